@@ -1,0 +1,103 @@
+//! Bit streams, least significant bit first (spec, section 7.1).
+
+#[cfg(feature = "encode")]
+use alloc::vec::Vec;
+
+/// Takes bits from bytes that arrive piece by piece.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BitReader {
+    /// Bits that have arrived and are not taken yet, the next one lowest.
+    window: u64,
+    available: u32,
+}
+
+impl BitReader {
+    /// Takes the next `count` <= 32 bits, pulling whole bytes from `input` as needed. `None` when
+    /// the input ends before; what was pulled is kept.
+    pub(crate) fn take(&mut self, count: u32, input: &mut &[u8]) -> Option<u32> {
+        while self.available < count {
+            let (&byte, rest) = input.split_first()?;
+            *input = rest;
+            self.window |= u64::from(byte) << self.available;
+            self.available += 8;
+        }
+        let value = self.window & ((1 << count) - 1);
+        self.window >>= count;
+        self.available -= count;
+        Some(value as u32)
+    }
+
+    /// Whether only zero bits, fewer than eight, remain: the padding of a last byte.
+    pub(crate) fn is_padding(&self) -> bool {
+        self.available < 8 && self.window == 0
+    }
+}
+
+/// Packs bits into bytes.
+#[cfg(feature = "encode")]
+#[derive(Debug, Default)]
+pub(crate) struct BitWriter {
+    bytes: Vec<u8>,
+    window: u64,
+    pending: u32,
+}
+
+#[cfg(feature = "encode")]
+impl BitWriter {
+    /// Appends the low `count` <= 32 bits of `value`.
+    pub(crate) fn put(&mut self, value: u32, count: u32) {
+        debug_assert!(count == 32 || value >> count == 0, "a code wider than its bit depth");
+        self.window |= u64::from(value) << self.pending;
+        self.pending += count;
+        while self.pending >= 8 {
+            self.bytes.push(self.window as u8);
+            self.window >>= 8;
+            self.pending -= 8;
+        }
+    }
+
+    /// The bytes, the last one padded with zero bits.
+    pub(crate) fn finish(mut self) -> Vec<u8> {
+        if self.pending > 0 {
+            self.bytes.push(self.window as u8);
+        }
+        self.bytes
+    }
+}
+
+#[cfg(all(test, feature = "encode"))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn any_fields_round_trip_through_any_slicing(
+            fields in prop::collection::vec((any::<u32>(), 1_u32..=32), 0..200),
+            slice in 1_usize..9,
+        ) {
+            let mut writer = BitWriter::default();
+            let fields: Vec<(u32, u32)> = fields
+                .into_iter()
+                .map(|(value, count)| (value & (u32::MAX >> (32 - count)), count))
+                .collect();
+            for &(value, count) in &fields {
+                writer.put(value, count);
+            }
+            let bytes = writer.finish();
+            let mut reader = BitReader::default();
+            let mut pieces = bytes.chunks(slice);
+            let mut input: &[u8] = &[];
+            for &(value, count) in &fields {
+                let taken = loop {
+                    match reader.take(count, &mut input) {
+                        Some(taken) => break taken,
+                        None => input = pieces.next().expect("the writer wrote every bit"),
+                    }
+                };
+                prop_assert_eq!(taken, value);
+            }
+            prop_assert!(reader.is_padding() && input.is_empty() && pieces.next().is_none());
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Symbols to bytes and back (spec, section 7).
+
+mod bits;
+pub(crate) mod fixed;

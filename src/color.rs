@@ -1,0 +1,88 @@
+//! The colour models and sample depths that a picture can have (spec, section 5).
+
+/// What the channels of a picture mean. Samples are sRGB-encoded unless an ICC profile says
+/// otherwise; alpha is straight (not premultiplied) and linear.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ColorModel {
+    /// One channel.
+    Gray,
+    /// Gray and alpha.
+    GrayAlpha,
+    /// Red, green, blue.
+    Rgb,
+    /// Red, green, blue, alpha.
+    Rgba,
+}
+
+impl ColorModel {
+    /// The number of channels, 1 to 4.
+    #[must_use]
+    pub const fn channels(self) -> usize {
+        match self {
+            Self::Gray => 1,
+            Self::GrayAlpha => 2,
+            Self::Rgb => 3,
+            Self::Rgba => 4,
+        }
+    }
+
+    /// Whether the last channel is alpha.
+    #[must_use]
+    pub const fn has_alpha(self) -> bool {
+        matches!(self, Self::GrayAlpha | Self::Rgba)
+    }
+
+    /// The code that the header stores.
+    #[cfg(feature = "encode")]
+    pub(crate) const fn code(self) -> u8 {
+        self.channels() as u8 - 1
+    }
+
+    /// The model that a header's code names.
+    pub(crate) const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Gray),
+            1 => Some(Self::GrayAlpha),
+            2 => Some(Self::Rgb),
+            3 => Some(Self::Rgba),
+            _ => None,
+        }
+    }
+}
+
+/// Bits per sample of the picture that was encoded, and of the natural output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SampleDepth {
+    /// 8 bits per sample.
+    Eight,
+    /// 16 bits per sample.
+    Sixteen,
+}
+
+impl SampleDepth {
+    /// 8 or 16.
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        match self {
+            Self::Eight => 8,
+            Self::Sixteen => 16,
+        }
+    }
+
+    /// Bytes per sample, 1 or 2.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        self.bits() as usize / 8
+    }
+
+    /// The depth of the given number of bits.
+    pub(crate) const fn from_bits(bits: u8) -> Option<Self> {
+        match bits {
+            8 => Some(Self::Eight),
+            16 => Some(Self::Sixteen),
+            _ => None,
+        }
+    }
+}

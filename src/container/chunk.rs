@@ -1,0 +1,80 @@
+//! Chunk framing: length, type, payload, CRC-32 (spec, section 4.2).
+
+#[cfg(feature = "encode")]
+use alloc::vec::Vec;
+use core::fmt;
+
+/// The first eight bytes of every file: a byte that no text starts with, the name, and line
+/// endings that a transfer in text mode would damage (as in PNG).
+pub(crate) const SIGNATURE: [u8; 8] = [0xC7, b'G', b'I', b'P', b'\r', b'\n', 0x1A, b'\n'];
+
+/// Longest payload that a chunk may declare.
+pub(crate) const MAX_CHUNK_LENGTH: u32 = (1 << 31) - 1;
+
+/// The type of a chunk: four ASCII letters. An upper-case first letter means *critical*: a decoder
+/// that does not know the type must refuse the file. Lower case means *ancillary*: skip it.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ChunkType(pub [u8; 4]);
+
+impl ChunkType {
+    /// The header, always first.
+    pub const GHDR: Self = Self(*b"GHDR");
+    /// The quantizers of all attributes.
+    pub const QNTZ: Self = Self(*b"QNTZ");
+    /// One layer of Gaussians.
+    pub const GAUS: Self = Self(*b"GAUS");
+    /// The end of the file.
+    pub const GEND: Self = Self(*b"GEND");
+    /// An ICC profile.
+    pub const ICCP: Self = Self(*b"iCCP");
+    /// Exif data: a TIFF stream.
+    pub const EXIF: Self = Self(*b"eXIf");
+    /// An XMP packet.
+    pub const XMP: Self = Self(*b"xMPd");
+    /// A keyword and its text.
+    pub const TEXT: Self = Self(*b"tEXt");
+
+    /// Whether a decoder must know this type to show the picture.
+    #[must_use]
+    pub const fn is_critical(self) -> bool {
+        self.0[0].is_ascii_uppercase()
+    }
+
+    /// Whether all four bytes are ASCII letters.
+    pub(crate) fn is_well_formed(self) -> bool {
+        self.0.iter().all(u8::is_ascii_alphabetic)
+    }
+}
+
+impl fmt::Display for ChunkType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for byte in self.0 {
+            fmt::Display::fmt(&byte.escape_ascii(), f)?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for ChunkType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "ChunkType({self})")
+    }
+}
+
+/// Appends one chunk. The payload is at most [`MAX_CHUNK_LENGTH`] bytes long.
+#[cfg(feature = "encode")]
+pub(crate) fn write_chunk(out: &mut Vec<u8>, kind: ChunkType, payload: &[u8]) {
+    use byteorder::{ByteOrder, LittleEndian};
+
+    debug_assert!(payload.len() <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
+    let mut word = [0; 4];
+    LittleEndian::write_u32(&mut word, payload.len() as u32);
+    out.extend_from_slice(&word);
+    out.extend_from_slice(&kind.0);
+    out.extend_from_slice(payload);
+    let mut crc = crc32fast::Hasher::new();
+    crc.update(&kind.0);
+    crc.update(payload);
+    LittleEndian::write_u32(&mut word, crc.finalize());
+    out.extend_from_slice(&word);
+}

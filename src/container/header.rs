@@ -1,0 +1,140 @@
+//! The `GHDR` chunk: all that a decoder must know before it allocates (spec, section 5.1).
+
+use byteorder::{ByteOrder, LittleEndian};
+
+use super::ChunkType;
+use crate::color::{ColorModel, SampleDepth};
+use crate::error::DecodeError;
+use crate::gaussian::Chart;
+use crate::render::Kernel;
+
+/// The version that this crate reads and writes. 0 is a draft: files may become unreadable.
+pub(crate) const VERSION: u8 = 0;
+/// Fixed-length bit packing, the only coding of version 0.
+const CODING_FIXED: u8 = 0;
+/// Largest width and height.
+pub(crate) const MAX_SIDE: u32 = 1 << 20;
+/// Bytes in the payload of `GHDR`.
+pub(crate) const HEADER_LENGTH: usize = 36;
+
+/// What a file says of its picture before the first Gaussian.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Header {
+    /// Version of the format; 0 is a draft.
+    pub version: u8,
+    /// Width in pixels, 1 to 2^20.
+    pub width: u32,
+    /// Height in pixels, 1 to 2^20.
+    pub height: u32,
+    /// What the channels mean.
+    pub color: ColorModel,
+    /// Bits per sample of the source picture.
+    pub depth: SampleDepth,
+    /// Number of Gaussians in all layers.
+    pub gaussians: u32,
+    /// Number of `GAUS` chunks.
+    pub layers: u16,
+    /// The kernel and its cut-off.
+    pub kernel: Kernel,
+    /// What the three shape attributes mean.
+    pub chart: Chart,
+    /// The colour that the Gaussians are added to: one value in 1/65535 per channel; channels
+    /// that the colour model lacks are 0.
+    pub base_color: [u16; 4],
+}
+
+impl Header {
+    /// Reads the payload of `GHDR`.
+    pub(crate) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
+        const CHUNK: ChunkType = ChunkType::GHDR;
+        // The version comes first, so that a later version may change all that follows.
+        if let Some(&version) = payload.first()
+            && version != VERSION
+        {
+            return Err(DecodeError::unsupported(CHUNK, "version", version.into()));
+        }
+        let payload: &[u8; HEADER_LENGTH] = payload
+            .try_into()
+            .map_err(|_| DecodeError::malformed(CHUNK, "the length is not 36 bytes"))?;
+        if payload[1] != CODING_FIXED {
+            return Err(DecodeError::unsupported(CHUNK, "coding", payload[1].into()));
+        }
+        let color = ColorModel::from_code(payload[2])
+            .ok_or_else(|| DecodeError::unsupported(CHUNK, "colour model", payload[2].into()))?;
+        let depth = SampleDepth::from_bits(payload[3])
+            .ok_or_else(|| DecodeError::unsupported(CHUNK, "sample depth", payload[3].into()))?;
+        let side = |at: usize, name: &'static str| match LittleEndian::read_u32(&payload[at..]) {
+            0 => Err(DecodeError::malformed(CHUNK, alloc::format!("the {name} is zero"))),
+            side if side > MAX_SIDE => {
+                Err(DecodeError::malformed(CHUNK, alloc::format!("the {name} is over 2^20")))
+            }
+            side => Ok(side),
+        };
+        let (width, height) = (side(4, "width")?, side(8, "height")?);
+        let gaussians = LittleEndian::read_u32(&payload[12..]);
+        let layers = LittleEndian::read_u16(&payload[16..]);
+        if u32::from(layers) > gaussians {
+            return Err(DecodeError::malformed(CHUNK, "more layers than Gaussians"));
+        }
+        if layers == 0 && gaussians != 0 {
+            return Err(DecodeError::malformed(CHUNK, "Gaussians, but no layer"));
+        }
+        let kernel = Kernel::parse(payload[18], LittleEndian::read_f32(&payload[20..]))?;
+        let chart = Chart::from_code(payload[19])
+            .ok_or_else(|| DecodeError::unsupported(CHUNK, "chart", payload[19].into()))?;
+        if payload[24] != 0 {
+            return Err(DecodeError::unsupported(CHUNK, "colour transform", payload[24].into()));
+        }
+        if payload[25..28] != [0; 3] {
+            return Err(DecodeError::malformed(CHUNK, "a reserved byte is not zero"));
+        }
+        let mut base_color = [0; 4];
+        LittleEndian::read_u16_into(&payload[28..], &mut base_color);
+        if base_color[color.channels()..].iter().any(|&value| value != 0) {
+            return Err(DecodeError::malformed(CHUNK, "base colour in an absent channel"));
+        }
+        Ok(Self {
+            version: VERSION,
+            width,
+            height,
+            color,
+            depth,
+            gaussians,
+            layers,
+            kernel,
+            chart,
+            base_color,
+        })
+    }
+
+    /// The payload of `GHDR`.
+    #[cfg(feature = "encode")]
+    pub(crate) fn to_payload(&self) -> [u8; HEADER_LENGTH] {
+        let mut payload = [0; HEADER_LENGTH];
+        payload[0] = self.version;
+        payload[1] = CODING_FIXED;
+        payload[2] = self.color.code();
+        payload[3] = self.depth.bits();
+        LittleEndian::write_u32(&mut payload[4..], self.width);
+        LittleEndian::write_u32(&mut payload[8..], self.height);
+        LittleEndian::write_u32(&mut payload[12..], self.gaussians);
+        LittleEndian::write_u16(&mut payload[16..], self.layers);
+        payload[18] = self.kernel.code();
+        payload[19] = self.chart.code();
+        LittleEndian::write_f32(&mut payload[20..], self.kernel.cutoff());
+        LittleEndian::write_u16_into(&self.base_color, &mut payload[28..]);
+        payload
+    }
+
+    /// The base colour as samples in [0, 1].
+    pub(crate) fn base(&self) -> [f32; 4] {
+        self.base_color.map(|value| f32::from(value) / 65535.0)
+    }
+
+    /// Number of stored components per Gaussian: two of position, three of shape, one per channel.
+    #[must_use]
+    pub fn components(&self) -> usize {
+        5 + self.color.channels()
+    }
+}

@@ -1,0 +1,110 @@
+//! The ancillary chunks that this crate understands (spec, section 5.5).
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::ChunkType;
+use crate::error::DecodeError;
+
+/// What a file carries besides its picture. Stored as it is, never interpreted.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Metadata {
+    /// An ICC profile for the colour channels; without one they are sRGB.
+    pub icc_profile: Option<Vec<u8>>,
+    /// Exif data: a TIFF stream, starting with `II` or `MM`.
+    pub exif: Option<Vec<u8>>,
+    /// An XMP packet: UTF-8 XML.
+    pub xmp: Option<Vec<u8>>,
+    /// Keywords and texts, in file order.
+    pub texts: Vec<Text>,
+}
+
+/// A keyword and its text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Text {
+    /// 1 to 79 bytes of UTF-8 without NUL, such as `Title`, `Author`, `Copyright`.
+    pub keyword: String,
+    /// Any UTF-8 text without NUL.
+    pub text: String,
+}
+
+impl Metadata {
+    /// Takes the payload of a known ancillary chunk; the first of each single-valued kind counts,
+    /// later ones are an error.
+    pub(crate) fn take(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
+        let slot = match chunk {
+            ChunkType::ICCP => &mut self.icc_profile,
+            ChunkType::EXIF => &mut self.exif,
+            ChunkType::XMP => &mut self.xmp,
+            _ => {
+                self.texts.push(Text::parse(payload)?);
+                return Ok(());
+            }
+        };
+        if slot.is_some() {
+            return Err(DecodeError::malformed(chunk, "appears twice"));
+        }
+        *slot = Some(payload);
+        Ok(())
+    }
+
+    /// Whether `chunk` is one of those that [`Metadata::take`] takes.
+    pub(crate) fn knows(chunk: ChunkType) -> bool {
+        matches!(chunk, ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP | ChunkType::TEXT)
+    }
+
+    /// Bytes held.
+    pub(crate) fn size(&self) -> u64 {
+        let blobs = [&self.icc_profile, &self.exif, &self.xmp];
+        let blobs = blobs.into_iter().flatten().map(Vec::len).sum::<usize>();
+        let texts = self.texts.iter().map(|t| t.keyword.len() + t.text.len()).sum::<usize>();
+        (blobs + texts + self.texts.len() * size_of::<Text>()) as u64
+    }
+
+    /// The chunks that carry this metadata, in the order in which they are written.
+    #[cfg(feature = "encode")]
+    pub(crate) fn chunks(&self) -> impl Iterator<Item = (ChunkType, Vec<u8>)> + '_ {
+        let blobs = [
+            (ChunkType::ICCP, &self.icc_profile),
+            (ChunkType::EXIF, &self.exif),
+            (ChunkType::XMP, &self.xmp),
+        ];
+        let blobs = blobs.into_iter().filter_map(|(chunk, blob)| Some((chunk, blob.clone()?)));
+        blobs.chain(self.texts.iter().map(|text| (ChunkType::TEXT, text.to_payload())))
+    }
+}
+
+impl Text {
+    /// Most bytes in a keyword.
+    #[cfg(feature = "encode")]
+    pub(crate) const MAX_KEYWORD: usize = MAX_KEYWORD;
+
+    fn parse(mut payload: Vec<u8>) -> Result<Self, DecodeError> {
+        const CHUNK: ChunkType = ChunkType::TEXT;
+        let nul = payload
+            .iter()
+            .position(|&byte| byte == 0)
+            .ok_or_else(|| DecodeError::malformed(CHUNK, "no NUL after the keyword"))?;
+        if !(1..=MAX_KEYWORD).contains(&nul) {
+            return Err(DecodeError::malformed(CHUNK, "the keyword is not 1 to 79 bytes long"));
+        }
+        let text = payload.split_off(nul + 1);
+        payload.truncate(nul);
+        let utf8 = |bytes| {
+            String::from_utf8(bytes).map_err(|_| DecodeError::malformed(CHUNK, "is not UTF-8"))
+        };
+        let (keyword, text) = (utf8(payload)?, utf8(text)?);
+        if text.contains('\0') {
+            return Err(DecodeError::malformed(CHUNK, "a NUL in the text"));
+        }
+        Ok(Self { keyword, text })
+    }
+
+    #[cfg(feature = "encode")]
+    fn to_payload(&self) -> Vec<u8> {
+        [self.keyword.as_bytes(), &[0], self.text.as_bytes()].concat()
+    }
+}
+
+const MAX_KEYWORD: usize = 79;

@@ -1,0 +1,17 @@
+//! The container: signature, chunks, header, metadata (spec, sections 4 and 5).
+
+mod chunk;
+mod header;
+mod metadata;
+mod parser;
+
+pub use chunk::ChunkType;
+#[cfg(feature = "encode")]
+pub(crate) use chunk::SIGNATURE;
+#[cfg(feature = "encode")]
+pub(crate) use chunk::write_chunk;
+pub use header::Header;
+#[cfg(feature = "encode")]
+pub(crate) use header::MAX_SIDE;
+pub use metadata::{Metadata, Text};
+pub(crate) use parser::{Event, Parser};

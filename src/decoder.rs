@@ -1,0 +1,435 @@
+//! The decoder: a push decoder without I/O, and an adapter over any `Read` (spec, section 4).
+
+use alloc::vec::Vec;
+
+use crate::coding::fixed::LayerReader;
+use crate::container::{ChunkType, Event, Header, Metadata, Parser};
+use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
+use crate::limits::Limits;
+use crate::quantizer::Quantizer;
+use crate::render::Picture;
+
+/// Most bytes of a header or quantizer chunk of version 0: nine quantizers of twelve bytes.
+const MAX_SMALL_CHUNK: u32 = 108;
+
+/// Most types that [`StreamDecoder::chunks`] tells apart: types are the file's own choice.
+const MAX_CHUNK_KINDS: usize = 64;
+
+/// Decodes bytes as they arrive, in pieces of any size.
+///
+/// After any piece it can give the [`Picture`] so far. It allocates as bytes arrive, never on the
+/// word of a declared count.
+///
+/// ```no_run
+/// # fn next_piece() -> Vec<u8> { vec![] }
+/// # fn main() -> Result<(), image_gip::DecodeError> {
+/// use image_gip::{RenderOptions, StreamDecoder};
+///
+/// let mut decoder = StreamDecoder::new();
+/// while !decoder.is_complete() {
+///     decoder.feed(&next_piece())?;
+///     if let Some(picture) = decoder.picture() {
+///         let options = RenderOptions::new();
+///         let mut pixels = vec![0; options.output_len(picture.header()).unwrap()];
+///         picture.render_u8(&options, &mut pixels)?;
+///     }
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct StreamDecoder {
+    parser: Parser,
+    limits: Limits,
+    stage: Stage,
+    header: Option<Header>,
+    quantizers: Vec<Quantizer>,
+    metadata: Metadata,
+    gaussians: Vec<Gaussian>,
+    layers: u16,
+    chunks: Vec<ChunkStatistics>,
+}
+
+/// How many chunks of a type a file has, and their bytes with framing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ChunkStatistics {
+    /// The type.
+    pub kind: ChunkType,
+    /// How many there are.
+    pub count: u32,
+    /// Their bytes, length, type and CRC included.
+    pub bytes: u64,
+}
+
+/// What the decoder does with the current chunk.
+#[derive(Debug)]
+enum Stage {
+    /// Between chunks.
+    Idle,
+    /// The payload is skipped.
+    Skip,
+    /// The payload is collected and read as a whole.
+    Collect(Vec<u8>),
+    /// A layer, and how many Gaussians there were before it.
+    Layer(LayerReader, usize),
+    /// `GEND` was read.
+    Complete,
+    /// An earlier call failed.
+    Failed,
+}
+
+impl Default for StreamDecoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl StreamDecoder {
+    /// A decoder with the default limits.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::with_limits(Limits::default())
+    }
+
+    /// A decoder with the given limits.
+    #[must_use]
+    pub fn with_limits(limits: Limits) -> Self {
+        Self {
+            parser: Parser::new(),
+            limits,
+            stage: Stage::Idle,
+            header: None,
+            quantizers: Vec::new(),
+            metadata: Metadata::default(),
+            gaussians: Vec::new(),
+            layers: 0,
+            chunks: Vec::new(),
+        }
+    }
+
+    /// Takes the next bytes of the file. Returns how many were used: all of them, unless the file
+    /// ends within them.
+    ///
+    /// # Errors
+    /// When the file is not a sound `.gip` file, needs something that this decoder does not have,
+    /// or exceeds a limit. The decoder cannot go on then, but [`StreamDecoder::picture`] still
+    /// gives what had been decoded; Gaussians of a layer whose CRC is wrong are dropped.
+    pub fn feed(&mut self, bytes: &[u8]) -> Result<usize, DecodeError> {
+        let mut input = bytes;
+        match self.advance(&mut input) {
+            Ok(()) => Ok(bytes.len() - input.len()),
+            Err(error) => {
+                if let Stage::Layer(_, before) = self.stage {
+                    self.gaussians.truncate(before);
+                }
+                self.stage = Stage::Failed;
+                Err(error)
+            }
+        }
+    }
+
+    /// Says that no more bytes will come.
+    ///
+    /// # Errors
+    /// When the file is not complete.
+    pub fn finish(&self) -> Result<(), DecodeError> {
+        match self.stage {
+            Stage::Complete => Ok(()),
+            Stage::Failed => Err(DecodeError::AlreadyFailed),
+            _ => Err(DecodeError::UnexpectedEnd { chunk: self.parser.current() }),
+        }
+    }
+
+    /// Whether the whole file has been read.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        matches!(self.stage, Stage::Complete)
+    }
+
+    /// What the file says of its picture, once that has arrived.
+    #[must_use]
+    pub fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
+    /// How each component is stored: two of position, three of shape, one per channel. Empty
+    /// until that has arrived.
+    #[must_use]
+    pub fn quantizers(&self) -> &[Quantizer] {
+        &self.quantizers
+    }
+
+    /// The metadata that has arrived. All of it stands before the first Gaussian.
+    #[must_use]
+    pub fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    /// The Gaussians that have arrived, in file order.
+    #[must_use]
+    pub fn gaussians(&self) -> &[Gaussian] {
+        &self.gaussians
+    }
+
+    /// The chunks that are complete, by type, in order of first appearance.
+    #[must_use]
+    pub fn chunks(&self) -> &[ChunkStatistics] {
+        &self.chunks
+    }
+
+    /// The picture so far; `None` until the header has arrived.
+    #[must_use]
+    pub fn picture(&self) -> Option<Picture<'_>> {
+        let header = self.header.as_ref()?;
+        Some(Picture::new(header, &self.gaussians, &self.limits))
+    }
+
+    /// Whether the first layer has begun: header and metadata are complete.
+    #[cfg(feature = "std")]
+    fn has_begun(&self) -> bool {
+        matches!(self.stage, Stage::Layer(..) | Stage::Complete) || self.layers > 0
+    }
+
+    fn advance(&mut self, input: &mut &[u8]) -> Result<(), DecodeError> {
+        match self.stage {
+            Stage::Failed => return Err(DecodeError::AlreadyFailed),
+            Stage::Complete => return Ok(()),
+            _ => {}
+        }
+        loop {
+            match self.parser.next(input)? {
+                Event::NeedMore => return Ok(()),
+                Event::Begin(chunk, length) => self.stage = self.begin(chunk, length)?,
+                Event::Payload(payload) => self.payload(payload)?,
+                Event::Complete(chunk, length) => {
+                    self.complete(chunk)?;
+                    self.count(chunk, length);
+                    if matches!(self.stage, Stage::Complete) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Checks that a chunk may stand here, and says what becomes of its payload.
+    fn begin(&self, chunk: ChunkType, length: u32) -> Result<Stage, DecodeError> {
+        let misplaced = |reason| Err(DecodeError::malformed(chunk, reason));
+        if self.header.is_none() && chunk != ChunkType::GHDR {
+            return misplaced("stands before the header");
+        }
+        match chunk {
+            ChunkType::GHDR if self.header.is_some() => misplaced("appears twice"),
+            ChunkType::QNTZ if !self.quantizers.is_empty() => misplaced("appears twice"),
+            ChunkType::GHDR | ChunkType::QNTZ if length > MAX_SMALL_CHUNK => {
+                misplaced("is too long")
+            }
+            ChunkType::GAUS if self.quantizers.is_empty() => misplaced("stands before QNTZ"),
+            ChunkType::GAUS if Some(self.layers) == self.header.as_ref().map(|h| h.layers) => {
+                misplaced("more layers than the header declares")
+            }
+            ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
+            ChunkType::GEND if length != 0 => misplaced("is not empty"),
+            // A later version may add to these; version 0 reads them before any layer only.
+            _ if Metadata::knows(chunk) && self.layers == 0 => {
+                self.limits.check_memory(self.metadata.size() + u64::from(length))?;
+                Ok(Stage::Collect(Vec::new()))
+            }
+            ChunkType::GHDR | ChunkType::QNTZ => Ok(Stage::Collect(Vec::new())),
+            ChunkType::GEND => Ok(Stage::Skip),
+            _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
+            _ => Ok(Stage::Skip),
+        }
+    }
+
+    fn payload(&mut self, mut payload: &[u8]) -> Result<(), DecodeError> {
+        match &mut self.stage {
+            Stage::Collect(bytes) => bytes.extend_from_slice(payload),
+            Stage::Layer(layer, _) => {
+                let Some(header) = &self.header else { return Ok(()) };
+                let allowed = header.gaussians - self.gaussians.len() as u32;
+                if layer.count(&mut payload, &self.quantizers, allowed)?.is_none() {
+                    return Ok(());
+                }
+                while let Some(values) = layer.next(&mut payload, &self.quantizers)? {
+                    let values = &values[..self.quantizers.len()];
+                    self.gaussians.push(Gaussian::from_components(values, header.chart));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Reads a chunk whose CRC was right.
+    fn complete(&mut self, chunk: ChunkType) -> Result<(), DecodeError> {
+        match (chunk, &mut self.stage) {
+            (ChunkType::GHDR, Stage::Collect(payload)) => {
+                let header = Header::parse(payload)?;
+                self.limits.check_size(header.width, header.height)?;
+                self.limits.check_gaussians(header.gaussians)?;
+                let bytes = u64::from(header.gaussians) * size_of::<Gaussian>() as u64;
+                self.limits.check_memory(bytes)?;
+                self.header = Some(header);
+            }
+            (ChunkType::QNTZ, Stage::Collect(payload)) => {
+                let components = self.header.as_ref().map_or(0, Header::components);
+                self.quantizers = Quantizer::parse_all(payload, components)?;
+            }
+            (_, Stage::Collect(payload)) => {
+                let payload = core::mem::take(payload);
+                self.metadata.take(chunk, payload)?;
+            }
+            (_, Stage::Layer(layer, _)) => {
+                layer.finish()?;
+                self.layers += 1;
+            }
+            (ChunkType::GEND, _) => {
+                let declared = self.header.as_ref().map(|h| (h.layers, h.gaussians as usize));
+                if declared != Some((self.layers, self.gaussians.len())) {
+                    let reason = "fewer layers or Gaussians than the header declares";
+                    return Err(DecodeError::malformed(chunk, reason));
+                }
+                self.stage = Stage::Complete;
+                return Ok(());
+            }
+            _ => {}
+        }
+        self.stage = Stage::Idle;
+        Ok(())
+    }
+
+    fn count(&mut self, kind: ChunkType, length: u32) {
+        let bytes = u64::from(length) + 12;
+        if let Some(known) = self.chunks.iter_mut().find(|known| known.kind == kind) {
+            known.count += 1;
+            known.bytes += bytes;
+        } else if self.chunks.len() < MAX_CHUNK_KINDS {
+            self.chunks.push(ChunkStatistics { kind, count: 1, bytes });
+        }
+    }
+}
+
+/// Decodes from any reader, in one pass and without seeking.
+///
+/// ```no_run
+/// # fn main() -> Result<(), image_gip::DecodeError> {
+/// let file = std::fs::File::open("picture.gip")?;
+/// let mut decoder = image_gip::Decoder::new(file)?;
+/// let mut pixels = vec![0; decoder.output_len().expect("fits the address space")];
+/// decoder.decode_into(&mut pixels)?;
+/// # Ok(())
+/// # }
+/// ```
+#[cfg(feature = "std")]
+#[derive(Debug)]
+pub struct Decoder<R> {
+    reader: R,
+    stream: StreamDecoder,
+    options: crate::render::RenderOptions,
+}
+
+#[cfg(feature = "std")]
+impl<R: std::io::Read> Decoder<R> {
+    /// Reads header and metadata, with the default limits.
+    ///
+    /// # Errors
+    /// When reading fails, or the file is not a sound `.gip` file up to its first layer.
+    pub fn new(reader: R) -> Result<Self, DecodeError> {
+        Self::with_limits(reader, Limits::default())
+    }
+
+    /// Reads header and metadata, with the given limits.
+    ///
+    /// # Errors
+    /// As [`Decoder::new`], and when a limit is exceeded.
+    pub fn with_limits(reader: R, limits: Limits) -> Result<Self, DecodeError> {
+        let stream = StreamDecoder::with_limits(limits);
+        let options = crate::render::RenderOptions::new();
+        let mut decoder = Self { reader, stream, options };
+        while !decoder.stream.has_begun() {
+            decoder.read_some()?;
+        }
+        Ok(decoder)
+    }
+
+    /// What the file says of its picture.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        self.stream.header().expect("`with_limits` read it")
+    }
+
+    /// ICC profile, Exif, XMP and texts.
+    #[must_use]
+    pub fn metadata(&self) -> &Metadata {
+        self.stream.metadata()
+    }
+
+    /// The push decoder inside, with all that has arrived.
+    #[must_use]
+    pub fn stream(&self) -> &StreamDecoder {
+        &self.stream
+    }
+
+    /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes.
+    pub fn set_options(&mut self, options: crate::render::RenderOptions) {
+        self.options = options;
+    }
+
+    /// The number of samples that [`Decoder::decode_into`] writes.
+    #[must_use]
+    pub fn output_len(&self) -> Option<usize> {
+        self.options.output_len(self.header())
+    }
+
+    /// Reads the rest of the file.
+    ///
+    /// # Errors
+    /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
+    /// decoded until then.
+    pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
+        while !self.stream.is_complete() {
+            self.read_some()?;
+        }
+        Ok(())
+    }
+
+    /// The picture so far.
+    #[must_use]
+    pub fn picture(&self) -> Picture<'_> {
+        self.stream.picture().expect("`with_limits` read the header")
+    }
+
+    /// Reads the rest of the file and renders interleaved 8-bit samples.
+    ///
+    /// # Errors
+    /// As [`Decoder::read_to_end`] and [`Picture::render_u8`].
+    pub fn decode_into(&mut self, out: &mut [u8]) -> Result<(), DecodeError> {
+        self.read_to_end()?;
+        self.picture().render_u8(&self.options, out)
+    }
+
+    /// Reads the rest of the file and renders interleaved 16-bit samples.
+    ///
+    /// # Errors
+    /// As [`Decoder::read_to_end`] and [`Picture::render_u16`].
+    pub fn decode_into_u16(&mut self, out: &mut [u16]) -> Result<(), DecodeError> {
+        self.read_to_end()?;
+        self.picture().render_u16(&self.options, out)
+    }
+
+    /// Feeds one piece of the file to the push decoder.
+    fn read_some(&mut self) -> Result<(), DecodeError> {
+        let mut buffer = [0; 8192];
+        loop {
+            match self.reader.read(&mut buffer) {
+                Ok(0) => return self.stream.finish(),
+                Ok(length) => return self.stream.feed(&buffer[..length]).map(|_| ()),
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+}

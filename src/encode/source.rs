@@ -1,0 +1,100 @@
+//! The picture to encode.
+
+use super::error::EncodeError;
+use crate::color::{ColorModel, SampleDepth};
+use crate::container::MAX_SIDE;
+
+/// A picture in the caller's memory: interleaved samples, rows from the top, without padding.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    width: u32,
+    height: u32,
+    color: ColorModel,
+    samples: Samples<'a>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Samples<'a> {
+    Eight(&'a [u8]),
+    Sixteen(&'a [u16]),
+}
+
+impl<'a> Source<'a> {
+    /// A picture of 8-bit samples: width x height x channels of them.
+    ///
+    /// # Errors
+    /// When a side is not 1 to 2^20, or the number of samples does not fit.
+    pub fn new_u8(
+        width: u32,
+        height: u32,
+        color: ColorModel,
+        samples: &'a [u8],
+    ) -> Result<Self, EncodeError> {
+        check(width, height, color, samples.len())?;
+        Ok(Self { width, height, color, samples: Samples::Eight(samples) })
+    }
+
+    /// A picture of 16-bit samples in the machine's byte order.
+    ///
+    /// # Errors
+    /// As [`Source::new_u8`].
+    pub fn new_u16(
+        width: u32,
+        height: u32,
+        color: ColorModel,
+        samples: &'a [u16],
+    ) -> Result<Self, EncodeError> {
+        check(width, height, color, samples.len())?;
+        Ok(Self { width, height, color, samples: Samples::Sixteen(samples) })
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// What the channels mean.
+    #[must_use]
+    pub fn color(&self) -> ColorModel {
+        self.color
+    }
+
+    /// Bits per sample.
+    #[must_use]
+    pub fn depth(&self) -> SampleDepth {
+        match self.samples {
+            Samples::Eight(_) => SampleDepth::Eight,
+            Samples::Sixteen(_) => SampleDepth::Sixteen,
+        }
+    }
+
+    /// The sample at an index of the interleaved order, 1.0 being a full one.
+    pub(crate) fn sample(&self, index: usize) -> f32 {
+        match self.samples {
+            Samples::Eight(samples) => f32::from(samples[index]) / 255.0,
+            Samples::Sixteen(samples) => f32::from(samples[index]) / 65535.0,
+        }
+    }
+}
+
+fn check(width: u32, height: u32, color: ColorModel, samples: usize) -> Result<(), EncodeError> {
+    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+        return Err(EncodeError::Source(format!(
+            "{width}x{height} pixels; each side must be 1 to {MAX_SIDE}"
+        )));
+    }
+    let wanted = u64::from(width) * u64::from(height) * color.channels() as u64;
+    if samples as u64 != wanted {
+        return Err(EncodeError::Source(format!(
+            "{samples} samples; {width}x{height} {color:?} needs {wanted}"
+        )));
+    }
+    Ok(())
+}

@@ -1,0 +1,133 @@
+//! The kernel: how a Gaussian falls off with the squared Mahalanobis distance q (spec, section
+//! 9.3).
+
+use crate::container::ChunkType;
+use crate::error::DecodeError;
+use crate::math;
+
+/// Largest cut-off of the reference kernel.
+const MAX_CUTOFF: f32 = 64.0;
+/// Where the quartic kernel ends.
+pub(crate) const QUARTIC_CUTOFF: f32 = 8.0;
+
+/// What is added at squared Mahalanobis distance q from a Gaussian's centre, relative to its
+/// colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Kernel {
+    /// The paper's: exp(-q / 2) for q up to a cut-off, else 0. Discontinuous there.
+    Exponential {
+        /// The largest q that is drawn, in (0, 64]. The paper's code draws weights of at least
+        /// 1/255, that is up to 2 ln 255 = 11.08.
+        cutoff: f32,
+    },
+    /// (1 - q / 8)^4 for q < 8, else 0: close to exp(-q / 2), but without an exponential, and
+    /// smooth where it ends.
+    Quartic,
+}
+
+impl Kernel {
+    /// The paper's kernel as its released code cuts it off: at weights below 1/255.
+    pub const PAPER: Self = Self::Exponential { cutoff: 11.082_527 };
+
+    /// The value of q from which on nothing is drawn.
+    #[must_use]
+    pub const fn cutoff(self) -> f32 {
+        match self {
+            Self::Exponential { cutoff } => cutoff,
+            Self::Quartic => QUARTIC_CUTOFF,
+        }
+    }
+
+    /// The weight at q >= 0; q may be infinite.
+    pub(crate) fn weight(self, q: f32) -> f32 {
+        match self {
+            Self::Exponential { cutoff } if q <= cutoff => math::exp(q * -0.5),
+            Self::Exponential { .. } => 0.0,
+            Self::Quartic => {
+                let t = (1.0 - q * 0.125).max(0.0);
+                let t2 = t * t;
+                t2 * t2
+            }
+        }
+    }
+
+    /// The code that the header stores.
+    #[cfg(feature = "encode")]
+    pub(crate) const fn code(self) -> u8 {
+        match self {
+            Self::Exponential { .. } => 0,
+            Self::Quartic => 1,
+        }
+    }
+
+    /// The kernel that a header names, with the cut-off that it states.
+    pub(crate) fn parse(code: u8, cutoff: f32) -> Result<Self, DecodeError> {
+        const CHUNK: ChunkType = ChunkType::GHDR;
+        match code {
+            0 if cutoff > 0.0 && cutoff <= MAX_CUTOFF => Ok(Self::Exponential { cutoff }),
+            1 if cutoff == QUARTIC_CUTOFF => Ok(Self::Quartic),
+            0 => Err(DecodeError::malformed(CHUNK, "a cut-off that is not in (0, 64]")),
+            1 => {
+                Err(DecodeError::malformed(CHUNK, "a cut-off of the quartic kernel that is not 8"))
+            }
+            _ => Err(DecodeError::unsupported(CHUNK, "kernel", code.into())),
+        }
+    }
+}
+
+#[cfg(feature = "std")]
+pub(crate) mod simd {
+    //! The same weights, sixteen at a time and bit for bit.
+
+    use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+
+    use crate::math::{EXP2_POLYNOMIAL, LOG2_E, ROUND_MAGIC};
+
+    /// A kernel whose parameters are known when the inner loop is compiled.
+    pub(crate) trait Weight: Copy {
+        /// The weights at q.
+        fn weight<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S>;
+    }
+
+    #[derive(Clone, Copy)]
+    pub(crate) struct Exponential {
+        pub(crate) cutoff: f32,
+    }
+
+    #[derive(Clone, Copy)]
+    pub(crate) struct Quartic;
+
+    impl Weight for Quartic {
+        #[inline(always)]
+        fn weight<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
+            let t = (f32x16::splat(simd, 1.0) - q * 0.125).max(0.0);
+            let t2 = t * t;
+            t2 * t2
+        }
+    }
+
+    impl Weight for Exponential {
+        #[inline(always)]
+        fn weight<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
+            let zero = f32x16::splat(simd, 0.0);
+            q.simd_le(self.cutoff).select(exp(simd, q * -0.5), zero)
+        }
+    }
+
+    /// [`math::exp`](crate::math::exp), sixteen at a time.
+    #[inline(always)]
+    pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+        let y = (x * LOG2_E).max(-126.0).min(126.0);
+        let shifted = y + ROUND_MAGIC;
+        let f = y - (shifted - ROUND_MAGIC);
+        let mut p = f32x16::splat(simd, EXP2_POLYNOMIAL[0]);
+        for &coefficient in &EXP2_POLYNOMIAL[1..] {
+            p = p * f + coefficient;
+        }
+        // The low bits of `shifted` are the rounded y itself.
+        let exponent: u32x16<S> = shifted.bitcast();
+        let power = (exponent - (ROUND_MAGIC.to_bits() - 127)) << 23;
+        p * power.bitcast::<f32x16<S>>()
+    }
+}
