@@ -48,3 +48,13 @@ pub use limits::Limits;
 pub use quantizer::{Quantizer, Steps};
 #[cfg(feature = "decode")]
 pub use render::{Kernel, Picture, Region, RenderOptions};
+
+#[cfg(feature = "encode")]
+pub mod training {
+    //! The constants of training, for those who study the method: see [`Training`].
+
+    pub use crate::encode::training::{
+        Densification, Distortion, Filter, NewColor, NewShape, Optimizer, Placement, Portion,
+        Quantization, Schedule, Training, Units,
+    };
+}

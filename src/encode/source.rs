@@ -75,12 +75,17 @@ impl<'a> Source<'a> {
         }
     }
 
+    /// The sample at an index of the interleaved order.
+    pub(crate) fn integer(&self, index: usize) -> u16 {
+        match self.samples {
+            Samples::Eight(samples) => samples[index].into(),
+            Samples::Sixteen(samples) => samples[index],
+        }
+    }
+
     /// The sample at an index of the interleaved order, 1.0 being a full one.
     pub(crate) fn sample(&self, index: usize) -> f32 {
-        match self.samples {
-            Samples::Eight(samples) => f32::from(samples[index]) / 255.0,
-            Samples::Sixteen(samples) => f32::from(samples[index]) / 65535.0,
-        }
+        f32::from(self.integer(index)) / f32::from(self.depth().max_sample())
     }
 }
 

@@ -16,9 +16,9 @@ pub use view::{Region, RenderOptions};
 #[cfg(feature = "encode")]
 pub(crate) use kernel::simd as kernel_simd;
 pub(crate) use splat::Splat;
-pub(crate) use tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
 #[cfg(feature = "encode")]
-pub(crate) use tile::{Plane, TILE_PIXELS};
+pub(crate) use tile::centers;
+pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
 pub(crate) use tiling::Tiling;
 #[cfg(feature = "encode")]
 pub(crate) use view::View;
@@ -165,7 +165,7 @@ struct Job {
 
 impl Job {
     /// Renders one row of tiles and hands each over with its first column in the region.
-    fn row(&self, row: usize, write: impl FnMut(&[tile::Plane], usize)) {
+    fn row(&self, row: usize, write: impl FnMut(&[Plane], usize)) {
         match self.channels {
             1 => self.row_of::<1>(row, write),
             2 => self.row_of::<2>(row, write),
@@ -174,16 +174,12 @@ impl Job {
         }
     }
 
-    fn row_of<const CHANNELS: usize>(
-        &self,
-        row: usize,
-        mut write: impl FnMut(&[tile::Plane], usize),
-    ) {
+    fn row_of<const CHANNELS: usize>(&self, row: usize, mut write: impl FnMut(&[Plane], usize)) {
         let y = self.region.y + (row * TILE_HEIGHT) as u32;
         for column in 0..self.tiling.columns() {
             let x = column * TILE_WIDTH;
             let origin = (self.region.x + x as u32, y);
-            let mut planes: [tile::Plane; CHANNELS] =
+            let mut planes: [Plane; CHANNELS] =
                 core::array::from_fn(|channel| [[self.base[channel]; TILE_WIDTH]; TILE_HEIGHT]);
             let list = self.tiling.splats(column, row);
             self.backend.add(&mut planes, origin, &self.splats, list, self.kernel);
