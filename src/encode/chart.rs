@@ -169,3 +169,70 @@ fn axes(angle: f32) -> (Vec2, Vec2) {
     let (sin, cos) = angle.sin_cos();
     (Vec2::new(cos, sin), Vec2::new(-sin, cos))
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::gaussian::Gaussian;
+
+    const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
+
+    fn covariance(chart: Chart, values: Vec3) -> [f32; 3] {
+        let cholesky = chart.to_cholesky(values.into());
+        Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] }.covariance()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(128))]
+
+        #[test]
+        fn shapes_survive_the_way_through_every_chart(
+            l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
+        ) {
+            let expected = covariance(Chart::Cholesky, Vec3::new(l11, l21, l22));
+            for chart in CHARTS {
+                let found = covariance(chart, from_cholesky(chart, [l11, l21, l22]));
+                for (found, expected_value) in found.iter().zip(expected) {
+                    let scale = expected[0] + expected[2];
+                    prop_assert!((found - expected_value).abs() <= 1e-5 * scale, "{chart:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn the_filter_adds_its_variance_along_both_axes(
+            l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
+            variance in 0.0_f32..300.0,
+        ) {
+            let [xx, xy, yy] = covariance(Chart::Cholesky, Vec3::new(l11, l21, l22));
+            for chart in CHARTS {
+                let values = from_cholesky(chart, [l11, l21, l22]);
+                let found = covariance(chart, widened(chart, values, variance));
+                let scale = xx + yy + variance;
+                for (found, expected) in found.iter().zip([xx + variance, xy, yy + variance]) {
+                    prop_assert!((found - expected).abs() <= 2e-5 * scale, "{chart:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn whatever_is_confined_is_drawn(values in prop::array::uniform3(any::<f32>())) {
+            for chart in CHARTS {
+                let confined = confined(chart, Vec3::from(values), 4096.0);
+                let cholesky = chart.to_cholesky(confined.into());
+                let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
+                prop_assert!(gaussian.is_drawable(), "{chart:?} {values:?}: {cholesky:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn confining_leaves_ordinary_shapes_alone() {
+        for chart in CHARTS {
+            let values = from_cholesky(chart, [3.0, -1.0, 2.0]);
+            assert_eq!(confined(chart, values, 100.0), values, "{chart:?}");
+        }
+    }
+}

@@ -364,3 +364,202 @@ fn sums<S: Simd>(vectors: [f32x16<S>; 4]) -> [f32; 4] {
     let quarters = vectors.map(|vector| quarter(vector).to_array());
     quarters.map(|[a, b, c, d]| (a + c) + (b + d))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::source::Source;
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
+    use crate::render::View;
+
+    const WIDTH: u32 = 37;
+    const HEIGHT: u32 = 21;
+    const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
+    const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
+
+    /// Half the sum of squared residuals, straight from the formulas, in f64.
+    fn loss(
+        rows: &[[f64; MAX_COMPONENTS]],
+        chart: Chart,
+        kernel: Kernel,
+        source: &Source<'_>,
+    ) -> f64 {
+        let channels = source.color().channels();
+        let mut loss = 0.0;
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let mut sums = BASE.map(f64::from);
+                for row in rows {
+                    let [a, b, c] = [row[2], row[3], row[4]];
+                    let (xx, xy, yy) = match chart {
+                        Chart::Covariance => (a, b, c),
+                        Chart::Cholesky => (a * a, a * b, b * b + c * c),
+                        Chart::RotationScale => {
+                            let (sin, cos) = c.sin_cos();
+                            let (a, b) = (a * a, b * b);
+                            (
+                                cos * cos * a + sin * sin * b,
+                                cos * sin * (a - b),
+                                sin * sin * a + cos * cos * b,
+                            )
+                        }
+                    };
+                    let (dx, dy) = (f64::from(x) + 0.5 - row[0], f64::from(y) + 0.5 - row[1]);
+                    let determinant = xx * yy - xy * xy;
+                    let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+                    let weight = match kernel {
+                        Kernel::Quartic => (1.0 - q / 8.0).max(0.0).powi(4),
+                        Kernel::Exponential { cutoff } if q <= f64::from(cutoff) => {
+                            (-q / 2.0).exp()
+                        }
+                        Kernel::Exponential { .. } => 0.0,
+                    };
+                    for (sum, color) in sums.iter_mut().zip(&row[5..]) {
+                        *sum += color * weight;
+                    }
+                }
+                for channel in 0..channels {
+                    let index = (y * WIDTH + x) as usize * channels + channel;
+                    loss += 0.5 * (sums[channel] - f64::from(source.sample(index))).powi(2);
+                }
+            }
+        }
+        loss
+    }
+
+    /// Gaussians of many shapes: round, slanted both ways, needles, over the border.
+    fn scene(chart: Chart, channels: usize, rng: &mut fastrand::Rng) -> Vec<[f32; MAX_COMPONENTS]> {
+        (0..12)
+            .map(|index| {
+                let (s1, s2) = match index % 3 {
+                    0 => (2.0 + 3.0 * rng.f32(), 2.0 + 3.0 * rng.f32()),
+                    1 => (6.0, 1.0 + rng.f32()),
+                    _ => (12.0, 0.8),
+                };
+                let angle = rng.f32() * 6.0 - 3.0;
+                let factor = Chart::RotationScale.to_cholesky([s1, s2, angle]);
+                let shape = match chart {
+                    Chart::RotationScale => Vec3::new(s1, s2, angle),
+                    _ => super::super::chart::from_cholesky(chart, factor),
+                };
+                let mut row = [0.0; MAX_COMPONENTS];
+                row[0] = rng.f32() * 45.0 - 4.0;
+                row[1] = rng.f32() * 27.0 - 3.0;
+                row[2..5].copy_from_slice(&shape.to_array());
+                for value in &mut row[5..5 + channels] {
+                    *value = rng.f32() * 0.4 - 0.2;
+                }
+                row
+            })
+            .collect()
+    }
+
+    fn gradients(
+        rows: &[[f32; MAX_COMPONENTS]],
+        chart: Chart,
+        kernel: Kernel,
+        raster: &Raster,
+    ) -> Vec<[f32; MAX_COMPONENTS]> {
+        let view = View::identity(WIDTH, HEIGHT);
+        let splats: Vec<_> = rows
+            .iter()
+            .map(|row| {
+                let gaussian = Gaussian::from_components(&row[..5 + raster.channels], chart);
+                Splat::new(&gaussian, &view).expect("the scene is sound")
+            })
+            .collect();
+        let mut by_splat = Vec::new();
+        Pass::new(raster).run(raster, &splats, kernel, BASE, &mut by_splat);
+        let by_row = by_splat.iter().zip(rows).map(|(gradient, row)| {
+            let (center, shape) = gradient.moments.gradients(chart, Vec3::from_slice(&row[2..5]));
+            let mut out = [0.0; MAX_COMPONENTS];
+            out[..2].copy_from_slice(&center.to_array());
+            out[2..5].copy_from_slice(&shape.to_array());
+            out[5..].copy_from_slice(&gradient.color);
+            out
+        });
+        by_row.collect()
+    }
+
+    #[test]
+    fn every_gradient_equals_its_finite_difference() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        // Away from black and white, where the residual saturates on purpose. A cut-off so far out
+        // that the jump there is below what f32 resolves.
+        let kernels = [Kernel::Quartic, Kernel::Exponential { cutoff: 40.0 }];
+        let colors = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+        for (chart, kernel) in CHARTS.into_iter().flat_map(|c| kernels.map(|k| (c, k))) {
+            for color in colors {
+                let channels = color.channels();
+                let samples: Vec<u8> = (0..WIDTH as usize * HEIGHT as usize * channels)
+                    .map(|_| rng.u8(1..255))
+                    .collect();
+                let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
+                let rows = scene(chart, channels, &mut rng);
+                let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
+                let found = gradients(&rows, chart, kernel, &Raster::new(&source));
+                for (index, found) in found.iter().enumerate() {
+                    for component in 0..5 + channels {
+                        let step = 1e-5 * exact[index][component].abs().max(1.0);
+                        let moved = |by: f64| {
+                            let mut rows = exact.clone();
+                            rows[index][component] += by;
+                            loss(&rows, chart, kernel, &source)
+                        };
+                        let expected = (moved(step) - moved(-step)) / (2.0 * step);
+                        let error = (f64::from(found[component]) - expected).abs();
+                        assert!(
+                            error <= 2e-3 * expected.abs() + 2e-4,
+                            "{chart:?} {kernel:?} {color:?}, Gaussian {index}, component \
+                             {component}: {} against {expected}",
+                            found[component]
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_simd_level_gives_the_same_bits() {
+        let mut rng = fastrand::Rng::with_seed(2);
+        let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+        let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+        let raster = Raster::new(&source);
+        let rows = scene(Chart::Cholesky, 3, &mut rng);
+        let view = View::identity(WIDTH, HEIGHT);
+        let splats: Vec<_> = rows
+            .iter()
+            .filter_map(|row| {
+                Splat::new(&Gaussian::from_components(&row[..8], Chart::Cholesky), &view)
+            })
+            .collect();
+        let run = |level| {
+            let mut pass = Pass { level, ..Pass::new(&raster) };
+            let mut gradients = Vec::new();
+            let error = pass.run(&raster, &splats, Kernel::Quartic, BASE, &mut gradients);
+            (error, gradients)
+        };
+        let expected = run(Level::baseline());
+        assert!(expected.0 > 0.0);
+        assert_eq!(run(Level::new()), expected);
+    }
+
+    #[test]
+    fn what_lies_outside_the_picture_or_beyond_white_is_no_error() {
+        let white = [255; 5 * 3 * 3];
+        let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
+        let raster = Raster::new(&source);
+        let gaussian =
+            Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
+        let splat = Splat::new(&gaussian, &View::identity(5, 3)).expect("it is sound");
+        let mut gradients = Vec::new();
+        let error =
+            Pass::new(&raster).run(&raster, &[splat], Kernel::Quartic, [0.9; 4], &mut gradients);
+        assert_eq!(error, 0.0);
+        assert_eq!(gradients[0], SplatGradient::default());
+    }
+}

@@ -217,3 +217,122 @@ fn bulk(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
     let reach = 3.0 * variance.sqrt();
     (low.max((mean - reach) as f32), high.min((mean + reach) as f32))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec2;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::encode::training::Training;
+
+    const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
+
+    fn bounds(chart: Chart) -> Bounds {
+        Bounds { chart, channels: 3, size: Vec2::new(300.0, 200.0) }
+    }
+
+    /// Sound Gaussians, from tiny to as large as the picture, needles among them.
+    fn rows(chart: Chart, count: usize, seed: u64) -> Vec<Row> {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let mut number = move |low: f32, high: f32| low + (high - low) * rng.f32();
+        (0..count)
+            .map(|_| {
+                let (s1, s2) = (number(-1.5, 5.0).exp(), number(-1.5, 2.0).exp());
+                let factor = Chart::RotationScale.to_cholesky([s1, s2, number(-3.0, 3.0)]);
+                let mut row = [0.0; MAX_COMPONENTS];
+                row[0] = number(-5.0, 305.0);
+                row[1] = number(-5.0, 205.0);
+                row[2..5].copy_from_slice(&chart::from_cholesky(chart, factor).to_array());
+                for value in &mut row[5..8] {
+                    *value = number(-0.5, 1.0);
+                }
+                bounds(chart).confined(row)
+            })
+            .collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn no_gaussian_is_lost_by_rounding(seed: u64, shape_bits in 2_u8..=12, drift in -30..30) {
+            for chart in CHARTS {
+                let rows = rows(chart, 50, seed);
+                let mut options = Training::fast(1).quantization;
+                options.shape_bits = shape_bits;
+                let mut quantizers = Quantizers::new(&rows, bounds(chart), &options);
+                // Scales and offsets as training may have moved them.
+                let gradient = [[f32::from(drift as i8), -f32::from(drift as i8)]; MAX_COMPONENTS];
+                for _ in 0..5 {
+                    quantizers.step(&gradient, rows.len(), 0.05);
+                }
+                for row in &rows {
+                    let codes = quantizers.codes(row);
+                    prop_assert!(quantizers.is_drawable(&codes), "{chart:?}: {row:?}");
+                    for (code, component) in codes.iter().zip(&quantizers.components) {
+                        prop_assert!(*code <= component.steps.max_code());
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn rounding_errs_by_half_a_step(seed: u64) {
+            let rows = rows(Chart::Cholesky, 40, seed);
+            let options = Training::fast(1).quantization;
+            let quantizers = Quantizers::new(&rows, bounds(Chart::Cholesky), &options);
+            for row in &rows {
+                let decoded = quantizers.decoded(&quantizers.codes(row));
+                // Position and shape cover their whole range; colours are clipped on purpose.
+                for (index, component) in quantizers.components.iter().enumerate().take(5) {
+                    let least = component.least;
+                    let error = domain(decoded[index], least) - domain(row[index], least);
+                    prop_assert!(error.abs() <= 0.501 * component.steps.scale + 1e-5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn gradients_by_scale_and_offset_are_those_of_lsq_plus() {
+        let rows = rows(Chart::Cholesky, 30, 7);
+        let options = Training::fast(1).quantization;
+        let quantizers = Quantizers::new(&rows, bounds(Chart::Cholesky), &options);
+        // A colour inside, below and above the range.
+        let Steps { scale, offset, .. } = quantizers.components[5].steps;
+        let max = quantizers.components[5].steps.max_code() as f32;
+        for (position, by_scale, by_offset, passes) in
+            [(3.25, -0.25, 0.0, 1.0), (-2.0, 0.0, 1.0, 0.0), (max + 2.0, max, 1.0, 0.0)]
+        {
+            let mut row = rows[0];
+            row[5] = offset + position * scale;
+            let decoded = quantizers.decoded(&quantizers.codes(&row));
+            let mut gradient = [0.0; MAX_COMPONENTS];
+            gradient[5] = 2.0;
+            let by_steps = quantizers.backward(&row, &decoded, &mut gradient);
+            assert!((by_steps[5][0] - 2.0 * by_scale).abs() < 1e-3, "scale at {position}");
+            assert_eq!(by_steps[5][1], 2.0 * by_offset, "offset at {position}");
+            assert_eq!(gradient[5], 2.0 * passes, "value at {position}");
+        }
+        // Through the logarithm the gradient passes as if nothing had been rounded.
+        let decoded = quantizers.decoded(&quantizers.codes(&rows[0]));
+        let mut gradient = [1.0; MAX_COMPONENTS];
+        quantizers.backward(&rows[0], &decoded, &mut gradient);
+        assert!((gradient[2] - decoded[2] / rows[0][2]).abs() < 1e-5);
+    }
+
+    #[test]
+    fn equal_values_are_kept_exactly() {
+        let row = rows(Chart::Cholesky, 1, 3)[0];
+        let options = Training::fast(1).quantization;
+        let quantizers = Quantizers::new(&[row; 9], bounds(Chart::Cholesky), &options);
+        let decoded = quantizers.decoded(&quantizers.codes(&row));
+        for (decoded, value) in decoded.iter().zip(row) {
+            assert!((decoded - value).abs() <= 1e-6 * value.abs());
+        }
+        for quantizer in Quantizers::new(&[], bounds(Chart::Cholesky), &options).stored() {
+            assert!(quantizer.value(0).is_finite());
+        }
+    }
+}
