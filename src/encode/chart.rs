@@ -148,9 +148,11 @@ pub(crate) fn confined(chart: Chart, values: Vec3, max: f32) -> Vec3 {
             Vec3::new(xx, values.y.clamp(-room, room), yy)
         }
         Chart::RotationScale => {
-            // The same ellipse returns after half a turn.
+            // The same ellipse returns after half a turn; an exact remainder keeps far angles sound.
             let half_turn = std::f32::consts::PI;
-            let angle = values.z - (values.z / half_turn).round() * half_turn;
+            let rest = values.z % half_turn;
+            let angle =
+                if rest.abs() > 0.5 * half_turn { rest - half_turn.copysign(rest) } else { rest };
             Vec3::new(values.x.clamp(MIN_DEVIATION, max), values.y.clamp(MIN_DEVIATION, max), angle)
         }
     }
