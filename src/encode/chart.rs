@@ -149,7 +149,7 @@ pub(crate) fn confined(chart: Chart, values: Vec3, max: f32) -> Vec3 {
         }
         Chart::RotationScale => {
             // The same ellipse returns after half a turn; an exact remainder keeps far angles sound.
-            let half_turn = std::f32::consts::PI;
+            let half_turn = core::f32::consts::PI;
             let rest = values.z % half_turn;
             let angle =
                 if rest.abs() > 0.5 * half_turn { rest - half_turn.copysign(rest) } else { rest };

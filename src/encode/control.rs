@@ -1,7 +1,7 @@
 //! Rate control: one training run, steered to the caller's target and finished on real files.
 
 use super::budget::Budget;
-use super::fit::{Fit, Observer};
+use super::fit::{Fit, Fitted, Observer};
 use super::layout::Layout;
 use super::raster::Raster;
 use super::source::Source;
@@ -16,6 +16,9 @@ const PSNR_TOLERANCE: f64 = 0.05;
 const SIZE_TOLERANCE: f64 = 0.99;
 /// How often a finished fit may be extended to meet its target.
 const MAX_ROUNDS: u32 = 8;
+
+/// How many single Gaussians are tried without.
+const MAX_TRIALS: usize = 64;
 
 /// A finished encoding.
 #[derive(Debug)]
@@ -59,8 +62,7 @@ pub(crate) fn encode(
         }
     }
     if let Target::Psnr(target) = encoder.target {
-        let count = least_prefix(&Verified::new(&file, source), target);
-        file = layout.write(&layout.truncated(&fit.fitted(), count as usize));
+        file = trimmed(&layout, layout.ordered(&fit.fitted()), file, source, target);
     }
     let verified = Verified::new(&file, source);
     let gaussians = verified.gaussians();
@@ -153,6 +155,32 @@ fn missing(
         }
         _ => 0,
     }
+}
+
+/// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
+/// those that are not needed among the last ones, where one Gaussian is worth more than the
+/// tolerance. The file as it is if it falls short.
+fn trimmed(
+    layout: &Layout<'_>,
+    mut fitted: Fitted,
+    mut file: Vec<u8>,
+    source: &Source<'_>,
+    target: f64,
+) -> Vec<u8> {
+    fitted.codes.truncate(least_prefix(&Verified::new(&file, source), target) as usize);
+    file = layout.write(&fitted);
+    for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
+        if Verified::new(&file, source).psnr(u32::MAX) <= target + PSNR_TOLERANCE {
+            break;
+        }
+        let mut fewer = fitted.clone();
+        fewer.codes.remove(index);
+        let trial = layout.write(&fewer);
+        if Verified::new(&trial, source).psnr(u32::MAX) >= target {
+            (fitted, file) = (fewer, trial);
+        }
+    }
+    file
 }
 
 /// The fewest of the file's first Gaussians that reach `target`; all of them if none do.

@@ -14,67 +14,78 @@ use crate::gaussian::{Chart, MAX_COMPONENTS};
 /// bits.
 pub(crate) const USELESS_COLOR: f32 = 1.0 / 4096.0;
 
-/// Up to `count` new Gaussians where the picture of the last pass is worst; `present` are there
-/// already. Fewer where there is nothing left to correct.
-pub(crate) fn newcomers(
-    count: usize,
-    present: usize,
-    options: &Densification,
-    filter: Filter,
-    raster: &Raster,
-    pass: &Pass,
-    bounds: Bounds,
-    rng: &mut fastrand::Rng,
-) -> Vec<Row> {
-    let pixels = match options.placement {
-        Placement::Top => top(count, &distortions(options.distortion, raster, pass)),
-        Placement::Sampled => sampled(count, &distortions(options.distortion, raster, pass), rng),
-    };
-    let variance = filter
-        .variance(raster.pixels(), present + pixels.len())
-        .expect("`Training::check` accepted the filter");
-    let born = |pixel: u32| {
-        let (x, y) = (pixel as usize % raster.width, pixel as usize / raster.width);
+/// Where a picture stands when Gaussians are added.
+#[derive(Debug)]
+pub(crate) struct Site<'a> {
+    pub(crate) options: &'a Densification,
+    pub(crate) filter: Filter,
+    pub(crate) raster: &'a Raster,
+    /// The last pass over the picture.
+    pub(crate) pass: &'a Pass,
+    pub(crate) bounds: Bounds,
+    /// Gaussians that are there already.
+    pub(crate) present: usize,
+}
+
+impl Site<'_> {
+    /// Up to `count` new Gaussians where the picture is worst. Fewer where there is nothing left
+    /// to correct.
+    pub(crate) fn newcomers(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+        let map = self.distortions();
+        let pixels = match self.options.placement {
+            Placement::Top => top(count, &map),
+            Placement::Sampled => sampled(count, &map, rng),
+        };
+        let total = self.present + pixels.len();
+        let variance = self
+            .filter
+            .variance(self.raster.pixels(), total)
+            .expect("`Training::check` accepted the filter");
+        pixels.into_iter().map(|pixel| self.born(pixel as usize, variance, rng)).collect()
+    }
+
+    /// A new Gaussian on a pixel.
+    fn born(&self, pixel: usize, variance: f32, rng: &mut fastrand::Rng) -> Row {
+        let (x, y) = (pixel % self.raster.width, pixel / self.raster.width);
         let mut row = [0.0; MAX_COMPONENTS];
         row[0] = x as f32 + 0.5;
         row[1] = y as f32 + 0.5;
-        let shape = match options.shape {
-            NewShape::Point => {
-                chart::from_cholesky(bounds.chart, [variance.sqrt(), 0.0, variance.sqrt()])
-            }
-            NewShape::Random => random_shape(bounds.chart, variance, rng),
+        let chart = self.bounds.chart;
+        let shape = match self.options.shape {
+            NewShape::Point => chart::from_cholesky(chart, [variance.sqrt(), 0.0, variance.sqrt()]),
+            NewShape::Random => random_shape(chart, variance, rng),
         };
         row[2..5].copy_from_slice(&shape.to_array());
-        let residual = pass.residual(x, y, raster.channels);
-        let source = raster.sample(x, y);
-        for channel in 0..raster.channels {
-            row[5 + channel] = match options.color {
+        let residual = self.pass.residual(x, y, self.raster.channels);
+        let source = self.raster.sample(x, y);
+        for channel in 0..self.raster.channels {
+            row[5 + channel] = match self.options.color {
                 NewColor::Zero => 0.0,
                 NewColor::Source => source[channel],
                 NewColor::Residual(share) => -share * residual[channel],
             };
         }
-        bounds.confined(row)
-    };
-    pixels.into_iter().map(born).collect()
-}
-
-/// The distortion of every pixel, row by row; 0 where the output could not be improved.
-fn distortions(distortion: Distortion, raster: &Raster, pass: &Pass) -> Vec<f32> {
-    let mut map = Vec::with_capacity(raster.pixels());
-    for y in 0..raster.height {
-        for x in 0..raster.width {
-            let residual = pass.residual(x, y, raster.channels);
-            // Less than half a step of the source's depth: exact after rounding.
-            let exact = residual.iter().all(|value| value.abs() < raster.half_step);
-            map.push(match distortion {
-                _ if exact => 0.0,
-                Distortion::L1 => residual.iter().map(|value| value.abs()).sum(),
-                Distortion::L2 => residual.iter().map(|value| value * value).sum(),
-            });
-        }
+        self.bounds.confined(row)
     }
-    map
+
+    /// The distortion of every pixel, row by row; 0 where the output could not be improved.
+    fn distortions(&self) -> Vec<f32> {
+        let raster = self.raster;
+        let mut map = Vec::with_capacity(raster.pixels());
+        for y in 0..raster.height {
+            for x in 0..raster.width {
+                let residual = self.pass.residual(x, y, raster.channels);
+                // Less than half a step of the source's depth: exact after rounding.
+                let exact = residual.iter().all(|value| value.abs() < raster.half_step);
+                map.push(match self.options.distortion {
+                    _ if exact => 0.0,
+                    Distortion::L1 => residual.iter().map(|value| value.abs()).sum(),
+                    Distortion::L2 => residual.iter().map(|value| value * value).sum(),
+                });
+            }
+        }
+        map
+    }
 }
 
 /// The pixels of largest distortion; the first of equals.
@@ -123,11 +134,41 @@ fn random_shape(chart: Chart, variance: f32, rng: &mut fastrand::Rng) -> Vec3 {
             *value += if positive { 0.5 } else { 0.0 };
         }
         if chart == Chart::RotationScale {
-            shape.z *= std::f32::consts::TAU;
+            shape.z *= core::f32::consts::TAU;
         }
         let wide = chart::widened(chart, shape, variance);
         if wide.is_finite() {
             return wide;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_top_are_the_largest_and_the_first_of_equals() {
+        let map = [0.0, 3.0, 1.0, 3.0, 0.0, 2.0];
+        assert_eq!(top(3, &map), [1, 3, 5]);
+        assert_eq!(top(1, &map), [1]);
+        // What is exact gets no Gaussian, however many are asked for.
+        assert_eq!(top(10, &map), [1, 3, 5, 2]);
+    }
+
+    #[test]
+    fn samples_follow_the_distortion() {
+        let mut rng = fastrand::Rng::with_seed(5);
+        // One large block of small distortion, one small block of large distortion.
+        let mut map = vec![0.0; 1000];
+        map[100..900].fill(1.0);
+        map[900..950].fill(16.0);
+        let pixels = sampled(400, &map, &mut rng);
+        assert!(pixels.is_sorted_by(|a, b| a < b), "each at most once");
+        assert!(pixels.iter().all(|&pixel| map[pixel as usize] > 0.0));
+        // Half of the distortion lies in each, but the small one is soon full.
+        let (large, small) = pixels.split_at(pixels.partition_point(|&pixel| pixel < 900));
+        assert!(small.len() >= 45 && (120..240).contains(&large.len()), "{}", large.len());
+        assert!(sampled(10, &[0.0; 50], &mut rng).is_empty());
     }
 }

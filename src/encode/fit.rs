@@ -1,12 +1,12 @@
 //! The training loop: from a picture to Gaussians (paper, section "Methodology").
 
-use std::ops::ControlFlow;
+use core::ops::ControlFlow;
 
 use glam::Vec2;
 use rayon::prelude::*;
 
 use super::budget::Budget;
-use super::densify::{self, USELESS_COLOR};
+use super::densify::{Site, USELESS_COLOR};
 use super::gradient::{Pass, SplatGradient};
 use super::lsq::{Quantizers, StepGradients};
 use super::optimizer::{Bounds, Parameters, Row, shape_of};
@@ -280,16 +280,15 @@ impl<'a> Fit<'a> {
         if count == 0 {
             return;
         }
-        let newcomers = densify::newcomers(
-            count,
-            self.parameters.len(),
-            &self.training.densification,
-            self.training.filter,
-            self.raster,
-            &self.pass,
-            self.bounds,
-            &mut self.rng,
-        );
+        let site = Site {
+            options: &self.training.densification,
+            filter: self.training.filter,
+            raster: self.raster,
+            pass: &self.pass,
+            bounds: self.bounds,
+            present: self.parameters.len(),
+        };
+        let newcomers = site.newcomers(count, &mut self.rng);
         for row in newcomers {
             self.parameters.push(row);
         }

@@ -133,7 +133,7 @@ impl Pass {
         let rows: Vec<_> = (0..tiling.rows())
             .map(|row| {
                 let entries = tiling.row_entries(row);
-                let (taken, rest) = std::mem::take(&mut slots).split_at_mut(entries);
+                let (taken, rest) = core::mem::take(&mut slots).split_at_mut(entries);
                 slots = rest;
                 (row, taken)
             })
@@ -272,7 +272,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
     ) -> f64 {
         let px = centers(simd, self.x);
         let py: [f32; TILE_HEIGHT] =
-            std::array::from_fn(|row| (self.y as usize + row) as f32 + 0.5);
+            core::array::from_fn(|row| (self.y as usize + row) as f32 + 0.5);
         for (plane, base) in planes.iter_mut().zip(self.base) {
             *plane = [[base; TILE_WIDTH]; TILE_HEIGHT];
         }

@@ -52,7 +52,7 @@ impl<'a> Layout<'a> {
     /// The file.
     pub(crate) fn write(&self, fitted: &Fitted) -> Vec<u8> {
         let quantizers = &fitted.quantizers;
-        let codes = self.by_importance(fitted);
+        let Fitted { codes, .. } = self.ordered(fitted);
         let layers = layers(codes.len());
         let header = Header {
             gaussians: codes.len() as u32,
@@ -76,13 +76,6 @@ impl<'a> Layout<'a> {
         file
     }
 
-    /// The first `count` Gaussians of the file.
-    pub(crate) fn truncated(&self, fitted: &Fitted, count: usize) -> Fitted {
-        let mut codes = self.by_importance(fitted);
-        codes.truncate(count);
-        Fitted { quantizers: fitted.quantizers.clone(), codes }
-    }
-
     /// The bytes of a file with `count` Gaussians stored by `quantizers`.
     pub(crate) fn length(&self, quantizers: &[Quantizer], count: usize) -> u64 {
         let empty = Fitted { quantizers: quantizers.to_vec(), codes: Vec::new() };
@@ -92,9 +85,9 @@ impl<'a> Layout<'a> {
         self.write(&empty).len() as u64 + layers.sum::<u64>()
     }
 
-    /// The codes, the Gaussian that adds most to the picture first, so that every prefix of the
-    /// file is a picture.
-    fn by_importance(&self, fitted: &Fitted) -> Vec<[u32; MAX_COMPONENTS]> {
+    /// The Gaussian that adds most to the picture first, so that every prefix of the file is a
+    /// picture.
+    pub(crate) fn ordered(&self, fitted: &Fitted) -> Fitted {
         let mut order: Vec<_> = fitted
             .codes
             .iter()
@@ -113,7 +106,8 @@ impl<'a> Layout<'a> {
             })
             .collect();
         order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-        order.into_iter().map(|(_, codes)| *codes).collect()
+        let codes = order.into_iter().map(|(_, codes)| *codes).collect();
+        Fitted { quantizers: fitted.quantizers.clone(), codes }
     }
 }
 

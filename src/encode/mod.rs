@@ -16,7 +16,7 @@ mod source;
 pub(crate) mod training;
 mod verify;
 
-use std::ops::ControlFlow;
+use core::ops::ControlFlow;
 use std::time::Instant;
 
 pub use error::EncodeError;

@@ -31,7 +31,7 @@ impl Raster {
                 }
             }
         }
-        let half_step = 0.5 / source.depth().max_sample() as f32;
+        let half_step = 0.5 / f32::from(source.depth().max_sample());
         Self { width, height, channels, half_step, planes }
     }
 

@@ -309,7 +309,7 @@ impl Training {
 
 impl Filter {
     /// The paper's filter with its released code's constants.
-    pub const PAPER: Self = Self::ContentAware { alpha: 9.0 * std::f32::consts::PI, cap: 300.0 };
+    pub const PAPER: Self = Self::ContentAware { alpha: 9.0 * core::f32::consts::PI, cap: 300.0 };
 
     /// The variance for newcomers that make the number of Gaussians `count`; `None` if the
     /// constants make no variance.
