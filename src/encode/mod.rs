@@ -39,7 +39,7 @@ pub struct Encoder {
     precision: Precision,
     seed: u64,
     threads: Option<usize>,
-    metadata: Metadata,
+    pub(crate) metadata: Metadata,
 }
 
 impl Default for Encoder {
