@@ -82,22 +82,21 @@ pub(crate) struct Encode {
 /// What the file shall meet. Without any of them: a sensible quality, the same as --quality 75.
 #[derive(Debug, clap::Args)]
 #[group(multiple = false)]
-#[command(next_help_heading = "Targets")]
 pub(crate) struct TargetArgs {
     /// At most N Gaussians, from 1 to 4194304.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
+    #[arg(long, help_heading = "Targets", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
     gaussians: Option<u32>,
     /// A file of B bits per pixel, from 0.0001 to 1000.
-    #[arg(long, value_name = "B", value_parser = |text: &str| number(text, 0.0001, 1000.0))]
+    #[arg(long, help_heading = "Targets", value_name = "B", value_parser = |text: &str| number(text, 0.0001, 1000.0))]
     bpp: Option<f64>,
     /// A file of BYTES bytes.
-    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, help_heading = "Targets", value_name = "BYTES", value_parser = clap::value_parser!(u64).range(1..))]
     size: Option<u64>,
     /// A PSNR of the decoded file of DB decibels, from 1 to 120.
-    #[arg(long, value_name = "DB", value_parser = |text: &str| number(text, 1.0, 120.0))]
+    #[arg(long, help_heading = "Targets", value_name = "DB", value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
     /// A quality from 0 (smallest) to 100 (best) [default: 75].
-    #[arg(long, value_name = "Q", value_parser = |text: &str| number(text, 0.0, 100.0))]
+    #[arg(long, help_heading = "Targets", value_name = "Q", value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,
 }
 

@@ -34,11 +34,11 @@ fn read(args: &args::Decode) -> Result<StreamDecoder> {
         let arrived = stream.gaussians().len();
         match stream.header() {
             Some(header) if args.allow_partial => {
-                let name = files::name(&args.input);
+                let name = files::input_name(&args.input);
                 let all = header.gaussians;
                 eprintln!("warning: {name}: {error}; showing {arrived} of {all} Gaussians");
             }
-            _ => return Err(error).with_context(|| files::name(&args.input)),
+            _ => return Err(error).with_context(|| files::input_name(&args.input)),
         }
     }
     Ok(stream)

@@ -99,7 +99,7 @@ impl<'a> Report<'a> {
         let mut line = format!(
             "{}: {width}x{height}, {gaussians} Gaussians, {bytes} bytes, {bpp:.3} bpp, \
              {psnr:.2} dB, {seconds:.1} s",
-            files::name(output)
+            files::output_name(output)
         );
         if let Some(shortfall) = self.shortfall {
             line.push_str("\nnote: ");

@@ -12,19 +12,24 @@ pub(crate) fn is_standard_stream(path: &Path) -> bool {
     ["-", "/dev/stdin", "/dev/stdout"].iter().any(|name| path.as_os_str() == *name)
 }
 
-/// What messages call a path.
-pub(crate) fn name(path: &Path) -> String {
-    if is_standard_stream(path) { "standard stream".into() } else { path.display().to_string() }
+/// What messages call the source of an input.
+pub(crate) fn input_name(path: &Path) -> String {
+    if is_standard_stream(path) { "standard input".into() } else { path.display().to_string() }
+}
+
+/// What messages call the destination of an output.
+pub(crate) fn output_name(path: &Path) -> String {
+    if is_standard_stream(path) { "standard output".into() } else { path.display().to_string() }
 }
 
 /// Reads a whole file, or standard input.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     if is_standard_stream(path) {
         let mut bytes = Vec::new();
-        io::stdin().lock().read_to_end(&mut bytes).with_context(|| name(path))?;
+        io::stdin().lock().read_to_end(&mut bytes).with_context(|| input_name(path))?;
         return Ok(bytes);
     }
-    fs::read(path).with_context(|| name(path))
+    fs::read(path).with_context(|| input_name(path))
 }
 
 /// Prints text to standard output, or to standard error where the former carries a file. A reader
@@ -59,7 +64,7 @@ impl Output {
         if is_standard_stream(path) {
             return Ok(Self::Standard);
         }
-        let context = || name(path);
+        let context = || output_name(path);
         // Through a symbolic link, the file that it leads to is written, and the link stays.
         let path = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => bail!("{} is a directory", path.display()),
@@ -89,9 +94,9 @@ impl Output {
                 .write(true)
                 .open(path)
                 .and_then(|mut file| file.write_all(bytes))
-                .with_context(|| name(path)),
+                .with_context(|| output_name(path)),
             Self::Regular { path, directory } => {
-                replace(path, directory, bytes).with_context(|| name(path))
+                replace(path, directory, bytes).with_context(|| output_name(path))
             }
         }
     }

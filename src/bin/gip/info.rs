@@ -11,7 +11,7 @@ use crate::encode::bits_per_pixel;
 use crate::files;
 
 pub(crate) fn run(args: &args::Info) -> Result<()> {
-    let context = || files::name(&args.file);
+    let context = || files::input_name(&args.file);
     let bytes = files::read(&args.file)?;
     let mut stream = StreamDecoder::new();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;

@@ -34,7 +34,7 @@ pub(crate) enum Samples<'a> {
 impl Picture {
     /// Reads a picture of any format that `image` reads, .gip included.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let name = || files::name(path);
+        let name = || files::input_name(path);
         let bytes = files::read(path)?;
         let mut reader = ImageReader::new(Cursor::new(bytes));
         // Some formats have no signature; for them the extension counts.
@@ -114,17 +114,19 @@ impl Picture {
 
     /// Drops an alpha channel that is opaque everywhere.
     pub(crate) fn drop_opaque_alpha(&mut self) {
+        let color = match self.color() {
+            ColorModel::GrayAlpha => ColorModel::Gray,
+            ColorModel::Rgba => ColorModel::Rgb,
+            _ => return,
+        };
         let channels = self.color().channels();
         let opaque = match self.samples() {
             Samples::Eight(samples) => is_opaque(samples, channels, &u8::MAX),
             Samples::Sixteen(samples) => is_opaque(samples, channels, &u16::MAX),
         };
-        let color = match self.color() {
-            ColorModel::GrayAlpha if opaque => ColorModel::Gray,
-            ColorModel::Rgba if opaque => ColorModel::Rgb,
-            _ => return,
-        };
-        self.convert(color, self.depth());
+        if opaque {
+            self.convert(color, self.depth());
+        }
     }
 
     /// Changes colour model and depth. A model with the missing channels, or a greater depth,
