@@ -109,6 +109,15 @@ impl StreamDecoder {
         }
     }
 
+    /// Replaces the limits, for what is still to be read and for rendering.
+    ///
+    /// # Errors
+    /// When what the file has declared so far exceeds the new limits. They hold in any case.
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), DecodeError> {
+        self.limits = limits;
+        self.header.as_ref().map_or(Ok(()), |header| self.check_header(header))
+    }
+
     /// Takes the next bytes of the file. Returns how many were used: all of them, unless the file
     /// ends within them.
     ///
@@ -268,10 +277,7 @@ impl StreamDecoder {
         match (chunk, &mut self.stage) {
             (ChunkType::GHDR, Stage::Collect(payload)) => {
                 let header = Header::parse(payload)?;
-                self.limits.check_size(header.width, header.height)?;
-                self.limits.check_gaussians(header.gaussians)?;
-                let bytes = u64::from(header.gaussians) * size_of::<Gaussian>() as u64;
-                self.limits.check_memory(bytes)?;
+                self.check_header(&header)?;
                 self.header = Some(header);
             }
             (ChunkType::QNTZ, Stage::Collect(payload)) => {
@@ -299,6 +305,14 @@ impl StreamDecoder {
         }
         self.stage = Stage::Idle;
         Ok(())
+    }
+
+    /// Checks what a header declares against the limits.
+    fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
+        self.limits.check_size(header.width, header.height)?;
+        self.limits.check_gaussians(header.gaussians)?;
+        let bytes = u64::from(header.gaussians) * size_of::<Gaussian>() as u64;
+        self.limits.check_memory(bytes)
     }
 
     fn count(&mut self, kind: ChunkType, length: u32) {
@@ -371,6 +385,14 @@ impl<R: std::io::Read> Decoder<R> {
     #[must_use]
     pub fn stream(&self) -> &StreamDecoder {
         &self.stream
+    }
+
+    /// Replaces the limits; see [`StreamDecoder::set_limits`].
+    ///
+    /// # Errors
+    /// As [`StreamDecoder::set_limits`].
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), DecodeError> {
+        self.stream.set_limits(limits)
     }
 
     /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes.

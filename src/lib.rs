@@ -19,15 +19,21 @@ mod encode;
 mod error;
 #[cfg(feature = "decode")]
 mod gaussian;
+#[cfg(feature = "image")]
+mod image;
 #[cfg(feature = "decode")]
 mod limits;
 #[cfg(feature = "decode")]
 mod math;
+#[cfg(feature = "encode")]
+pub mod metrics;
 #[cfg(feature = "decode")]
 mod quantizer;
 #[cfg(feature = "decode")]
 mod render;
 
+#[cfg(feature = "image")]
+pub use crate::image::{GipDecoder, GipEncoder, register};
 #[cfg(feature = "decode")]
 pub use color::{ColorModel, SampleDepth};
 #[cfg(feature = "decode")]

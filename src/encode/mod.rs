@@ -53,7 +53,7 @@ pub struct Encoder {
     precision: Precision,
     seed: u64,
     threads: Option<usize>,
-    metadata: Metadata,
+    pub(crate) metadata: Metadata,
     training: Option<Training>,
 }
 

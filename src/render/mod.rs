@@ -24,7 +24,7 @@ pub(crate) use tiling::Tiling;
 pub(crate) use view::View;
 
 use crate::container::Header;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, LimitKind};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use output::Sample;
@@ -56,6 +56,21 @@ impl<'a> Picture<'a> {
     #[must_use]
     pub fn gaussians(&self) -> &'a [Gaussian] {
         self.gaussians
+    }
+
+    /// The number of samples that rendering with these options writes, checked against the picture
+    /// and the limits: safe to allocate.
+    ///
+    /// # Errors
+    /// When the options do not fit the picture, or when a limit would be exceeded.
+    pub fn output_len(&self, options: &RenderOptions) -> Result<usize, DecodeError> {
+        let view = options.view(self.header, self.limits)?;
+        let samples = view.region.pixels() * options.output_color(self.header)?.channels() as u64;
+        usize::try_from(samples).map_err(|_| DecodeError::Limit {
+            kind: LimitKind::Memory,
+            wanted: samples,
+            allowed: usize::MAX as u64,
+        })
     }
 
     /// Renders interleaved 8-bit samples, rows from the top, without padding.
@@ -121,14 +136,14 @@ impl<'a> Picture<'a> {
 
     /// Checks everything and bins the splats; nothing of the output is touched before.
     fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job, DecodeError> {
-        let view = options.view(self.header, self.limits)?;
-        let color = options.output_color(self.header)?;
-        let wanted = view.region.pixels() * color.channels() as u64;
-        if wanted != out as u64 {
+        let wanted = self.output_len(options)?;
+        if wanted != out {
             return Err(DecodeError::Request(format!(
                 "the output buffer holds {out} samples, {wanted} are needed"
             )));
         }
+        let view = options.view(self.header, self.limits)?;
+        let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
         let held = size_of_val(self.gaussians) + gaussians.len() * size_of::<Splat>();
