@@ -143,8 +143,10 @@ pub(crate) fn confined(chart: Chart, values: Vec3, max: f32) -> Vec3 {
         Chart::Covariance => {
             let xx = values.x.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
             let yy = values.z.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
-            // Conditional variances stay above the least variance.
-            let room = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0).sqrt();
+            // Conditional variances stay above the least variance, and above what rounding of the
+            // determinant may cost.
+            let square = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0);
+            let room = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
             Vec3::new(xx, values.y.clamp(-room, room), yy)
         }
         Chart::RotationScale => {
