@@ -4,8 +4,8 @@
 
 use arbitrary::Arbitrary;
 use image_gip::{
-    ColorModel, DecodeError, Encoder, Picture, Precision, RenderOptions, SampleDepth,
-    Source, StreamDecoder, Target, metrics,
+    ColorModel, DecodeError, Encoder, Picture, Precision, RenderOptions, SampleDepth, Source,
+    StreamDecoder, Target, metrics,
 };
 use libfuzzer_sys::fuzz_target;
 
