@@ -1,25 +1,21 @@
-//! Everything that touches the `image` crate: hooks, [`GipDecoder`], [`GipEncoder`].
+//! Everything that touches the `image` crate: hooks, [`GipDecoder`], and with the feature `encode`
+//! `GipEncoder`.
 //!
 //! The names are prefixed because they are used next to `image`'s own.
 
-use core::fmt;
-use std::io::{Read, Write};
+use std::io::Read;
 use std::sync::OnceLock;
 
 use ::image::error::{
-    DecodingError, EncodingError, ImageFormatHint, LimitError, LimitErrorKind, ParameterError,
-    ParameterErrorKind, UnsupportedError, UnsupportedErrorKind,
+    DecodingError, ImageFormatHint, LimitError, LimitErrorKind, ParameterError, ParameterErrorKind,
+    UnsupportedError, UnsupportedErrorKind,
 };
 use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
-use ::image::{
-    ColorType, ExtendedColorType, ImageDecoder, ImageDecoderRect, ImageEncoder, ImageError,
-    ImageResult,
-};
+use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
 
 use crate::color::{ColorModel, SampleDepth};
 use crate::container::SIGNATURE;
 use crate::decoder::Decoder;
-use crate::encode::{EncodeError, Encoder, Source};
 use crate::error::{DecodeError, LimitKind};
 use crate::limits::Limits;
 use crate::render::{Region, RenderOptions};
@@ -34,7 +30,7 @@ const EXTENSION: &str = "gip";
 /// read by this crate now: `false` means that another decoder had taken the extension before, and
 /// that one stays.
 ///
-/// `image` has no such hook for writing: use [`GipEncoder`] with
+/// `image` has no such hook for writing: use `GipEncoder` (feature `encode`) with
 /// `DynamicImage::write_with_encoder`.
 ///
 /// ```no_run
@@ -230,90 +226,6 @@ impl<R: Read> ImageDecoderRect for GipDecoder<R> {
     }
 }
 
-/// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and RGB
-/// pictures with or without alpha.
-///
-/// ```no_run
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// # let picture = image::DynamicImage::new_rgb8(64, 64);
-/// let file = std::fs::File::create("picture.gip")?;
-/// picture.write_with_encoder(image_gip::GipEncoder::new(file))?;
-/// # Ok(())
-/// # }
-/// ```
-pub struct GipEncoder<W> {
-    writer: W,
-    encoder: Encoder,
-}
-
-impl<W> GipEncoder<W> {
-    /// Writes a file with the default options of [`Encoder`].
-    pub fn new(writer: W) -> Self {
-        Self::with_encoder(writer, Encoder::new())
-    }
-
-    /// Writes a file with the options of `encoder`.
-    pub fn with_encoder(writer: W, encoder: Encoder) -> Self {
-        Self { writer, encoder }
-    }
-}
-
-// By hand, for writers that have no `Debug`.
-impl<W> fmt::Debug for GipEncoder<W> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("GipEncoder").field("encoder", &self.encoder).finish_non_exhaustive()
-    }
-}
-
-impl<W: Write> ImageEncoder for GipEncoder<W> {
-    fn write_image(
-        mut self,
-        buf: &[u8],
-        width: u32,
-        height: u32,
-        color_type: ExtendedColorType,
-    ) -> ImageResult<()> {
-        let (color, depth) = match color_type {
-            ExtendedColorType::L8 => (ColorModel::Gray, SampleDepth::Eight),
-            ExtendedColorType::La8 => (ColorModel::GrayAlpha, SampleDepth::Eight),
-            ExtendedColorType::Rgb8 => (ColorModel::Rgb, SampleDepth::Eight),
-            ExtendedColorType::Rgba8 => (ColorModel::Rgba, SampleDepth::Eight),
-            ExtendedColorType::L16 => (ColorModel::Gray, SampleDepth::Sixteen),
-            ExtendedColorType::La16 => (ColorModel::GrayAlpha, SampleDepth::Sixteen),
-            ExtendedColorType::Rgb16 => (ColorModel::Rgb, SampleDepth::Sixteen),
-            ExtendedColorType::Rgba16 => (ColorModel::Rgba, SampleDepth::Sixteen),
-            _ => {
-                let kind = UnsupportedErrorKind::Color(color_type);
-                let error = UnsupportedError::from_format_and_kind(hint(), kind);
-                return Err(ImageError::Unsupported(error));
-            }
-        };
-        let encoded = match depth {
-            SampleDepth::Eight => self.encoder.encode(&Source::new_u8(width, height, color, buf)?),
-            SampleDepth::Sixteen => {
-                let (samples, rest) = buf.as_chunks();
-                if !rest.is_empty() {
-                    return Err(parameter("half a 16-bit sample at the end of the buffer".into()));
-                }
-                let samples: Vec<_> = samples.iter().copied().map(u16::from_ne_bytes).collect();
-                self.encoder.encode(&Source::new_u16(width, height, color, &samples)?)
-            }
-        }?;
-        self.writer.write_all(&encoded.bytes)?;
-        Ok(self.writer.flush()?)
-    }
-
-    fn set_icc_profile(&mut self, icc_profile: Vec<u8>) -> Result<(), UnsupportedError> {
-        self.encoder.metadata.icc_profile = Some(icc_profile);
-        Ok(())
-    }
-
-    fn set_exif_metadata(&mut self, exif: Vec<u8>) -> Result<(), UnsupportedError> {
-        self.encoder.metadata.exif = Some(exif);
-        Ok(())
-    }
-}
-
 impl From<DecodeError> for ImageError {
     fn from(error: DecodeError) -> Self {
         match error {
@@ -347,19 +259,123 @@ impl From<DecodeError> for ImageError {
     }
 }
 
-impl From<EncodeError> for ImageError {
-    fn from(error: EncodeError) -> Self {
-        match error {
-            EncodeError::Source(_) | EncodeError::Option(_) => parameter(error.to_string()),
-            EncodeError::Cancelled => Self::Encoding(EncodingError::new(hint(), error)),
-        }
-    }
-}
-
 fn parameter(what: String) -> ImageError {
     ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::Generic(what)))
 }
 
 fn hint() -> ImageFormatHint {
     ImageFormatHint::Name("GIP".into())
+}
+
+#[cfg(feature = "encode")]
+pub use encoder::GipEncoder;
+
+#[cfg(feature = "encode")]
+mod encoder {
+    use core::fmt;
+    use std::io::Write;
+
+    use ::image::error::{EncodingError, UnsupportedError, UnsupportedErrorKind};
+    use ::image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
+
+    use super::{hint, parameter};
+    use crate::color::{ColorModel, SampleDepth};
+    use crate::encode::{EncodeError, Encoder, Source};
+
+    /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and RGB
+    /// pictures with or without alpha.
+    ///
+    /// ```no_run
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let picture = image::DynamicImage::new_rgb8(64, 64);
+    /// let file = std::fs::File::create("picture.gip")?;
+    /// picture.write_with_encoder(image_gip::GipEncoder::new(file))?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub struct GipEncoder<W> {
+        writer: W,
+        encoder: Encoder,
+    }
+
+    impl<W> GipEncoder<W> {
+        /// Writes a file with the default options of [`Encoder`].
+        pub fn new(writer: W) -> Self {
+            Self::with_encoder(writer, Encoder::new())
+        }
+
+        /// Writes a file with the options of `encoder`.
+        pub fn with_encoder(writer: W, encoder: Encoder) -> Self {
+            Self { writer, encoder }
+        }
+    }
+
+    // By hand, for writers that have no `Debug`.
+    impl<W> fmt::Debug for GipEncoder<W> {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.debug_struct("GipEncoder").field("encoder", &self.encoder).finish_non_exhaustive()
+        }
+    }
+
+    impl<W: Write> ImageEncoder for GipEncoder<W> {
+        fn write_image(
+            mut self,
+            buf: &[u8],
+            width: u32,
+            height: u32,
+            color_type: ExtendedColorType,
+        ) -> ImageResult<()> {
+            let (color, depth) = match color_type {
+                ExtendedColorType::L8 => (ColorModel::Gray, SampleDepth::Eight),
+                ExtendedColorType::La8 => (ColorModel::GrayAlpha, SampleDepth::Eight),
+                ExtendedColorType::Rgb8 => (ColorModel::Rgb, SampleDepth::Eight),
+                ExtendedColorType::Rgba8 => (ColorModel::Rgba, SampleDepth::Eight),
+                ExtendedColorType::L16 => (ColorModel::Gray, SampleDepth::Sixteen),
+                ExtendedColorType::La16 => (ColorModel::GrayAlpha, SampleDepth::Sixteen),
+                ExtendedColorType::Rgb16 => (ColorModel::Rgb, SampleDepth::Sixteen),
+                ExtendedColorType::Rgba16 => (ColorModel::Rgba, SampleDepth::Sixteen),
+                _ => {
+                    let kind = UnsupportedErrorKind::Color(color_type);
+                    let error = UnsupportedError::from_format_and_kind(hint(), kind);
+                    return Err(ImageError::Unsupported(error));
+                }
+            };
+            let encoded = match depth {
+                SampleDepth::Eight => {
+                    self.encoder.encode(&Source::new_u8(width, height, color, buf)?)
+                }
+                SampleDepth::Sixteen => {
+                    let (samples, rest) = buf.as_chunks();
+                    if !rest.is_empty() {
+                        return Err(parameter(
+                            "half a 16-bit sample at the end of the buffer".into(),
+                        ));
+                    }
+                    let samples: Vec<_> = samples.iter().copied().map(u16::from_ne_bytes).collect();
+                    self.encoder.encode(&Source::new_u16(width, height, color, &samples)?)
+                }
+            }?;
+            self.writer.write_all(&encoded.bytes)?;
+            Ok(self.writer.flush()?)
+        }
+
+        fn set_icc_profile(&mut self, icc_profile: Vec<u8>) -> Result<(), UnsupportedError> {
+            self.encoder.metadata.icc_profile = Some(icc_profile);
+            Ok(())
+        }
+
+        fn set_exif_metadata(&mut self, exif: Vec<u8>) -> Result<(), UnsupportedError> {
+            self.encoder.metadata.exif = Some(exif);
+            Ok(())
+        }
+    }
+
+    impl From<EncodeError> for ImageError {
+        fn from(error: EncodeError) -> Self {
+            match error {
+                EncodeError::Source(_) | EncodeError::Option(_) => parameter(error.to_string()),
+                EncodeError::Cancelled => Self::Encoding(EncodingError::new(hint(), error)),
+            }
+        }
+    }
 }

@@ -58,7 +58,7 @@
 //! | `std` | yes | `Decoder`, and SIMD chosen at run time |
 //! | `rayon` | yes | threads in the decoder; the output stays the same bit for bit |
 //! | `encode` | yes | the encoder |
-//! | `image` | no | hooks, `ImageDecoder` and `ImageEncoder` for the `image` crate |
+//! | `image` | no | hooks and `ImageDecoder` for the `image` crate; with `encode` also `ImageEncoder` |
 //! | `cli` | no | the command line tool `gip` |
 
 #[cfg(feature = "decode")]
@@ -91,8 +91,10 @@ mod quantizer;
 #[cfg(feature = "decode")]
 mod render;
 
+#[cfg(all(feature = "encode", feature = "image"))]
+pub use crate::image::GipEncoder;
 #[cfg(feature = "image")]
-pub use crate::image::{GipDecoder, GipEncoder, register};
+pub use crate::image::{GipDecoder, register};
 #[cfg(feature = "decode")]
 pub use color::{ColorModel, SampleDepth};
 #[cfg(feature = "decode")]

@@ -6,7 +6,7 @@ mod metadata;
 mod parser;
 
 pub use chunk::ChunkType;
-#[cfg(feature = "encode")]
+#[cfg(any(feature = "encode", feature = "image"))]
 pub(crate) use chunk::SIGNATURE;
 #[cfg(feature = "encode")]
 pub(crate) use chunk::write_chunk;

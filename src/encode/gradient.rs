@@ -421,9 +421,9 @@ mod tests {
                         *sum += color * weight;
                     }
                 }
-                for channel in 0..channels {
+                for (channel, sum) in sums[..channels].iter().enumerate() {
                     let index = (y * WIDTH + x) as usize * channels + channel;
-                    loss += 0.5 * (sums[channel] - f64::from(source.sample(index))).powi(2);
+                    loss += 0.5 * (sum - f64::from(source.sample(index))).powi(2);
                 }
             }
         }

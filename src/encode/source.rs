@@ -13,8 +13,9 @@ pub struct Source<'a> {
     samples: Samples<'a>,
 }
 
+/// Samples of either depth.
 #[derive(Clone, Copy, Debug)]
-enum Samples<'a> {
+pub(crate) enum Samples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
@@ -75,17 +76,25 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The sample at an index of the interleaved order.
-    pub(crate) fn integer(&self, index: usize) -> u16 {
+    /// All samples.
+    pub(crate) fn samples(&self) -> Samples<'a> {
+        self.samples
+    }
+
+    /// The number of samples.
+    pub(crate) fn len(&self) -> usize {
         match self.samples {
-            Samples::Eight(samples) => samples[index].into(),
-            Samples::Sixteen(samples) => samples[index],
+            Samples::Eight(samples) => samples.len(),
+            Samples::Sixteen(samples) => samples.len(),
         }
     }
 
     /// The sample at an index of the interleaved order, 1.0 being a full one.
     pub(crate) fn sample(&self, index: usize) -> f32 {
-        f32::from(self.integer(index)) / f32::from(self.depth().max_sample())
+        match self.samples {
+            Samples::Eight(samples) => f32::from(samples[index]) / 255.0,
+            Samples::Sixteen(samples) => f32::from(samples[index]) / 65535.0,
+        }
     }
 }
 
