@@ -116,7 +116,7 @@ impl Chart {
     pub(crate) fn to_cholesky(self, [a, b, c]: [f32; 3]) -> [f32; 3] {
         match self {
             Self::Covariance => {
-                // Of a negative number, the root here is NaN or the number itself: never drawn.
+                // Of a negative number the root is NaN, which is never drawn.
                 let l11 = math::sqrt(a);
                 let l21 = b / l11;
                 [l11, l21, math::sqrt(c - l21 * l21)]

@@ -96,6 +96,9 @@ impl Quantizer {
         };
         let quantizer = match entry[0] {
             0 if steps.bits != 32 => return Err(malformed("a float that is not 32 bits deep")),
+            0 if steps.scale != 1.0 || steps.offset != 0.0 => {
+                return Err(malformed("a float whose scale and offset are not 1 and 0"));
+            }
             0 => return Ok(Self::Float),
             1 => Self::Linear(steps),
             2 => Self::Log(steps),

@@ -39,11 +39,18 @@ pub struct Picture<'a> {
     header: &'a Header,
     gaussians: &'a [Gaussian],
     limits: &'a Limits,
+    /// Bytes that the decoder holds.
+    held: u64,
 }
 
 impl<'a> Picture<'a> {
-    pub(crate) fn new(header: &'a Header, gaussians: &'a [Gaussian], limits: &'a Limits) -> Self {
-        Self { header, gaussians, limits }
+    pub(crate) fn new(
+        header: &'a Header,
+        gaussians: &'a [Gaussian],
+        limits: &'a Limits,
+        held: u64,
+    ) -> Self {
+        Self { header, gaussians, limits, held }
     }
 
     /// What the file says of the picture.
@@ -131,12 +138,13 @@ impl<'a> Picture<'a> {
         }
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
-        let held = size_of_val(self.gaussians) + gaussians.len() * size_of::<Splat>();
-        self.limits.check_memory(held as u64)?;
-        let splats: Vec<_> = gaussians.iter().filter_map(|g| Splat::new(g, &view)).collect();
+        let held = self.held + gaussians.len() as u64 * size_of::<Splat>() as u64;
+        self.limits.check_memory(held)?;
+        let mut splats = Vec::with_capacity(gaussians.len());
+        splats.extend(gaussians.iter().filter_map(|g| Splat::new(g, &view)));
         let kernel = self.header.kernel;
         let (region, cutoff) = (view.region, kernel.cutoff());
-        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held as u64)?;
+        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held)?;
         Ok(Job {
             splats,
             tiling,
