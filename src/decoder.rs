@@ -1,4 +1,5 @@
-//! The decoder: a push decoder without I/O, and an adapter over any `Read` (spec, section 4).
+//! The decoder: a push decoder without I/O, and an adapter over any `Read` (spec, sections 4
+//! and 11).
 
 use alloc::vec::Vec;
 

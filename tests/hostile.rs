@@ -183,7 +183,7 @@ fn the_memory_limit_holds() {
         })
     };
     let mut succeeded = 0;
-    for max_memory in (0..200).map(|step| step * 100_000) {
+    for max_memory in (0..40).map(|step| step * 400_000) {
         let (result, peak) = attempt(max_memory);
         // The limit speaks of what grows with the file; the rest is a few kilobytes.
         assert!(peak <= max_memory + 20_000, "{peak} bytes held, {max_memory} allowed");
@@ -195,7 +195,7 @@ fn the_memory_limit_holds() {
             Err(error) => panic!("{error}"),
         }
     }
-    assert!(succeeded > 50, "the limit is far too strict: {succeeded}");
+    assert!(succeeded > 10, "the limit is far too strict: {succeeded}");
 }
 
 #[test]

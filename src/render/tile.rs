@@ -1,4 +1,5 @@
-//! One tile of the output: splats added to a few hundred pixels that stay in the first cache.
+//! One tile of the output: splats added to a few hundred pixels that stay in the first cache
+//! (spec, section 9.4).
 
 use super::kernel::Kernel;
 use super::splat::Splat;
