@@ -389,6 +389,7 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// What the file says of its picture.
     #[must_use]
+    #[expect(clippy::missing_panics_doc, reason = "it cannot")]
     pub fn header(&self) -> &Header {
         self.stream.header().expect("`with_limits` read it")
     }
@@ -430,6 +431,7 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// The picture so far.
     #[must_use]
+    #[expect(clippy::missing_panics_doc, reason = "it cannot")]
     pub fn picture(&self) -> Picture<'_> {
         self.stream.picture().expect("`with_limits` read the header")
     }

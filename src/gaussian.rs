@@ -123,7 +123,7 @@ impl Chart {
             }
             Self::Cholesky => [a, b, c],
             Self::RotationScale => {
-                if !(c.abs() <= 1024.0) {
+                if c.is_nan() || c.abs() > 1024.0 {
                     return [f32::NAN; 3];
                 }
                 let (sin, cos) = math::sin_cos(c);

@@ -13,7 +13,7 @@ pub(crate) const LOG2_E: f32 = core::f32::consts::LOG2_E;
 /// The coefficients of 2^f on [-1/2, 1/2], highest power first; relative error 2e-8 before
 /// rounding.
 pub(crate) const EXP2_POLYNOMIAL: [f32; 7] =
-    [1.540_353e-4, 1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265_1e-1, 6.931_472e-1, 1.0];
+    [1.540_353e-4, 1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265e-1, 6.931_472e-1, 1.0];
 
 /// e^x for finite x, from the specification's polynomial (spec, section 3.1).
 ///
@@ -35,7 +35,7 @@ pub(crate) fn exp(x: f32) -> f32 {
 pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     let n = (x * core::f32::consts::FRAC_2_PI + ROUND_MAGIC) - ROUND_MAGIC;
     // pi/2 in two parts, the first with few enough bits that `n * part` is exact.
-    let r = (x - n * 1.570_312_5) - n * 4.838_267_9e-4;
+    let r = (x - n * 1.570_312_5) - n * 4.838_268e-4;
     let r2 = r * r;
     let sin = ((-1.951_529_6e-4 * r2 + 8.332_161e-3) * r2 - 1.666_665_5e-1) * r2 * r + r;
     let cos =

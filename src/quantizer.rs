@@ -110,8 +110,7 @@ impl Quantizer {
         if !(steps.scale > 0.0 && steps.scale <= MAX_PARAMETER) {
             return Err(malformed("a scale that is not positive and at most 2^32"));
         }
-        // Written so that NaN fails.
-        if !(steps.offset.abs() <= MAX_PARAMETER) {
+        if steps.offset.is_nan() || steps.offset.abs() > MAX_PARAMETER {
             return Err(malformed("an offset that is not within +-2^32"));
         }
         Ok(quantizer)

@@ -301,7 +301,7 @@ struct Awkward<'a> {
 impl Read for Awkward<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.calls += 1;
-        if self.calls % 2 == 0 {
+        if self.calls.is_multiple_of(2) {
             return Err(io::ErrorKind::Interrupted.into());
         }
         match self.bytes.split_first() {
@@ -355,6 +355,9 @@ fn the_adapter_reads_from_awkward_readers() {
     assert!(error.is_unexpected_end(), "{error}");
 }
 
+/// What to do to a sound field, and what the error then says.
+type Change<'a, T> = (&'a dyn Fn(&mut T), &'a str);
+
 /// The error of a file of these chunks, which must have one.
 #[track_caller]
 fn refused(chunks: &[Vec<u8>]) -> String {
@@ -377,7 +380,7 @@ fn errors_name_the_chunk_and_the_rule() {
     let after = |first: Vec<u8>| [first, quantizers.clone(), layer.clone(), end.clone()];
     decode(&of_chunks(&after(sound.clone()))).1.expect("sound until it is changed");
 
-    let changes: [(&dyn Fn(&mut Ghdr), &str); 20] = [
+    let changes: [Change<'_, Ghdr>; 20] = [
         (&|h| h.version = 1, "GHDR: unsupported: version 1"),
         (&|h| h.coding = 1, "GHDR: unsupported: coding 1"),
         (&|h| h.color = 4, "GHDR: unsupported: colour model 4"),
@@ -410,7 +413,7 @@ fn errors_name_the_chunk_and_the_rule() {
         change(&mut entries[3]);
         chunk(b"QNTZ", &qntz(&entries))
     };
-    let changes: [(&dyn Fn(&mut Entry), &str); 14] = [
+    let changes: [Change<'_, Entry>; 14] = [
         (&|e| e.kind = 3, "QNTZ: unsupported: kind 3"),
         (&|e| e.reserved[0] = 1, "QNTZ: a reserved byte is not zero"),
         (&|e| e.bits = 0, "QNTZ: a bit depth that is not 1 to 16"),

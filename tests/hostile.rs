@@ -2,6 +2,8 @@
 
 mod common;
 
+use core::time::Duration;
+
 use cap::Cap;
 use common::{
     CHOLESKY, Entry, File, Ghdr, RGB, RGBA, SIGNATURE, chunk, decode_pieces, decode_valid,
@@ -9,7 +11,7 @@ use common::{
 use image_gip::{DecodeError, LimitKind, Limits, Region, RenderOptions, StreamDecoder};
 use std::alloc::System;
 use std::sync::{Mutex, MutexGuard};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Counts what is allocated.
 #[global_allocator]

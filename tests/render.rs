@@ -290,8 +290,8 @@ fn exact(file: &File) -> (Vec<f64>, Vec<f64>) {
         let values: Vec<f64> = codes.iter().map(|&c| f64::from(f32::from_bits(c))).collect();
         let [x, y, l11, l21, l22, color] = values[..] else { unreachable!("six components") };
         for pixel in 0..pixels {
-            let dx = (pixel as u32 % header.width) as f64 + 0.5 - x;
-            let dy = (pixel as u32 / header.width) as f64 + 0.5 - y;
+            let dx = f64::from(pixel as u32 % header.width) + 0.5 - x;
+            let dy = f64::from(pixel as u32 / header.width) + 0.5 - y;
             let u = dx / l11;
             let q = u * u + ((dy - l21 * u) / l22).powi(2);
             let weight = match header.kernel {

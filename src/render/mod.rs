@@ -29,6 +29,9 @@ use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use output::Sample;
 
+/// Most bytes that a row of tiles takes for slices of the output.
+const STRIP: u64 = 128;
+
 /// A picture that can be rendered: a header and the Gaussians that have arrived so far.
 ///
 /// Rendering evaluates the continuous model at the centres of the output's pixels: at the stored
@@ -138,7 +141,8 @@ impl<'a> Picture<'a> {
         }
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
-        let held = self.held + gaussians.len() as u64 * size_of::<Splat>() as u64;
+        let strips = u64::from(view.region.height).div_ceil(TILE_HEIGHT as u64) * STRIP;
+        let held = self.held + strips + gaussians.len() as u64 * size_of::<Splat>() as u64;
         self.limits.check_memory(held)?;
         let mut splats = Vec::with_capacity(gaussians.len());
         splats.extend(gaussians.iter().filter_map(|g| Splat::new(g, &view)));

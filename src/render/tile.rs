@@ -142,6 +142,7 @@ mod simd {
 mod tests {
     use fearless_simd::{Level, Simd};
     use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
 
     use super::*;
     use crate::gaussian::Gaussian;
@@ -189,7 +190,12 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(200))]
+        #![proptest_config(ProptestConfig {
+            cases: 200,
+            failure_persistence: None,
+            rng_seed: RngSeed::Fixed(1),
+            ..ProptestConfig::default()
+        })]
         #[test]
         fn every_simd_level_gives_the_bits_of_the_reference(
             shapes in prop::collection::vec(

@@ -173,7 +173,7 @@ fn tiles(low: f32, high: f32, origin: u32, length: u32, size: usize) -> Option<(
     // clamp and the first pixel is at most one too early.
     let last = high - 0.5 - origin as f32;
     let first = (low - 0.5 - origin as f32).max(0.0) as usize;
-    if !(last >= 0.0) || first >= length as usize {
+    if last.is_nan() || last < 0.0 || first >= length as usize {
         return None;
     }
     let last = (last as usize).min(length as usize - 1);
