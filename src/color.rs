@@ -1,4 +1,4 @@
-//! The colour models and sample depths that a picture can have (spec, section 5).
+//! The colour models and sample depths that a picture can have (spec, section 5.2).
 
 /// What the channels of a picture mean. Samples are sRGB-encoded unless an ICC profile says
 /// otherwise; alpha is straight (not premultiplied) and linear.

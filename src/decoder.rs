@@ -1,4 +1,5 @@
-//! The decoder: a push decoder without I/O, and an adapter over any `Read` (spec, section 4).
+//! The decoder: a push decoder without I/O, and an adapter over any `Read` (spec, sections 4
+//! and 11).
 
 use alloc::vec::Vec;
 
@@ -71,7 +72,12 @@ enum Stage {
     /// The payload is skipped.
     Skip,
     /// The payload is collected and read as a whole.
-    Collect(Vec<u8>),
+    Collect {
+        /// What has arrived.
+        payload: Vec<u8>,
+        /// Bytes that the chunk declares.
+        length: usize,
+    },
     /// A layer, and how many Gaussians there were before it.
     Layer(LayerReader, usize),
     /// `GEND` was read.
@@ -192,7 +198,8 @@ impl StreamDecoder {
     #[must_use]
     pub fn picture(&self) -> Option<Picture<'_>> {
         let header = self.header.as_ref()?;
-        Some(Picture::new(header, &self.gaussians, &self.limits))
+        let held = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
+        Some(Picture::new(header, &self.gaussians, &self.limits, held + self.metadata.size()))
     }
 
     /// Whether the first layer has begun: header and metadata are complete.
@@ -243,10 +250,12 @@ impl StreamDecoder {
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
             // A later version may add to these; version 0 reads them before any layer only.
             _ if Metadata::knows(chunk) && self.layers == 0 => {
-                self.limits.check_memory(self.metadata.size() + u64::from(length))?;
-                Ok(Stage::Collect(Vec::new()))
+                let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
+                let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
+                self.limits.check_memory(self.metadata.size() + declared)?;
+                Ok(collect(length))
             }
-            ChunkType::GHDR | ChunkType::QNTZ => Ok(Stage::Collect(Vec::new())),
+            ChunkType::GHDR | ChunkType::QNTZ => Ok(collect(length)),
             ChunkType::GEND => Ok(Stage::Skip),
             _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
             _ => Ok(Stage::Skip),
@@ -255,7 +264,10 @@ impl StreamDecoder {
 
     fn payload(&mut self, mut payload: &[u8]) -> Result<(), DecodeError> {
         match &mut self.stage {
-            Stage::Collect(bytes) => bytes.extend_from_slice(payload),
+            Stage::Collect { payload: bytes, length } => {
+                grow(bytes, payload.len(), *length);
+                bytes.extend_from_slice(payload);
+            }
             Stage::Layer(layer, _) => {
                 let Some(header) = &self.header else { return Ok(()) };
                 let allowed = header.gaussians - self.gaussians.len() as u32;
@@ -264,6 +276,7 @@ impl StreamDecoder {
                 }
                 while let Some(values) = layer.next(&mut payload, &self.quantizers)? {
                     let values = &values[..self.quantizers.len()];
+                    grow(&mut self.gaussians, 1, header.gaussians as usize);
                     self.gaussians.push(Gaussian::from_components(values, header.chart));
                 }
             }
@@ -275,16 +288,16 @@ impl StreamDecoder {
     /// Reads a chunk whose CRC was right.
     fn complete(&mut self, chunk: ChunkType) -> Result<(), DecodeError> {
         match (chunk, &mut self.stage) {
-            (ChunkType::GHDR, Stage::Collect(payload)) => {
+            (ChunkType::GHDR, Stage::Collect { payload, .. }) => {
                 let header = Header::parse(payload)?;
                 self.check_header(&header)?;
                 self.header = Some(header);
             }
-            (ChunkType::QNTZ, Stage::Collect(payload)) => {
+            (ChunkType::QNTZ, Stage::Collect { payload, .. }) => {
                 let components = self.header.as_ref().map_or(0, Header::components);
                 self.quantizers = Quantizer::parse_all(payload, components)?;
             }
-            (_, Stage::Collect(payload)) => {
+            (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
                 self.metadata.take(chunk, payload)?;
             }
@@ -311,18 +324,37 @@ impl StreamDecoder {
     fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
         self.limits.check_size(header.width, header.height)?;
         self.limits.check_gaussians(header.gaussians)?;
-        let bytes = u64::from(header.gaussians) * size_of::<Gaussian>() as u64;
-        self.limits.check_memory(bytes)
+        self.limits.check_memory(growing::<Gaussian>(header.gaussians))
     }
 
     fn count(&mut self, kind: ChunkType, length: u32) {
         let bytes = u64::from(length) + 12;
         if let Some(known) = self.chunks.iter_mut().find(|known| known.kind == kind) {
-            known.count += 1;
+            known.count = known.count.saturating_add(1);
             known.bytes += bytes;
         } else if self.chunks.len() < MAX_CHUNK_KINDS {
             self.chunks.push(ChunkStatistics { kind, count: 1, bytes });
         }
+    }
+}
+
+/// The stage that collects a chunk of `length` bytes.
+fn collect(length: u32) -> Stage {
+    Stage::Collect { payload: Vec::new(), length: length as usize }
+}
+
+/// Most bytes that a vector holds which [`grow`]s to `length` items: the last time that it moves,
+/// its old and its new memory exist at the same time.
+fn growing<T>(length: u32) -> u64 {
+    2 * u64::from(length) * size_of::<T>() as u64
+}
+
+/// Makes room for `additional` items: by doubling, as they arrive, but never for more than the
+/// `declared` number in all.
+fn grow<T>(items: &mut Vec<T>, additional: usize, declared: usize) {
+    let length = items.len();
+    if items.capacity() - length < additional {
+        items.reserve_exact(additional.max(length.min(declared.saturating_sub(length))));
     }
 }
 

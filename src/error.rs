@@ -1,4 +1,4 @@
-//! What can go wrong while decoding, and where.
+//! What can go wrong while decoding, and where (spec, section 1).
 
 use alloc::borrow::Cow;
 use alloc::format;

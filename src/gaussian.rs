@@ -116,14 +116,14 @@ impl Chart {
     pub(crate) fn to_cholesky(self, [a, b, c]: [f32; 3]) -> [f32; 3] {
         match self {
             Self::Covariance => {
-                // Of a negative number, the root here is NaN or the number itself: never drawn.
+                // Of a negative number the root is NaN, which is never drawn.
                 let l11 = math::sqrt(a);
                 let l21 = b / l11;
                 [l11, l21, math::sqrt(c - l21 * l21)]
             }
             Self::Cholesky => [a, b, c],
             Self::RotationScale => {
-                if !(c.abs() <= 1024.0) {
+                if c.is_nan() || c.abs() > 1024.0 {
                     return [f32::NAN; 3];
                 }
                 let (sin, cos) = math::sin_cos(c);

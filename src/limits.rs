@@ -1,4 +1,4 @@
-//! Every bound that a decoder applies to a file it does not trust.
+//! Every bound that a decoder applies to a file it does not trust (spec, section 10).
 
 use crate::error::{DecodeError, LimitKind};
 
@@ -21,7 +21,7 @@ pub struct Limits {
     /// not counted. Default 512 MiB.
     pub max_memory: u64,
     /// Most kernel evaluations in one rendering: the sum over the Gaussians of the pixels that
-    /// each covers, in whole tiles. Default 2^32, a few seconds on one core.
+    /// each covers, in whole tiles of 16x8. Default 2^32, a few seconds on one core.
     pub max_work: u64,
 }
 

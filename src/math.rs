@@ -48,13 +48,13 @@ pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
-/// The correctly rounded square root of a finite x >= 0 (IEEE 754 squareRoot).
+/// The correctly rounded square root (IEEE 754 squareRoot); NaN for x < 0.
 #[cfg(feature = "std")]
 pub(crate) fn sqrt(x: f32) -> f32 {
     x.sqrt()
 }
 
-/// The correctly rounded square root of a finite x >= 0 (IEEE 754 squareRoot).
+/// The correctly rounded square root (IEEE 754 squareRoot); NaN for x < 0.
 #[cfg(not(feature = "std"))]
 pub(crate) fn sqrt(x: f32) -> f32 {
     soft_sqrt(x)
@@ -63,7 +63,10 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 /// IEEE 754 squareRoot in integers: `core` has none.
 #[cfg(any(not(feature = "std"), test))]
 fn soft_sqrt(x: f32) -> f32 {
-    if x <= 0.0 || !x.is_finite() {
+    if x < 0.0 {
+        return f32::NAN;
+    }
+    if x == 0.0 || !x.is_finite() {
         return x;
     }
     let bits = x.to_bits();
@@ -139,5 +142,9 @@ mod tests {
         for x in [0.0, 1.0, 4.0, 2.0, f32::MIN_POSITIVE, f32::MAX, 1e-45] {
             assert_eq!(soft_sqrt(x).to_bits(), x.sqrt().to_bits(), "sqrt({x:e})");
         }
+        for x in [-1.0, -1e-45, f32::NEG_INFINITY, f32::NAN] {
+            assert!(soft_sqrt(x).is_nan() && x.sqrt().is_nan(), "sqrt({x:e})");
+        }
+        assert_eq!(soft_sqrt(f32::INFINITY), f32::INFINITY);
     }
 }

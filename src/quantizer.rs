@@ -96,6 +96,9 @@ impl Quantizer {
         };
         let quantizer = match entry[0] {
             0 if steps.bits != 32 => return Err(malformed("a float that is not 32 bits deep")),
+            0 if steps.scale != 1.0 || steps.offset != 0.0 => {
+                return Err(malformed("a float whose scale and offset are not 1 and 0"));
+            }
             0 => return Ok(Self::Float),
             1 => Self::Linear(steps),
             2 => Self::Log(steps),
@@ -107,8 +110,7 @@ impl Quantizer {
         if !(steps.scale > 0.0 && steps.scale <= MAX_PARAMETER) {
             return Err(malformed("a scale that is not positive and at most 2^32"));
         }
-        // Written so that NaN fails.
-        if !(steps.offset.abs() <= MAX_PARAMETER) {
+        if steps.offset.is_nan() || steps.offset.abs() > MAX_PARAMETER {
             return Err(malformed("an offset that is not within +-2^32"));
         }
         Ok(quantizer)

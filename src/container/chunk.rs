@@ -1,4 +1,4 @@
-//! Chunk framing: length, type, payload, CRC-32 (spec, section 4.2).
+//! Signature and chunk framing: length, type, payload, CRC-32 (spec, sections 4.1 to 4.3).
 
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;

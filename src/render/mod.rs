@@ -29,6 +29,9 @@ use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use output::Sample;
 
+/// Most bytes that a row of tiles takes for slices of the output.
+const STRIP: u64 = 128;
+
 /// A picture that can be rendered: a header and the Gaussians that have arrived so far.
 ///
 /// Rendering evaluates the continuous model at the centres of the output's pixels: at the stored
@@ -39,11 +42,18 @@ pub struct Picture<'a> {
     header: &'a Header,
     gaussians: &'a [Gaussian],
     limits: &'a Limits,
+    /// Bytes that the decoder holds.
+    held: u64,
 }
 
 impl<'a> Picture<'a> {
-    pub(crate) fn new(header: &'a Header, gaussians: &'a [Gaussian], limits: &'a Limits) -> Self {
-        Self { header, gaussians, limits }
+    pub(crate) fn new(
+        header: &'a Header,
+        gaussians: &'a [Gaussian],
+        limits: &'a Limits,
+        held: u64,
+    ) -> Self {
+        Self { header, gaussians, limits, held }
     }
 
     /// What the file says of the picture.
@@ -146,12 +156,14 @@ impl<'a> Picture<'a> {
         let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
-        let held = size_of_val(self.gaussians) + gaussians.len() * size_of::<Splat>();
-        self.limits.check_memory(held as u64)?;
-        let splats: Vec<_> = gaussians.iter().filter_map(|g| Splat::new(g, &view)).collect();
+        let strips = u64::from(view.region.height).div_ceil(TILE_HEIGHT as u64) * STRIP;
+        let held = self.held + strips + gaussians.len() as u64 * size_of::<Splat>() as u64;
+        self.limits.check_memory(held)?;
+        let mut splats = Vec::with_capacity(gaussians.len());
+        splats.extend(gaussians.iter().filter_map(|g| Splat::new(g, &view)));
         let kernel = self.header.kernel;
         let (region, cutoff) = (view.region, kernel.cutoff());
-        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held as u64)?;
+        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held)?;
         Ok(Job {
             splats,
             tiling,

@@ -1,4 +1,4 @@
-//! Float planes to samples (spec, section 9.5).
+//! Float planes to samples (spec, sections 9.5 and 9.6).
 
 use super::tile::{Plane, TILE_HEIGHT, TILE_WIDTH};
 use crate::color::ColorModel;

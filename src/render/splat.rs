@@ -5,7 +5,7 @@ use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
 
 /// One Gaussian in output pixels: q = (i11 dx)^2 + (w dx + i22 dy)^2 with
-/// (dx, dy) = pixel centre - (x, y) (spec, section 9.2).
+/// (dx, dy) = pixel centre - (x, y) (spec, sections 9.2 and 9.3).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     pub(crate) x: f32,

@@ -1,4 +1,5 @@
-//! One tile of the output: splats added to a few hundred pixels that stay in the first cache.
+//! One tile of the output: splats added to a few hundred pixels that stay in the first cache
+//! (spec, section 9.4).
 
 use super::kernel::Kernel;
 use super::splat::Splat;
@@ -135,6 +136,100 @@ mod simd {
                     let sum = f32x16::load_array_ref(simd, &plane[row]) + weight * color;
                     sum.store_array(&mut plane[row]);
                 }
+            }
+        }
+    }
+}
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use fearless_simd::{Level, Simd};
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+
+    use super::*;
+    use crate::gaussian::Gaussian;
+    use crate::render::view::{Region, View};
+
+    /// Every level that this machine has, not only its best.
+    fn levels() -> Vec<Level> {
+        let best = Level::new();
+        let mut levels = vec![best, Level::baseline(), Level::fallback()];
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        levels.extend(
+            [
+                best.as_sse2().map(Simd::level),
+                best.as_sse4_2().map(Simd::level),
+                best.as_avx2().map(Simd::level),
+                best.as_avx512().map(Simd::level),
+            ]
+            .into_iter()
+            .flatten(),
+        );
+        levels
+    }
+
+    fn same_bits_at_every_level<const CHANNELS: usize>(
+        splats: &[Splat],
+        origin: (u32, u32),
+        kernel: Kernel,
+    ) {
+        let list: Vec<u32> = (0..splats.len() as u32).collect();
+        let start = [[[0.5; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        let render = |backend: Backend| {
+            let mut planes = start;
+            backend.add(&mut planes, origin, splats, &list, kernel);
+            planes.map(|plane| plane.map(|row| row.map(f32::to_bits)))
+        };
+        let expected = render(Backend::Reference);
+        for level in levels() {
+            assert_eq!(render(Backend::Simd(level)), expected, "{level:?}, {kernel:?}");
+        }
+    }
+
+    /// Positive numbers from 2^low to 2^high, every power of two as likely.
+    fn magnitude(low: i32, high: i32) -> impl Strategy<Value = f32> {
+        (low..high, 1.0_f32..2.0).prop_map(|(exponent, part)| part * 2_f32.powi(exponent))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            cases: 200,
+            failure_persistence: None,
+            rng_seed: RngSeed::Fixed(1),
+            ..ProptestConfig::default()
+        })]
+        #[test]
+        fn every_simd_level_gives_the_bits_of_the_reference(
+            shapes in prop::collection::vec(
+                (
+                    [-40.0_f32..80.0, -40.0_f32..80.0],
+                    magnitude(-12, 24),
+                    prop_oneof![Just(0.0), magnitude(-12, 24), magnitude(-12, 24).prop_map(|v| -v)],
+                    magnitude(-12, 24),
+                    prop::array::uniform4(-100.0_f32..100.0),
+                ),
+                1..12,
+            ),
+            cutoff in prop_oneof![Just(64.0_f32), Just(11.082_527), 0.001_f32..64.0],
+            tile in (0_u32..4, 0_u32..8),
+            far in prop_oneof![Just(0_u32), Just(1 << 22)],
+        ) {
+            let region = Region { x: 0, y: 0, width: 64, height: 64 };
+            let view = View::new((64, 64), (64, 64), region);
+            let origin = (far + tile.0 * TILE_WIDTH as u32, tile.1 * TILE_HEIGHT as u32);
+            let splats: Vec<_> = shapes
+                .into_iter()
+                .filter_map(|([x, y], l11, l21, l22, color)| {
+                    let center = [x + far as f32, y];
+                    Splat::new(&Gaussian { center, cholesky: [l11, l21, l22], color }, &view)
+                })
+                .collect();
+            for kernel in [Kernel::Quartic, Kernel::Exponential { cutoff }] {
+                same_bits_at_every_level::<1>(&splats, origin, kernel);
+                same_bits_at_every_level::<2>(&splats, origin, kernel);
+                same_bits_at_every_level::<3>(&splats, origin, kernel);
+                same_bits_at_every_level::<4>(&splats, origin, kernel);
             }
         }
     }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use super::splat::Splat;
 use super::tile::{TILE_HEIGHT, TILE_PIXELS, TILE_WIDTH};
 use super::view::Region;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, LimitKind};
 use crate::limits::Limits;
 
 /// For every tile of a region, the splats that may touch it, in file order.
@@ -56,19 +56,25 @@ impl Tiling {
         self.region = Some(region);
         self.columns = (region.width as usize).div_ceil(TILE_WIDTH);
         self.rows = (region.height as usize).div_ceil(TILE_HEIGHT);
-        let tiles = self.columns * self.rows;
-        let held = held + ((tiles + 1) * size_of::<usize>()) as u64;
+        let tiles = self.columns as u64 * self.rows as u64;
+        let held = held + (tiles + 1) * size_of::<usize>() as u64;
         limits.check_memory(held)?;
+        // Spans number tiles in 32 bits.
+        let allowed = u64::from(u32::MAX) * TILE_PIXELS as u64;
+        if tiles > u64::from(u32::MAX) {
+            let (kind, wanted) = (LimitKind::Pixels, region.pixels());
+            return Err(DecodeError::Limit { kind, wanted, allowed });
+        }
+        let tiles = tiles as usize;
         self.starts.clear();
         self.starts.resize(tiles + 1, 0);
         self.spans.clear();
         let mut touched = 0_u64;
         for (index, splat) in splats.iter().enumerate() {
             // Every span counts as work, so that hostile shapes cannot keep this loop busy.
+            self.reserve_spans(limits, held)?;
             touched += self.add_spans(index as u32, splat, cutoff, region);
             limits.check_work(touched * TILE_PIXELS as u64)?;
-            let spans = self.spans.len() * size_of::<Span>();
-            limits.check_memory(held + spans as u64 + touched * size_of::<u32>() as u64)?;
         }
         let mut total = 0;
         for start in &mut self.starts {
@@ -76,6 +82,8 @@ impl Tiling {
             *start = total;
             total += count;
         }
+        let spans = self.spans.capacity() * size_of::<Span>();
+        limits.check_memory(held + spans as u64 + total as u64 * size_of::<u32>() as u64)?;
         self.indices.clear();
         self.indices.resize(total, 0);
         // `starts[t]` runs through its tile's list and ends where the next begins; shift it back
@@ -89,6 +97,19 @@ impl Tiling {
         }
         self.starts.rotate_right(1);
         self.starts[0] = 0;
+        Ok(())
+    }
+
+    /// Makes room for the spans of one more splat, one per row of tiles.
+    fn reserve_spans(&mut self, limits: &Limits, held: u64) -> Result<(), DecodeError> {
+        let (length, capacity) = (self.spans.len(), self.spans.capacity());
+        if capacity - length < self.rows {
+            let wanted = (2 * capacity).max(length + self.rows);
+            // Old and new memory exist at the same time.
+            let bytes = (capacity + wanted) as u64 * size_of::<Span>() as u64;
+            limits.check_memory(held + bytes)?;
+            self.spans.reserve_exact(wanted - length);
+        }
         Ok(())
     }
 
@@ -155,7 +176,7 @@ fn tiles(low: f32, high: f32, origin: u32, length: u32, size: usize) -> Option<(
     // clamp and the first pixel is at most one too early.
     let last = high - 0.5 - origin as f32;
     let first = (low - 0.5 - origin as f32).max(0.0) as usize;
-    if !(last >= 0.0) || first >= length as usize {
+    if last.is_nan() || last < 0.0 || first >= length as usize {
         return None;
     }
     let last = (last as usize).min(length as usize - 1);

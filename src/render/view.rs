@@ -8,6 +8,9 @@ use crate::container::Header;
 use crate::error::DecodeError;
 use crate::limits::Limits;
 
+/// Largest width and height of an output. Up to here every pixel centre is exact in `f32`.
+const MAX_OUTPUT_SIDE: u32 = 1 << 23;
+
 /// A rectangle of output pixels: from (x, y), which is included, `width` to the right and
 /// `height` down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -62,7 +65,8 @@ impl RenderOptions {
 
     /// Renders the whole picture `width` by `height` pixels large. The continuous model is
     /// evaluated there; nothing is resampled. Where that is smaller than the stored size, each
-    /// Gaussian is first widened by the pixels' own footprint, so that nothing aliases.
+    /// Gaussian is first widened by the pixels' own footprint, so that nothing aliases. Each side
+    /// is at most 2^23; [`RenderOptions::region`] keeps a close-up affordable.
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self
@@ -143,8 +147,11 @@ impl RenderOptions {
     /// Checks the request against the picture and the limits.
     pub(super) fn view(&self, header: &Header, limits: &Limits) -> Result<View, DecodeError> {
         let (width, height) = self.size.unwrap_or((header.width, header.height));
-        if width == 0 || height == 0 {
-            return Err(DecodeError::Request(format!("an output size of {width}x{height}")));
+        let sides = 1..=MAX_OUTPUT_SIDE;
+        if !sides.contains(&width) || !sides.contains(&height) {
+            return Err(DecodeError::Request(format!(
+                "an output of {width}x{height} pixels; each side must be 1 to {MAX_OUTPUT_SIDE}"
+            )));
         }
         let region = self.region.unwrap_or(Region { x: 0, y: 0, width, height });
         let inside = |at: u32, length: u32, whole: u32| {

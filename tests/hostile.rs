@@ -1,0 +1,217 @@
+//! Files made to hurt: every limit refuses before memory is taken or time is spent.
+
+mod common;
+
+use core::time::Duration;
+
+use cap::Cap;
+use common::{
+    CHOLESKY, Entry, File, Ghdr, RGB, RGBA, SIGNATURE, chunk, decode_pieces, decode_valid,
+};
+use image_gip::{DecodeError, LimitKind, Limits, Region, RenderOptions, StreamDecoder};
+use std::alloc::System;
+use std::sync::{Mutex, MutexGuard};
+use std::time::Instant;
+
+/// Counts what is allocated.
+#[global_allocator]
+static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
+
+/// One test at a time, so that what is counted belongs to it.
+fn alone() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+/// Bytes that are allocated while `work` runs, beyond those before, at their highest.
+fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
+    // The peak cannot be set back; a block as large as the peak makes room above it.
+    let before = MEMORY.allocated();
+    let filler = vec![0_u8; MEMORY.max_allocated().saturating_sub(before) + 1];
+    let before = MEMORY.max_allocated();
+    let result = work();
+    let peak = MEMORY.max_allocated() - before;
+    drop(filler);
+    (result, peak as u64)
+}
+
+fn limits(change: impl FnOnce(&mut Limits)) -> Limits {
+    let mut limits = Limits::default();
+    change(&mut limits);
+    limits
+}
+
+fn header(change: impl FnOnce(&mut Ghdr)) -> Vec<u8> {
+    let mut header = Ghdr::default();
+    change(&mut header);
+    [&SIGNATURE[..], &chunk(b"GHDR", &header.payload())].concat()
+}
+
+/// Feeds a file that one limit refuses: which, and how much memory that took.
+#[track_caller]
+fn refusal(bytes: &[u8], limits: Limits) -> (LimitKind, u64, u64) {
+    let ((_, result), peak) = peak(|| decode_pieces([bytes], limits));
+    match result.expect_err("a limit is exceeded") {
+        DecodeError::Limit { kind, wanted, allowed } => {
+            assert!(wanted > allowed && peak < 10_000, "{kind}: {wanted}, {peak} bytes held");
+            (kind, wanted, allowed)
+        }
+        error => panic!("{error}"),
+    }
+}
+
+#[test]
+fn hostile_headers_are_refused_before_anything_is_allocated() {
+    let _alone = alone();
+    let side = 1 << 20;
+    let defaults = Limits::default;
+    let many = header(|h| (h.gaussians, h.layers) = (u32::MAX, 1));
+    assert_eq!(refusal(&many, defaults()), (LimitKind::Gaussians, u32::MAX.into(), 1 << 22));
+    let wide = header(|h| h.width = side);
+    assert_eq!(refusal(&wide, defaults()), (LimitKind::Width, 1 << 20, 1 << 16));
+    let high = header(|h| h.height = side);
+    assert_eq!(refusal(&high, defaults()), (LimitKind::Height, 1 << 20, 1 << 16));
+    let large = header(|h| (h.width, h.height) = (1 << 16, 1 << 16));
+    assert_eq!(refusal(&large, defaults()), (LimitKind::Pixels, 1 << 32, 1 << 28));
+    let (kind, ..) = refusal(&many, limits(|l| l.max_gaussians = u32::MAX));
+    assert_eq!(kind, LimitKind::Memory);
+    // Every bound counts as it is set.
+    let small = header(|h| (h.width, h.height, h.gaussians, h.layers) = (20, 30, 5, 1));
+    for (changed, expected) in [
+        (limits(|l| l.max_width = 19), (LimitKind::Width, 20, 19)),
+        (limits(|l| l.max_height = 29), (LimitKind::Height, 30, 29)),
+        (limits(|l| l.max_pixels = 599), (LimitKind::Pixels, 600, 599)),
+        (limits(|l| l.max_gaussians = 4), (LimitKind::Gaussians, 5, 4)),
+    ] {
+        assert_eq!(refusal(&small, changed), expected);
+    }
+}
+
+#[test]
+fn declared_lengths_take_no_memory() {
+    let _alone = alone();
+    let most = (1_u32 << 31) - 1;
+    for kind in [b"iCCP", b"tEXt", b"prVt"] {
+        let bytes = [header(|_| ()).as_slice(), &most.to_le_bytes(), kind, &[b'x'; 5000]].concat();
+        let ((_, result), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::none()));
+        assert!(result.expect_err("incomplete").is_unexpected_end());
+        assert!(peak < 12_000, "{peak} bytes held");
+    }
+    let bytes = [header(|_| ()).as_slice(), &most.to_le_bytes(), b"iCCP"].concat();
+    assert_eq!(refusal(&bytes, Limits::default()).0, LimitKind::Memory);
+    // A layer that declares many Gaussians and sends few.
+    let count = 1 << 22;
+    let start = header(|h| (h.gaussians, h.layers) = (count, 1));
+    let entries = common::qntz(&[Entry::linear(1, 1.0, 0.0); 6]);
+    let length = (4 + 6 * count / 8).to_le_bytes();
+    let layer = [&length[..], b"GAUS", &count.to_le_bytes(), &[0xAA; 300]].concat();
+    let bytes = [start, chunk(b"QNTZ", &entries), layer].concat();
+    let ((decoder, _), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::default()));
+    assert_eq!(decoder.gaussians().len(), 400);
+    assert!(peak < 60_000, "{peak} bytes held");
+}
+
+#[test]
+fn a_small_file_of_large_gaussians_is_refused_by_its_work() {
+    let _alone = alone();
+    // 10 kB: one bit per component, all of them at the centre and as wide as can be.
+    let entry = |value| Entry::linear(1, 1.0, value);
+    let entries =
+        vec![entry(2000.0), entry(2000.0), entry(1e7), entry(0.0), entry(1e7), entry(0.1)];
+    let header = Ghdr { width: 4096, height: 4096, ..Ghdr::default() };
+    let file = File::new(header, entries, vec![vec![0; 6 * 13_000]]);
+    let bytes = file.bytes();
+    assert!(bytes.len() < 10_000);
+    let decoder = decode_valid(&bytes);
+    let picture = decoder.picture().expect("a complete file");
+    let mut out = vec![7; 4096 * 4096];
+    let start = Instant::now();
+    let error = picture.render_u8(&RenderOptions::new(), &mut out).expect_err("too much work");
+    assert!(
+        matches!(error, DecodeError::Limit { kind: LimitKind::Work, allowed: 4_294_967_296, .. }),
+        "{error}"
+    );
+    assert!(start.elapsed() < Duration::from_secs(5), "refused late");
+    assert!(out.iter().all(|&sample| sample == 7), "the buffer was touched");
+    // The cost follows the output: a thumbnail of the same file is fine.
+    let options = RenderOptions::new().size(64, 64);
+    picture.render_u8(&options, &mut out[..64 * 64]).expect("little work");
+}
+
+#[test]
+fn spans_without_pixels_count_as_work() {
+    let _alone = alone();
+    // Needles that pass every row of a tall picture, most of the time beside it.
+    let rows: Vec<Vec<f32>> =
+        (0..6000).map(|i| vec![2e6 + i as f32, 30_000.0, 1e6, 1e7, 1.0, 0.1]).collect();
+    let header = Ghdr { width: 1, height: 60_000, ..Ghdr::default() };
+    let decoder = decode_valid(&File::of_floats(header, &rows).bytes());
+    let start = Instant::now();
+    let mut out = vec![0; 60_000];
+    let picture = decoder.picture().expect("a complete file");
+    let error = picture.render_u8(&RenderOptions::new(), &mut out).expect_err("too much work");
+    assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Work, .. }), "{error}");
+    assert!(start.elapsed() < Duration::from_secs(20), "refused late");
+}
+
+#[test]
+fn the_memory_limit_holds() {
+    let _alone = alone();
+    // Many Gaussians over many tiles, long metadata, many texts.
+    let mut random = common::Random(1);
+    let rows: Vec<Vec<f32>> = (0..20_000)
+        .map(|_| {
+            let mut row = vec![random.range(0.0, 900.0), random.range(0.0, 900.0)];
+            row.extend([random.decades(0.5, 40.0), 3.0, random.decades(0.5, 40.0)]);
+            row.extend([0.1; 4]);
+            row
+        })
+        .collect();
+    let base = [0; 4];
+    let header = Ghdr { color: RGBA, width: 900, height: 900, base, ..Ghdr::default() };
+    let mut file = File::of_floats(header, &rows).with(b"iCCP", &vec![1; 300_000]);
+    for _ in 0..3000 {
+        file = file.with(b"tEXt", b"a\0b");
+    }
+    let bytes = file.bytes();
+    let mut out = vec![0; 900 * 900 * 4];
+    let mut attempt = |max_memory: u64| {
+        let limits = limits(|l| l.max_memory = max_memory);
+        let options = RenderOptions::new().parallel(false);
+        peak(|| {
+            let mut decoder = StreamDecoder::with_limits(limits);
+            decoder.feed(&bytes)?;
+            decoder.picture().expect("a complete file").render_u8(&options, &mut out)
+        })
+    };
+    let mut succeeded = 0;
+    for max_memory in (0..40).map(|step| step * 400_000) {
+        let (result, peak) = attempt(max_memory);
+        // The limit speaks of what grows with the file; the rest is a few kilobytes.
+        assert!(peak <= max_memory + 20_000, "{peak} bytes held, {max_memory} allowed");
+        match result {
+            Ok(()) => succeeded += 1,
+            Err(DecodeError::Limit { kind: LimitKind::Memory, wanted, allowed }) => {
+                assert!(succeeded == 0 && wanted > allowed && allowed == max_memory);
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert!(succeeded > 10, "the limit is far too strict: {succeeded}");
+}
+
+#[test]
+fn output_sizes_count_against_the_limits() {
+    let _alone = alone();
+    let header = Ghdr { color: RGB, chart: CHOLESKY, ..Ghdr::default() };
+    let bytes = File::of_floats(header, &[]).bytes();
+    let (decoder, result) = decode_pieces([bytes.as_slice()], limits(|l| l.max_pixels = 1000));
+    result.expect("16x16 is within bounds");
+    let picture = decoder.picture().expect("a complete file");
+    let mut out = vec![0; 3 * 1024];
+    let error = picture.render_u8(&RenderOptions::new().size(32, 32), &mut out).expect_err("large");
+    assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Pixels, wanted: 1024, .. }));
+    let region = Region { x: 900_000, y: 900_000, width: 10, height: 10 };
+    let close_up = RenderOptions::new().size(1 << 20, 1 << 20).region(region);
+    picture.render_u8(&close_up, &mut out[..300]).expect("only the region counts");
+}
