@@ -77,6 +77,15 @@ impl SampleDepth {
         self.bits() as usize / 8
     }
 
+    /// The value of a full sample, 255 or 65535.
+    #[must_use]
+    pub const fn max_sample(self) -> u16 {
+        match self {
+            Self::Eight => 0xff,
+            Self::Sixteen => 0xffff,
+        }
+    }
+
     /// The depth of the given number of bits.
     pub(crate) const fn from_bits(bits: u8) -> Option<Self> {
         match bits {

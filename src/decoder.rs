@@ -115,6 +115,15 @@ impl StreamDecoder {
         }
     }
 
+    /// Replaces the limits, for what is still to be read and for rendering.
+    ///
+    /// # Errors
+    /// When what the file has declared so far exceeds the new limits. They hold in any case.
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), DecodeError> {
+        self.limits = limits;
+        self.header.as_ref().map_or(Ok(()), |header| self.check_header(header))
+    }
+
     /// Takes the next bytes of the file. Returns how many were used: all of them, unless the file
     /// ends within them.
     ///
@@ -281,9 +290,7 @@ impl StreamDecoder {
         match (chunk, &mut self.stage) {
             (ChunkType::GHDR, Stage::Collect { payload, .. }) => {
                 let header = Header::parse(payload)?;
-                self.limits.check_size(header.width, header.height)?;
-                self.limits.check_gaussians(header.gaussians)?;
-                self.limits.check_memory(growing::<Gaussian>(header.gaussians))?;
+                self.check_header(&header)?;
                 self.header = Some(header);
             }
             (ChunkType::QNTZ, Stage::Collect { payload, .. }) => {
@@ -311,6 +318,13 @@ impl StreamDecoder {
         }
         self.stage = Stage::Idle;
         Ok(())
+    }
+
+    /// Checks what a header declares against the limits.
+    fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
+        self.limits.check_size(header.width, header.height)?;
+        self.limits.check_gaussians(header.gaussians)?;
+        self.limits.check_memory(self.metadata.size() + growing::<Gaussian>(header.gaussians))
     }
 
     fn count(&mut self, kind: ChunkType, length: u32) {
@@ -389,7 +403,7 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// What the file says of its picture.
     #[must_use]
-    #[expect(clippy::missing_panics_doc, reason = "it cannot")]
+    #[expect(clippy::missing_panics_doc, reason = "no decoder exists without a header")]
     pub fn header(&self) -> &Header {
         self.stream.header().expect("`with_limits` read it")
     }
@@ -404,6 +418,14 @@ impl<R: std::io::Read> Decoder<R> {
     #[must_use]
     pub fn stream(&self) -> &StreamDecoder {
         &self.stream
+    }
+
+    /// Replaces the limits; see [`StreamDecoder::set_limits`].
+    ///
+    /// # Errors
+    /// As [`StreamDecoder::set_limits`].
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), DecodeError> {
+        self.stream.set_limits(limits)
     }
 
     /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes.
@@ -431,7 +453,7 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// The picture so far.
     #[must_use]
-    #[expect(clippy::missing_panics_doc, reason = "it cannot")]
+    #[expect(clippy::missing_panics_doc, reason = "no decoder exists without a header")]
     pub fn picture(&self) -> Picture<'_> {
         self.stream.picture().expect("`with_limits` read the header")
     }

@@ -110,12 +110,12 @@ fn malformed(reason: &'static str) -> DecodeError {
     DecodeError::malformed(ChunkType::GAUS, reason)
 }
 
-/// Packs the codes of one layer, `quantizers.len()` codes per Gaussian, with its count in front.
+/// Packs the codes of one layer, with its number of Gaussians in front.
 #[cfg(feature = "encode")]
-pub(crate) fn write_layer(codes: &[u32], quantizers: &[Quantizer]) -> Vec<u8> {
+pub(crate) fn write_layer(codes: &[[u32; MAX_COMPONENTS]], quantizers: &[Quantizer]) -> Vec<u8> {
     let mut writer = super::bits::BitWriter::default();
-    writer.put((codes.len() / quantizers.len()) as u32, 32);
-    for gaussian in codes.chunks_exact(quantizers.len()) {
+    writer.put(codes.len() as u32, 32);
+    for gaussian in codes {
         for (&code, quantizer) in gaussian.iter().zip(quantizers) {
             writer.put(code, quantizer.bits().into());
         }

@@ -4,7 +4,12 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::ChunkType;
+#[cfg(feature = "encode")]
+use super::chunk::MAX_CHUNK_LENGTH;
 use crate::error::DecodeError;
+
+/// Most bytes in a keyword.
+const MAX_KEYWORD: usize = 79;
 
 /// What a file carries besides its picture. Stored as it is, never interpreted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -66,6 +71,27 @@ impl Metadata {
         blobs as u64 + texts as u64 + (self.texts.len() * PER_TEXT) as u64
     }
 
+    /// Says what cannot be stored, if anything cannot, and what can.
+    #[cfg(feature = "encode")]
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let blobs = [&self.icc_profile, &self.exif, &self.xmp];
+        if blobs.into_iter().flatten().any(|blob| blob.len() > MAX_CHUNK_LENGTH as usize) {
+            return Err("metadata of more than 2^31 - 1 bytes".into());
+        }
+        for Text { keyword, text } in &self.texts {
+            if !(1..=MAX_KEYWORD).contains(&keyword.len()) {
+                return Err(alloc::format!("keyword {keyword:?}; it must be 1 to 79 bytes long"));
+            }
+            if keyword.contains('\0') || text.contains('\0') {
+                return Err(alloc::format!("a NUL in the text {keyword:?}"));
+            }
+            if keyword.len() + text.len() >= MAX_CHUNK_LENGTH as usize {
+                return Err(alloc::format!("the text {keyword:?} is over 2^31 - 1 bytes long"));
+            }
+        }
+        Ok(())
+    }
+
     /// The chunks that carry this metadata, in the order in which they are written.
     #[cfg(feature = "encode")]
     pub(crate) fn chunks(&self) -> impl Iterator<Item = (ChunkType, Vec<u8>)> + '_ {
@@ -80,10 +106,6 @@ impl Metadata {
 }
 
 impl Text {
-    /// Most bytes in a keyword.
-    #[cfg(feature = "encode")]
-    pub(crate) const MAX_KEYWORD: usize = MAX_KEYWORD;
-
     fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
         const CHUNK: ChunkType = ChunkType::TEXT;
         let nul = payload
@@ -109,5 +131,3 @@ impl Text {
         [self.keyword.as_bytes(), &[0], self.text.as_bytes()].concat()
     }
 }
-
-const MAX_KEYWORD: usize = 79;

@@ -6,12 +6,12 @@ mod metadata;
 mod parser;
 
 pub use chunk::ChunkType;
-#[cfg(feature = "encode")]
+#[cfg(any(feature = "encode", feature = "image"))]
 pub(crate) use chunk::SIGNATURE;
 #[cfg(feature = "encode")]
 pub(crate) use chunk::write_chunk;
 pub use header::Header;
 #[cfg(feature = "encode")]
-pub(crate) use header::MAX_SIDE;
+pub(crate) use header::{MAX_SIDE, VERSION};
 pub use metadata::{Metadata, Text};
 pub(crate) use parser::{Event, Parser};

@@ -1,21 +1,35 @@
 //! The encoder: pixels to Gaussians to bytes (paper: GaussianImage++).
 
+mod budget;
+mod chart;
+mod control;
+mod densify;
 mod error;
+mod fit;
+mod gradient;
+mod layout;
+mod lsq;
+mod optimizer;
 mod options;
+mod raster;
 mod source;
-mod writer;
+pub(crate) mod training;
+mod verify;
 
-use std::ops::ControlFlow;
+use core::ops::ControlFlow;
 use std::time::Instant;
 
 pub use error::EncodeError;
 pub use options::{Precision, Target};
 pub use source::Source;
+use training::Training;
 
-use crate::container::{Header, Metadata};
-use crate::gaussian::Chart;
-use crate::quantizer::Quantizer;
-use crate::render::Kernel;
+use crate::container::Metadata;
+
+/// Iterations by effort, from 1 to 9.
+const ITERATIONS: [u32; 9] = [75, 150, 250, 400, 600, 1000, 1600, 2800, 5000];
+/// Most threads that can be asked for.
+const MAX_THREADS: usize = 1024;
 
 /// Encodes pictures to `.gip`.
 ///
@@ -39,7 +53,8 @@ pub struct Encoder {
     precision: Precision,
     seed: u64,
     threads: Option<usize>,
-    metadata: Metadata,
+    pub(crate) metadata: Metadata,
+    training: Option<Training>,
 }
 
 impl Default for Encoder {
@@ -58,6 +73,7 @@ impl Encoder {
             seed: 0,
             threads: None,
             metadata: Metadata::default(),
+            training: None,
         }
     }
 
@@ -98,61 +114,70 @@ impl Encoder {
         self
     }
 
+    /// Sets the constants of training in place of those that the effort implies.
+    pub fn with_training(mut self, training: Training) -> Self {
+        self.training = Some(training);
+        self
+    }
+
     /// Encodes `source`.
     ///
     /// # Errors
-    /// When an option is out of range.
+    /// When an option is out of range, or no file can meet the target.
     pub fn encode(&self, source: &Source<'_>) -> Result<Encoded, EncodeError> {
         self.encode_with(source, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// Encodes `source` and calls `progress` several times a second.
+    /// Encodes `source` and calls `progress` at every iteration.
     ///
     /// # Errors
-    /// When an option is out of range, and [`EncodeError::Cancelled`] when `progress` breaks.
+    /// As [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` breaks.
     pub fn encode_with(
         &self,
         source: &Source<'_>,
-        progress: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
-        if progress(&Progress { iteration: 0, iterations: 1, gaussians: 0, psnr: 0.0 }).is_break() {
-            return Err(EncodeError::Cancelled);
-        }
-        let header = Header {
-            version: 0,
-            width: source.width(),
-            height: source.height(),
-            color: source.color(),
-            depth: source.depth(),
-            gaussians: 0,
-            layers: 0,
-            kernel: Kernel::Quartic,
-            chart: Chart::Cholesky,
-            base_color: [32768; 4],
-        };
-        let header =
-            Header {
-                base_color: std::array::from_fn(|c| {
-                    if c < header.color.channels() { 32768 } else { 0 }
-                }),
-                ..header
-            };
-        let quantizers = vec![Quantizer::Float; header.components()];
-        let bytes = writer::write(&header, &self.metadata, &quantizers, &[]);
+        let training = self.check()?;
+        let mut run = || control::encode(self, source, &training, progress);
+        let outcome = match self.threads {
+            None => run(),
+            Some(threads) => pool(threads)?.install(run),
+        }?;
         Ok(Encoded {
-            bytes,
+            bytes: outcome.file,
             report: Report {
-                gaussians: 0,
-                psnr: 0.0,
-                psnr_float: 0.0,
-                iterations: 0,
+                gaussians: outcome.gaussians,
+                psnr: outcome.psnr,
+                psnr_float: outcome.psnr_float,
+                iterations: outcome.iterations,
                 seconds: start.elapsed().as_secs_f64(),
-                peak_memory: 0,
-                shortfall: None,
+                peak_memory: outcome.peak_memory,
+                shortfall: outcome.shortfall,
             },
         })
     }
+
+    /// Checks all options and settles the training's constants.
+    fn check(&self) -> Result<Training, EncodeError> {
+        let wrong = |text: String| Err(EncodeError::Option(text));
+        let Some(&iterations) = ITERATIONS.get(usize::from(self.effort).wrapping_sub(1)) else {
+            return wrong(format!("effort {}; it must be 1 to 9", self.effort));
+        };
+        if self.threads.is_some_and(|threads| !(1..=MAX_THREADS).contains(&threads)) {
+            return wrong(format!("the number of threads must be 1 to {MAX_THREADS}"));
+        }
+        self.target.check().map_err(EncodeError::Option)?;
+        self.metadata.check().map_err(EncodeError::Option)?;
+        let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
+        training.check().map_err(|rule| EncodeError::Option(format!("training: {rule}")))?;
+        Ok(training)
+    }
+}
+
+fn pool(threads: usize) -> Result<rayon::ThreadPool, EncodeError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| EncodeError::Option(format!("{threads} threads: {error}")))
 }
 
 /// How far the encoder is.
@@ -189,7 +214,8 @@ pub struct Report {
     /// PSNR of the decoded file against the source at the source's depth, in dB; infinite for an
     /// exact copy.
     pub psnr: f64,
-    /// PSNR of the float rendering before quantization, clamped but not rounded, in dB.
+    /// PSNR of the decoded file before it is rounded to samples (but clamped), in dB: what papers
+    /// report.
     pub psnr_float: f64,
     /// Iterations of training.
     pub iterations: u32,

@@ -13,8 +13,9 @@ pub struct Source<'a> {
     samples: Samples<'a>,
 }
 
+/// Samples of either depth.
 #[derive(Clone, Copy, Debug)]
-enum Samples<'a> {
+pub(crate) enum Samples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
@@ -72,6 +73,19 @@ impl<'a> Source<'a> {
         match self.samples {
             Samples::Eight(_) => SampleDepth::Eight,
             Samples::Sixteen(_) => SampleDepth::Sixteen,
+        }
+    }
+
+    /// All samples.
+    pub(crate) fn samples(&self) -> Samples<'a> {
+        self.samples
+    }
+
+    /// The number of samples.
+    pub(crate) fn len(&self) -> usize {
+        match self.samples {
+            Samples::Eight(samples) => samples.len(),
+            Samples::Sixteen(samples) => samples.len(),
         }
     }
 

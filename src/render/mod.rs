@@ -16,15 +16,15 @@ pub use view::{Region, RenderOptions};
 #[cfg(feature = "encode")]
 pub(crate) use kernel::simd as kernel_simd;
 pub(crate) use splat::Splat;
-pub(crate) use tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
 #[cfg(feature = "encode")]
-pub(crate) use tile::{Plane, TILE_PIXELS};
+pub(crate) use tile::centers;
+pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
 pub(crate) use tiling::Tiling;
 #[cfg(feature = "encode")]
 pub(crate) use view::View;
 
 use crate::container::Header;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, LimitKind};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use output::Sample;
@@ -66,6 +66,21 @@ impl<'a> Picture<'a> {
     #[must_use]
     pub fn gaussians(&self) -> &'a [Gaussian] {
         self.gaussians
+    }
+
+    /// The number of samples that rendering with these options writes, checked against the picture
+    /// and the limits: safe to allocate.
+    ///
+    /// # Errors
+    /// When the options do not fit the picture, or when a limit would be exceeded.
+    pub fn output_len(&self, options: &RenderOptions) -> Result<usize, DecodeError> {
+        let view = options.view(self.header, self.limits)?;
+        let samples = view.region.pixels() * options.output_color(self.header)?.channels() as u64;
+        usize::try_from(samples).map_err(|_| DecodeError::Limit {
+            kind: LimitKind::Memory,
+            wanted: samples,
+            allowed: usize::MAX as u64,
+        })
     }
 
     /// Renders interleaved 8-bit samples, rows from the top, without padding.
@@ -131,14 +146,14 @@ impl<'a> Picture<'a> {
 
     /// Checks everything and bins the splats; nothing of the output is touched before.
     fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job, DecodeError> {
-        let view = options.view(self.header, self.limits)?;
-        let color = options.output_color(self.header)?;
-        let wanted = view.region.pixels() * color.channels() as u64;
-        if wanted != out as u64 {
+        let wanted = self.output_len(options)?;
+        if wanted != out {
             return Err(DecodeError::Request(format!(
                 "the output buffer holds {out} samples, {wanted} are needed"
             )));
         }
+        let view = options.view(self.header, self.limits)?;
+        let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
         let strips = u64::from(view.region.height).div_ceil(TILE_HEIGHT as u64) * STRIP;
@@ -177,7 +192,7 @@ struct Job {
 
 impl Job {
     /// Renders one row of tiles and hands each over with its first column in the region.
-    fn row(&self, row: usize, write: impl FnMut(&[tile::Plane], usize)) {
+    fn row(&self, row: usize, write: impl FnMut(&[Plane], usize)) {
         match self.channels {
             1 => self.row_of::<1>(row, write),
             2 => self.row_of::<2>(row, write),
@@ -186,16 +201,12 @@ impl Job {
         }
     }
 
-    fn row_of<const CHANNELS: usize>(
-        &self,
-        row: usize,
-        mut write: impl FnMut(&[tile::Plane], usize),
-    ) {
+    fn row_of<const CHANNELS: usize>(&self, row: usize, mut write: impl FnMut(&[Plane], usize)) {
         let y = self.region.y + (row * TILE_HEIGHT) as u32;
         for column in 0..self.tiling.columns() {
             let x = column * TILE_WIDTH;
             let origin = (self.region.x + x as u32, y);
-            let mut planes: [tile::Plane; CHANNELS] =
+            let mut planes: [Plane; CHANNELS] =
                 core::array::from_fn(|channel| [[self.base[channel]; TILE_WIDTH]; TILE_HEIGHT]);
             let list = self.tiling.splats(column, row);
             self.backend.add(&mut planes, origin, &self.splats, list, self.kernel);

@@ -19,6 +19,18 @@ pub(crate) struct Splat {
 }
 
 impl Splat {
+    /// A splat that touches no picture: in place of a Gaussian that is not drawn.
+    #[cfg(feature = "encode")]
+    pub(crate) const NOWHERE: Self = Self {
+        x: -4e9,
+        y: -4e9,
+        i11: 1.0,
+        w: 0.0,
+        i22: 1.0,
+        color: [0.0; 4],
+        cholesky: [1.0, 0.0, 1.0],
+    };
+
     /// `None` for a Gaussian that is not drawn.
     pub(crate) fn new(gaussian: &Gaussian, view: &View) -> Option<Self> {
         if !gaussian.is_drawable() {

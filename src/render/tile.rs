@@ -76,6 +76,9 @@ fn add_reference<const CHANNELS: usize>(
     }
 }
 
+#[cfg(feature = "encode")]
+pub(crate) use simd::centers;
+
 #[cfg(feature = "std")]
 mod simd {
     use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};

@@ -38,11 +38,12 @@ impl Tiling {
         held: u64,
     ) -> Result<Self, DecodeError> {
         let mut tiling = Self::default();
-        tiling.rebuild(splats, cutoff, region, limits, held)?;
+        tiling.rebuild(splats, cutoff, region, limits, held, |_, _| {})?;
         Ok(tiling)
     }
 
-    /// [`Tiling::new`] in the memory of an earlier one.
+    /// [`Tiling::new`] in the memory of an earlier one. `note` is told, splat by splat, where each
+    /// entry of its splat stands among the entries of all tiles.
     pub(crate) fn rebuild(
         &mut self,
         splats: &[Splat],
@@ -50,6 +51,7 @@ impl Tiling {
         region: Region,
         limits: &Limits,
         held: u64,
+        mut note: impl FnMut(u32, usize),
     ) -> Result<(), DecodeError> {
         self.region = Some(region);
         self.columns = (region.width as usize).div_ceil(TILE_WIDTH);
@@ -89,6 +91,7 @@ impl Tiling {
         for span in &self.spans {
             for start in &mut self.starts[span.first as usize..][..span.count as usize] {
                 self.indices[*start] = span.splat;
+                note(span.splat, *start);
                 *start += 1;
             }
         }
@@ -137,10 +140,10 @@ impl Tiling {
         touched
     }
 
-    /// Kernel evaluations in whole tiles.
+    /// The number of entries in a row of tiles.
     #[cfg(feature = "encode")]
-    pub(crate) fn evaluations(&self) -> u64 {
-        (self.indices.len() * TILE_PIXELS) as u64
+    pub(crate) fn row_entries(&self, row: usize) -> usize {
+        self.starts[(row + 1) * self.columns] - self.starts[row * self.columns]
     }
 
     pub(crate) fn columns(&self) -> usize {

@@ -1,0 +1,133 @@
+//! However a file is sliced on its way to the decoder, the outcome is the same.
+
+#![no_main]
+
+use std::io::{self, Read};
+
+use image_gip::{Decoder, StreamDecoder};
+use libfuzzer_sys::fuzz_target;
+
+/// All that a caller can learn from a decoder, floats by their bits.
+#[derive(Debug, PartialEq)]
+struct Outcome {
+    /// The error, or how many bytes were used.
+    end: Result<usize, String>,
+    state: State,
+}
+
+#[derive(Debug, PartialEq)]
+struct State {
+    complete: bool,
+    description: String,
+    gaussians: Vec<[u32; 9]>,
+}
+
+impl State {
+    fn of(decoder: &StreamDecoder) -> Self {
+        let description = format!(
+            "{:?} {:?} {:?} {:?}",
+            decoder.header(),
+            decoder.quantizers(),
+            decoder.metadata(),
+            decoder.chunks()
+        );
+        let gaussians = decoder
+            .gaussians()
+            .iter()
+            .map(|g| {
+                let mut bits = [0; 9];
+                let values = g.center.iter().chain(&g.cholesky).chain(&g.color);
+                for (bits, value) in bits.iter_mut().zip(values) {
+                    *bits = value.to_bits();
+                }
+                bits
+            })
+            .collect();
+        Self { complete: decoder.is_complete(), description, gaussians }
+    }
+}
+
+fn outcome<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> Outcome {
+    let mut decoder = StreamDecoder::with_limits(image_gip_fuzz::limits());
+    let mut used = 0;
+    let mut error = None;
+    for piece in pieces {
+        match decoder.feed(piece) {
+            Ok(count) => used += count,
+            Err(failure) => {
+                error = Some(failure);
+                break;
+            }
+        }
+    }
+    let error = error.or_else(|| decoder.finish().err());
+    let end = error.map_or(Ok(used), |error| Err(error.to_string()));
+    Outcome { end, state: State::of(&decoder) }
+}
+
+/// Pieces of 0 to 40 bytes, mostly short, from a generator that the contents seed.
+struct Pieces<'a> {
+    bytes: &'a [u8],
+    random: u32,
+}
+
+impl<'a> Pieces<'a> {
+    fn of(bytes: &'a [u8]) -> Self {
+        Self { bytes, random: crc32fast::hash(bytes) | 1 }
+    }
+
+    fn random(&mut self) -> u32 {
+        self.random ^= self.random << 13;
+        self.random ^= self.random >> 17;
+        self.random ^= self.random << 5;
+        self.random
+    }
+}
+
+impl<'a> Iterator for Pieces<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        if self.bytes.is_empty() {
+            return None;
+        }
+        let random = self.random();
+        let length = (random % if random & 0x100 == 0 { 5 } else { 41 }) as usize;
+        let (piece, rest) = self.bytes.split_at(length.min(self.bytes.len()));
+        self.bytes = rest;
+        Some(piece)
+    }
+}
+
+/// The same pieces through `Read`, with interruptions in place of the empty ones.
+impl Read for Pieces<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.next() {
+            None => Ok(0),
+            Some([]) => Err(io::ErrorKind::Interrupted.into()),
+            Some(piece) => {
+                buffer[..piece.len()].copy_from_slice(piece);
+                Ok(piece.len())
+            }
+        }
+    }
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let whole = outcome(std::iter::once(bytes));
+    assert_eq!(outcome(bytes.chunks(1)), whole, "byte by byte");
+    assert_eq!(outcome(Pieces::of(bytes)), whole, "in pieces");
+
+    match Decoder::with_limits(Pieces::of(bytes), image_gip_fuzz::limits()) {
+        Ok(mut decoder) => {
+            let result = decoder.read_to_end();
+            assert_eq!(
+                result.err().map(|error| error.to_string()),
+                whole.end.err(),
+                "through a reader"
+            );
+            assert_eq!(State::of(decoder.stream()), whole.state, "through a reader");
+        }
+        Err(error) => assert_eq!(Some(error.to_string()), whole.end.err(), "through a reader"),
+    }
+});

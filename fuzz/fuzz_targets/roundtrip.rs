@@ -1,0 +1,100 @@
+//! What the encoder reports is what the decoder finds.
+
+#![no_main]
+
+use arbitrary::Arbitrary;
+use image_gip::{
+    ColorModel, DecodeError, Encoder, Picture, Precision, RenderOptions, SampleDepth, Source,
+    StreamDecoder, Target, metrics,
+};
+use libfuzzer_sys::fuzz_target;
+
+#[derive(Arbitrary, Debug)]
+struct Case {
+    width: u8,
+    height: u8,
+    color: u8,
+    sixteen_bit: bool,
+    /// Repeated until the picture is full.
+    samples: Vec<u16>,
+    target: AnyTarget,
+    effort: u8,
+    float: bool,
+    seed: u64,
+}
+
+#[derive(Arbitrary, Debug)]
+enum AnyTarget {
+    Auto,
+    Gaussians(u8),
+    Bytes(u16),
+    BitsPerPixel(u8),
+    Psnr(u8),
+    Quality(u8),
+}
+
+impl AnyTarget {
+    /// In range, and no more work than a small picture is worth.
+    fn target(&self) -> Target {
+        match *self {
+            Self::Auto => Target::Auto,
+            Self::Gaussians(count) => Target::Gaussians(u32::from(count % 32)),
+            Self::Bytes(bytes) => Target::Bytes(1 + u64::from(bytes % 1024)),
+            Self::BitsPerPixel(rate) => Target::BitsPerPixel(f64::from(1 + rate) / 16.0),
+            Self::Psnr(psnr) => Target::Psnr(f64::from(10 + psnr % 30)),
+            Self::Quality(quality) => Target::Quality(f64::from(quality % 101)),
+        }
+    }
+}
+
+fuzz_target!(|case: Case| {
+    const COLORS: [ColorModel; 4] =
+        [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+    let color = COLORS[usize::from(case.color) % COLORS.len()];
+    let (width, height) = (u32::from(1 + case.width % 24), u32::from(1 + case.height % 24));
+    let count = (width * height) as usize * color.channels();
+    let wide: Vec<u16> = case.samples.iter().copied().chain([0]).cycle().take(count).collect();
+    let narrow: Vec<u8> = wide.iter().map(|&sample| sample as u8).collect();
+    let source = if case.sixteen_bit {
+        Source::new_u16(width, height, color, &wide)
+    } else {
+        Source::new_u8(width, height, color, &narrow)
+    }
+    .expect("a picture of this size fits");
+
+    let encoded = Encoder::new()
+        .with_target(case.target.target())
+        .with_effort(1 + case.effort % 3)
+        .with_precision(if case.float { Precision::Float } else { Precision::Packed })
+        .with_seed(case.seed)
+        .with_threads(Some(1))
+        .encode(&source)
+        .expect("all options are in range");
+
+    let mut decoder = StreamDecoder::new();
+    let used = decoder.feed(&encoded.bytes).expect("the encoder writes sound files");
+    assert!(decoder.is_complete() && used == encoded.bytes.len());
+    let picture = decoder.picture().expect("the file is complete");
+    let header = picture.header();
+    assert_eq!((header.width, header.height), (width, height));
+    assert_eq!(header.color, color);
+    assert_eq!(header.gaussians, encoded.report.gaussians);
+    assert!(picture.gaussians().iter().all(image_gip::Gaussian::is_drawable));
+
+    let psnr = if header.depth == SampleDepth::Sixteen {
+        metrics::psnr(&wide, &rendered(&picture, Picture::render_u16), 65535.0)
+    } else {
+        metrics::psnr(&narrow, &rendered(&picture, Picture::render_u8), 255.0)
+    };
+    assert_eq!(encoded.report.psnr, psnr, "the reported and the decoded PSNR");
+});
+
+fn rendered<'a, T: Clone + Default>(
+    picture: &Picture<'a>,
+    render: impl Fn(&Picture<'a>, &RenderOptions, &mut [T]) -> Result<(), DecodeError>,
+) -> Vec<T> {
+    let options = RenderOptions::new();
+    let mut samples = vec![T::default(); options.output_len(picture.header()).expect("small")];
+    render(picture, &options, &mut samples).expect("within the default limits");
+    samples
+}

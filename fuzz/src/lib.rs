@@ -1,0 +1,83 @@
+//! What the fuzz targets share: tight limits, the checks on whatever was decoded, and a generator
+//! of files that look valid.
+
+pub mod file;
+
+use image_gip::{DecodeError, Limits, Picture, Region, RenderOptions, StreamDecoder};
+
+/// Bounds that leave room for every branch and keep one input to a few milliseconds.
+pub fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_gaussians = 1 << 12;
+    limits.max_memory = 1 << 22;
+    limits.max_work = 1 << 20;
+    limits
+}
+
+/// Largest side of what the targets render.
+const MAX_SIDE: u32 = 40;
+
+/// Renders what has arrived in several ways and checks that they agree.
+pub fn check(decoder: &StreamDecoder) {
+    let Some(picture) = decoder.picture() else { return };
+    let header = picture.header();
+    assert!(picture.gaussians().len() <= header.gaussians as usize);
+    let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
+
+    let small = RenderOptions::new().size(width, height);
+    check_backends(&picture, &small);
+    let part = Region { x: width / 3, y: height / 3, width: width - width / 3, height: 1 };
+    check_region(&picture, &small, width, part);
+
+    // The middle of the picture at its stored size, however large that is.
+    let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
+    check_backends(&picture, &RenderOptions::new().region(Region { x, y, width, height }));
+}
+
+/// The fast code gives the bits of the reference code, or refuses just as it does.
+fn check_backends(picture: &Picture<'_>, options: &RenderOptions) {
+    let options = options.clone().parallel(false);
+    let fast = planes(picture, &options);
+    let reference = planes(picture, &options.reference(true));
+    match (&fast, &reference) {
+        (Some(fast), Some(reference)) => {
+            let differs = fast.iter().zip(reference).position(|(a, b)| a.to_bits() != b.to_bits());
+            assert_eq!(differs, None, "a sample of the fast code differs");
+            assert!(fast.iter().all(|sample| sample.is_finite()), "a sample is not finite");
+        }
+        _ => assert_eq!(fast, reference, "only one of fast and reference code refused"),
+    }
+}
+
+/// A region equals that part of the whole.
+fn check_region(picture: &Picture<'_>, options: &RenderOptions, width: u32, part: Region) {
+    let options = options.clone().parallel(false);
+    let (Some(whole), Some(region)) =
+        (samples(picture, &options), samples(picture, &options.clone().region(part)))
+    else {
+        return;
+    };
+    let channels = picture.header().color.channels();
+    let first = (part.y * width + part.x) as usize * channels;
+    assert_eq!(whole[first..][..region.len()], region, "the region differs from the whole");
+}
+
+/// Float planes; `None` when a limit would be exceeded, the only reason to refuse there is.
+fn planes(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<f32>> {
+    let mut out = vec![0.0; options.output_len(picture.header()).expect("small")];
+    granted(picture.render_planes(options, &mut out)).then_some(out)
+}
+
+/// Interleaved samples, as [`planes`].
+fn samples(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<u16>> {
+    let mut out = vec![0; options.output_len(picture.header()).expect("small")];
+    granted(picture.render_u16(options, &mut out)).then_some(out)
+}
+
+fn granted(result: Result<(), DecodeError>) -> bool {
+    match result {
+        Ok(()) => true,
+        Err(DecodeError::Limit { .. }) => false,
+        Err(error) => panic!("a fitting request was refused: {error}"),
+    }
+}

@@ -1,0 +1,176 @@
+//! Formats that `gip decode` writes.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
+use image::{DynamicImage, ImageEncoder};
+use image_gip::{ColorModel, SampleDepth};
+
+use crate::files;
+use crate::picture::{Picture, Samples};
+
+/// Quality of the JPEGs that are written: high, because the picture has been coded once already.
+const JPEG_QUALITY: u8 = 95;
+
+/// A format of output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Codec {
+    Bmp,
+    Farbfeld,
+    Gif,
+    Ico,
+    Jpeg,
+    /// A graymap.
+    Pgm,
+    /// A pixmap.
+    Ppm,
+    /// A graymap or a pixmap.
+    Pnm,
+    /// An arbitrary map.
+    Pam,
+    Png,
+    Qoi,
+    Tga,
+    Tiff,
+    WebP,
+}
+
+impl Codec {
+    /// The format that a path's extension names. Standard output is PNG.
+    pub(crate) fn of(path: &Path) -> Result<Self> {
+        if files::is_standard_stream(path) {
+            return Ok(Self::Png);
+        }
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        Ok(match &*extension.to_ascii_lowercase() {
+            "bmp" => Self::Bmp,
+            "ff" => Self::Farbfeld,
+            "gif" => Self::Gif,
+            "ico" => Self::Ico,
+            "jpg" | "jpeg" => Self::Jpeg,
+            "pgm" => Self::Pgm,
+            "ppm" => Self::Ppm,
+            "pnm" => Self::Pnm,
+            "pam" => Self::Pam,
+            "png" => Self::Png,
+            "qoi" => Self::Qoi,
+            "tga" => Self::Tga,
+            "tif" | "tiff" => Self::Tiff,
+            "webp" => Self::WebP,
+            _ => bail!(
+                "{}: the extension must name the format: png, tif, webp, jpg, bmp, tga, qoi, gif, \
+                 ico, ff, pgm, ppm, pnm or pam",
+                path.display()
+            ),
+        })
+    }
+
+    /// The colour models that the format has, narrowest first.
+    fn colors(self) -> &'static [ColorModel] {
+        use ColorModel::{Gray, GrayAlpha, Rgb, Rgba};
+        match self {
+            Self::Png | Self::WebP | Self::Tga | Self::Pam => &[Gray, GrayAlpha, Rgb, Rgba],
+            Self::Tiff | Self::Bmp => &[Gray, Rgb, Rgba],
+            Self::Jpeg | Self::Pnm => &[Gray, Rgb],
+            Self::Qoi | Self::Gif => &[Rgb, Rgba],
+            Self::Ico | Self::Farbfeld => &[Rgba],
+            Self::Pgm => &[Gray],
+            Self::Ppm => &[Rgb],
+        }
+    }
+
+    /// The depths that the format has.
+    fn depths(self) -> &'static [SampleDepth] {
+        match self {
+            Self::Png | Self::Tiff | Self::Pgm | Self::Ppm | Self::Pnm | Self::Pam => {
+                &[SampleDepth::Eight, SampleDepth::Sixteen]
+            }
+            Self::Farbfeld => &[SampleDepth::Sixteen],
+            _ => &[SampleDepth::Eight],
+        }
+    }
+
+    /// The narrowest model that holds all channels of a picture, and the depth nearest to its own.
+    pub(crate) fn choose(
+        self,
+        color: ColorModel,
+        depth: SampleDepth,
+    ) -> Result<(ColorModel, SampleDepth)> {
+        let holds = |candidate: &&ColorModel| {
+            (candidate.has_alpha() || !color.has_alpha())
+                && (candidate.channels() >= 3 || color.channels() < 3)
+        };
+        let Some(&chosen) = self.colors().iter().find(holds) else {
+            let missing = if self.colors().iter().any(|c| c.has_alpha()) || !color.has_alpha() {
+                "colour"
+            } else {
+                "alpha"
+            };
+            bail!("{self:?} has no {missing}, and the picture has: choose png, tif or webp");
+        };
+        let depths = self.depths();
+        Ok((chosen, if depths.contains(&depth) { depth } else { depths[0] }))
+    }
+
+    /// Encodes a picture whose colour model and depth are as [`Codec::choose`] chose them.
+    pub(crate) fn encode(self, picture: &Picture) -> Result<Vec<u8>> {
+        let mut out = Cursor::new(Vec::new());
+        match self {
+            Self::Bmp => write(bmp::BmpEncoder::new(&mut out), picture),
+            Self::Farbfeld => write(farbfeld::FarbfeldEncoder::new(&mut out), picture),
+            Self::Gif => write(gif::GifEncoder::new(&mut out), picture),
+            Self::Ico => write(ico::IcoEncoder::new(&mut out), picture),
+            Self::Jpeg => {
+                write(jpeg::JpegEncoder::new_with_quality(&mut out, JPEG_QUALITY), picture)
+            }
+            Self::Pgm | Self::Ppm | Self::Pnm | Self::Pam => return Ok(self.netpbm(picture)),
+            Self::Png => write(png::PngEncoder::new(&mut out), picture),
+            Self::Qoi => write(qoi::QoiEncoder::new(&mut out), picture),
+            Self::Tga => write(tga::TgaEncoder::new(&mut out), picture),
+            Self::Tiff => write(tiff::TiffEncoder::new(&mut out), picture),
+            Self::WebP => write(webp::WebPEncoder::new_lossless(&mut out), picture),
+        }?;
+        Ok(out.into_inner())
+    }
+
+    /// Netpbm, which `image` does not write with 16 bits in all its variants.
+    fn netpbm(self, picture: &Picture) -> Vec<u8> {
+        let (width, height) = (picture.image.width(), picture.image.height());
+        let (color, full) = (picture.color(), (1_u32 << picture.depth().bits()) - 1);
+        let header = if self == Self::Pam {
+            let kind = match color {
+                ColorModel::Gray => "GRAYSCALE",
+                ColorModel::GrayAlpha => "GRAYSCALE_ALPHA",
+                ColorModel::Rgb => "RGB",
+                _ => "RGB_ALPHA",
+            };
+            let depth = color.channels();
+            format!(
+                "P7\nWIDTH {width}\nHEIGHT {height}\nDEPTH {depth}\nMAXVAL {full}\nTUPLTYPE \
+                 {kind}\nENDHDR\n"
+            )
+        } else {
+            let magic = if color == ColorModel::Gray { "P5" } else { "P6" };
+            format!("{magic}\n{width} {height}\n{full}\n")
+        };
+        let mut out = header.into_bytes();
+        match picture.samples() {
+            Samples::Eight(samples) => out.extend_from_slice(samples),
+            Samples::Sixteen(samples) => out.extend(samples.iter().flat_map(|s| s.to_be_bytes())),
+        }
+        out
+    }
+}
+
+fn write(mut encoder: impl ImageEncoder, picture: &Picture) -> Result<()> {
+    // Encoders that cannot take a kind of metadata refuse it here; it is left out then.
+    if let Some(profile) = &picture.metadata.icc_profile {
+        let _ = encoder.set_icc_profile(profile.clone());
+    }
+    if let Some(exif) = &picture.metadata.exif {
+        let _ = encoder.set_exif_metadata(exif.clone());
+    }
+    Ok(DynamicImage::write_with_encoder(&picture.image, encoder)?)
+}

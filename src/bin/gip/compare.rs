@@ -1,0 +1,78 @@
+//! `gip compare`.
+
+use core::fmt;
+
+use anyhow::{Result, bail};
+use image_gip::{SampleDepth, metrics};
+use serde::Serialize;
+
+use crate::args;
+use crate::encode::json_psnr;
+use crate::files;
+use crate::picture::{Picture, Samples, widest};
+
+pub(crate) fn run(args: &args::Compare) -> Result<()> {
+    if files::is_standard_stream(&args.a) && files::is_standard_stream(&args.b) {
+        bail!("only one of the two pictures can come from standard input");
+    }
+    let (mut a, mut b) = (Picture::read(&args.a)?, Picture::read(&args.b)?);
+    let size = |picture: &Picture| (picture.image.width(), picture.image.height());
+    if size(&a) != size(&b) {
+        let ((w, h), (v, g)) = (size(&a), size(&b));
+        bail!("the sizes differ: {w}x{h} and {v}x{g}");
+    }
+    let color = widest(a.color(), b.color());
+    let depth = if a.depth().bits() > b.depth().bits() { a.depth() } else { b.depth() };
+    a.convert(color, depth);
+    b.convert(color, depth);
+    let comparison = match (a.samples(), b.samples()) {
+        (Samples::Eight(x), Samples::Eight(y)) => Comparison::new(&a, depth, x, y),
+        (Samples::Sixteen(x), Samples::Sixteen(y)) => Comparison::new(&a, depth, x, y),
+        _ => bail!("the depths differ"),
+    };
+    let text = if args.json { serde_json::to_string(&comparison)? } else { comparison.to_string() };
+    files::print(&text, None)
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Comparison {
+    width: u32,
+    height: u32,
+    channels: usize,
+    depth: u8,
+    psnr: f64,
+    ms_ssim: f64,
+    max_abs_error: u32,
+}
+
+impl Comparison {
+    fn new<T: Copy + Into<f64>>(picture: &Picture, depth: SampleDepth, a: &[T], b: &[T]) -> Self {
+        let full_scale = f64::from((1_u32 << depth.bits()) - 1);
+        let (width, height) = (picture.image.width(), picture.image.height());
+        let channels = picture.color().channels();
+        Self {
+            width,
+            height,
+            channels,
+            depth: depth.bits(),
+            psnr: json_psnr(metrics::psnr(a, b, full_scale)),
+            ms_ssim: metrics::ms_ssim(a, b, width as usize, channels, full_scale),
+            max_abs_error: metrics::max_abs_error(a, b) as u32,
+        }
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { psnr, ms_ssim, max_abs_error, depth, .. } = self;
+        if *max_abs_error == 0 {
+            return f.write_str("identical");
+        }
+        let full = (1_u32 << depth) - 1;
+        write!(
+            f,
+            "PSNR {psnr:.3} dB, MS-SSIM {ms_ssim:.5}, largest error {max_abs_error} of {full}"
+        )
+    }
+}

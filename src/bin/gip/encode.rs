@@ -1,0 +1,119 @@
+//! `gip encode`.
+
+use core::ops::ControlFlow;
+use std::path::Path;
+
+use anyhow::Result;
+use image_gip::{Encoded, Encoder, Source};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+use crate::args;
+use crate::files::{self, Output};
+use crate::picture::{Picture, Samples};
+
+/// What JSON says for an infinite PSNR, which JSON cannot.
+const INFINITE_PSNR: f64 = 999.0;
+
+pub(crate) fn run(args: &args::Encode) -> Result<()> {
+    let output = Output::new(&args.output)?;
+    let mut picture = Picture::read(&args.input)?;
+    picture.drop_opaque_alpha();
+
+    let (width, height) = (picture.image.width(), picture.image.height());
+    let source = match picture.samples() {
+        Samples::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
+        Samples::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
+    }?;
+    let encoder = Encoder::new()
+        .with_target(args.target.target())
+        .with_effort(args.effort)
+        .with_precision(args.precision.into())
+        .with_seed(args.seed)
+        .with_threads(args.threads.count.map(usize::from))
+        .with_metadata(picture.metadata.clone());
+    let encoded = encode(&encoder, &source)?;
+    output.write(&encoded.bytes)?;
+
+    let report = Report::new(&source, &encoded);
+    let text = if args.json {
+        serde_json::to_string(&report)?
+    } else {
+        report.to_line(&args.output, encoded.report.psnr)
+    };
+    files::print(&text, Some(&args.output))
+}
+
+/// Encodes with a progress bar, which shows itself on a terminal only.
+fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left")?;
+    let bar = ProgressBar::new(0).with_style(style);
+    let encoded = encoder.encode_with(source, &mut |progress| {
+        bar.set_length(progress.iterations.into());
+        bar.set_position(progress.iteration.into());
+        bar.set_message(format!("{} Gaussians, {:.2} dB", progress.gaussians, progress.psnr));
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    Ok(encoded?)
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    width: u32,
+    height: u32,
+    gaussians: u32,
+    bytes: usize,
+    bpp: f64,
+    psnr: f64,
+    psnr_float: f64,
+    iterations: u32,
+    seconds: f64,
+    peak_memory: u64,
+    shortfall: Option<&'a str>,
+}
+
+impl<'a> Report<'a> {
+    fn new(source: &Source<'_>, encoded: &'a Encoded) -> Self {
+        let (width, height) = (source.width(), source.height());
+        let bytes = encoded.bytes.len();
+        Self {
+            width,
+            height,
+            gaussians: encoded.report.gaussians,
+            bytes,
+            bpp: bits_per_pixel(bytes, width, height),
+            psnr: json_psnr(encoded.report.psnr),
+            psnr_float: json_psnr(encoded.report.psnr_float),
+            iterations: encoded.report.iterations,
+            seconds: encoded.report.seconds,
+            peak_memory: encoded.report.peak_memory,
+            shortfall: encoded.report.shortfall.as_deref(),
+        }
+    }
+
+    /// The same for humans.
+    fn to_line(&self, output: &Path, psnr: f64) -> String {
+        let Self { width, height, gaussians, bytes, bpp, seconds, .. } = self;
+        let mut line = format!(
+            "{}: {width}x{height}, {gaussians} Gaussians, {bytes} bytes, {bpp:.3} bpp, \
+             {psnr:.2} dB, {seconds:.1} s",
+            files::output_name(output)
+        );
+        if let Some(shortfall) = self.shortfall {
+            line.push_str("\nnote: ");
+            line.push_str(shortfall);
+        }
+        line
+    }
+}
+
+pub(crate) fn bits_per_pixel(bytes: usize, width: u32, height: u32) -> f64 {
+    bytes as f64 * 8.0 / (f64::from(width) * f64::from(height))
+}
+
+/// A PSNR as JSON gives it.
+pub(crate) fn json_psnr(psnr: f64) -> f64 {
+    psnr.min(INFINITE_PSNR)
+}

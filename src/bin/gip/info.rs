@@ -1,0 +1,242 @@
+//! `gip info`.
+
+use core::fmt::{self, Display};
+
+use anyhow::{Context, Result, anyhow};
+use image_gip::{Chart, ChunkType, ColorModel, Header, Kernel, Quantizer, StreamDecoder};
+use serde::Serialize;
+
+use crate::args;
+use crate::encode::bits_per_pixel;
+use crate::files;
+
+pub(crate) fn run(args: &args::Info) -> Result<()> {
+    let context = || files::input_name(&args.file);
+    let bytes = files::read(&args.file)?;
+    let mut stream = StreamDecoder::new();
+    stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
+    let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
+    let info = Info::new(header, &stream, bytes.len());
+    let text = if args.json { serde_json::to_string(&info)? } else { info.to_string() };
+    files::print(text.trim_end(), None)
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Info {
+    bytes: usize,
+    bpp: f64,
+    version: u8,
+    width: u32,
+    height: u32,
+    color: &'static str,
+    channels: usize,
+    depth: u8,
+    gaussians: u32,
+    layers: u16,
+    kernel: &'static str,
+    cutoff: f32,
+    chart: &'static str,
+    base_color: Vec<u16>,
+    chunks: Vec<Chunk>,
+    bits_per_gaussian: BitsPerGaussian,
+    components: Vec<Component>,
+    metadata: Metadata,
+}
+
+/// The chunks of one type; their bytes include length, type and CRC.
+#[derive(Debug, Serialize)]
+struct Chunk {
+    kind: String,
+    count: u32,
+    bytes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct BitsPerGaussian {
+    /// All bits of the chunks that hold Gaussians, by Gaussian; `None` without Gaussians.
+    coded: Option<f64>,
+    /// The sum of the declared depths.
+    total: u32,
+    position: u32,
+    shape: u32,
+    color: u32,
+}
+
+/// How one component of every Gaussian is stored.
+#[derive(Debug, Serialize)]
+struct Component {
+    attribute: &'static str,
+    name: &'static str,
+    kind: &'static str,
+    bits: u8,
+    scale: Option<f32>,
+    offset: Option<f32>,
+}
+
+/// Bytes of each kind of metadata.
+#[derive(Debug, Serialize)]
+struct Metadata {
+    icc_profile: Option<usize>,
+    exif: Option<usize>,
+    xmp: Option<usize>,
+    texts: Vec<Text>,
+}
+
+#[derive(Debug, Serialize)]
+struct Text {
+    keyword: String,
+    bytes: usize,
+}
+
+impl Info {
+    fn new(header: &Header, stream: &StreamDecoder, bytes: usize) -> Self {
+        let channels = header.color.channels();
+        let components = components(header, stream.quantizers());
+        let chunks = stream.chunks();
+        let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::GAUS);
+        let bits = |attribute| {
+            let of = components.iter().filter(|component| component.attribute == attribute);
+            of.map(|component| u32::from(component.bits)).sum::<u32>()
+        };
+        let bits_per_gaussian = BitsPerGaussian {
+            coded: layers.map(|l| l.bytes as f64 * 8.0 / f64::from(header.gaussians)),
+            total: components.iter().map(|component| u32::from(component.bits)).sum(),
+            position: bits("position"),
+            shape: bits("shape"),
+            color: bits("color"),
+        };
+        let metadata = stream.metadata();
+        let size = |blob: &Option<Vec<u8>>| blob.as_ref().map(Vec::len);
+        Self {
+            bytes,
+            bpp: bits_per_pixel(bytes, header.width, header.height),
+            version: header.version,
+            width: header.width,
+            height: header.height,
+            color: match header.color {
+                ColorModel::Gray => "gray",
+                ColorModel::GrayAlpha => "gray-alpha",
+                ColorModel::Rgb => "rgb",
+                ColorModel::Rgba => "rgba",
+                _ => "unknown",
+            },
+            channels,
+            depth: header.depth.bits(),
+            gaussians: header.gaussians,
+            layers: header.layers,
+            kernel: match header.kernel {
+                Kernel::Exponential { .. } => "exponential",
+                Kernel::Quartic => "quartic",
+                _ => "unknown",
+            },
+            cutoff: header.kernel.cutoff(),
+            chart: match header.chart {
+                Chart::Covariance => "covariance",
+                Chart::Cholesky => "cholesky",
+                Chart::RotationScale => "rotation-scale",
+                _ => "unknown",
+            },
+            base_color: header.base_color[..channels].to_vec(),
+            chunks: chunks
+                .iter()
+                .map(|c| Chunk { kind: c.kind.to_string(), count: c.count, bytes: c.bytes })
+                .collect(),
+            bits_per_gaussian,
+            components,
+            metadata: Metadata {
+                icc_profile: size(&metadata.icc_profile),
+                exif: size(&metadata.exif),
+                xmp: size(&metadata.xmp),
+                texts: metadata
+                    .texts
+                    .iter()
+                    .map(|text| Text { keyword: text.keyword.clone(), bytes: text.text.len() })
+                    .collect(),
+            },
+        }
+    }
+}
+
+/// The stored components in file order.
+fn components(header: &Header, quantizers: &[Quantizer]) -> Vec<Component> {
+    let shape = match header.chart {
+        Chart::Covariance => ["xx", "xy", "yy"],
+        Chart::Cholesky => ["l11", "l21", "l22"],
+        Chart::RotationScale => ["s1", "s2", "angle"],
+        _ => ["1", "2", "3"],
+    };
+    let color: &[_] = match header.color {
+        ColorModel::Gray => &["gray"],
+        ColorModel::GrayAlpha => &["gray", "alpha"],
+        _ => &["red", "green", "blue", "alpha"],
+    };
+    let position = ["x", "y"].map(|name| ("position", name));
+    let shape = shape.map(|name| ("shape", name));
+    let color = color.iter().map(|&name| ("color", name));
+    let names = position.into_iter().chain(shape).chain(color);
+    names
+        .zip(quantizers)
+        .map(|((attribute, name), quantizer)| {
+            let (kind, steps) = match quantizer {
+                Quantizer::Float => ("float", None),
+                Quantizer::Linear(steps) => ("linear", Some(steps)),
+                Quantizer::Log(steps) => ("log", Some(steps)),
+                _ => ("unknown", None),
+            };
+            Component {
+                attribute,
+                name,
+                kind,
+                bits: quantizer.bits(),
+                scale: steps.map(|steps| steps.scale),
+                offset: steps.map(|steps| steps.offset),
+            }
+        })
+        .collect()
+}
+
+impl Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { width, height, color, depth, kernel, cutoff, .. } = self;
+        let bits = &self.bits_per_gaussian;
+        let mut row = |name: &str, value: &dyn Display| writeln!(f, "{name:<18}{value}");
+        row("size", &format_args!("{width}x{height}, {color}, {depth} bits per sample"))?;
+        row("file", &format_args!("{} bytes, {:.3} bits per pixel", self.bytes, self.bpp))?;
+        row("version", &self.version)?;
+        row("Gaussians", &format_args!("{} in {} layers", self.gaussians, self.layers))?;
+        row("kernel", &format_args!("{kernel}, cut-off {cutoff}"))?;
+        row("chart", &self.chart)?;
+        row("base colour", &format_args!("{:?} / 65535", self.base_color))?;
+        let BitsPerGaussian { total, position, shape, color, .. } = bits;
+        row(
+            "bits per Gaussian",
+            &format_args!("{total}: position {position}, shape {shape}, colour {color}"),
+        )?;
+        if let Some(coded) = bits.coded {
+            row("  as coded", &format_args!("{coded:.2} with all framing"))?;
+        }
+        for component in &self.components {
+            let Component { attribute, name, kind, bits, scale, offset } = component;
+            let steps = match (scale, offset) {
+                (Some(scale), Some(offset)) => format!(", scale {scale:e}, offset {offset:e}"),
+                _ => String::new(),
+            };
+            let name = format!("  {attribute} {name}");
+            row(&name, &format_args!("{kind}, {bits} bits{steps}"))?;
+        }
+        for Chunk { kind, count, bytes } in &self.chunks {
+            row(&format!("chunk {kind}"), &format_args!("{count}, {bytes} bytes"))?;
+        }
+        let Metadata { icc_profile, exif, xmp, texts } = &self.metadata;
+        for (name, bytes) in [("ICC profile", icc_profile), ("Exif", exif), ("XMP", xmp)] {
+            if let Some(bytes) = bytes {
+                row(name, &format_args!("{bytes} bytes"))?;
+            }
+        }
+        for Text { keyword, bytes } in texts {
+            row("text", &format_args!("{}, {bytes} bytes", keyword.escape_debug()))?;
+        }
+        Ok(())
+    }
+}

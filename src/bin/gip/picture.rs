@@ -1,0 +1,200 @@
+//! Pictures in memory: reading them, and changing their colour model and depth.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image_gip::{ColorModel, Metadata, SampleDepth};
+
+use crate::files;
+
+/// Most bytes that reading a picture may take: 2^30 pixels of RGB at 8 bits, and more than the
+/// tool's other parts would care to hold.
+const MAX_MEMORY: u64 = 4 << 30;
+/// Longest side that a .gip file can have.
+const MAX_SIDE: u32 = 1 << 20;
+
+/// A picture, upright, and what came with it.
+#[derive(Debug)]
+pub(crate) struct Picture {
+    /// Gray or RGB with or without alpha, 8 or 16 bits: one of eight of the variants.
+    pub(crate) image: DynamicImage,
+    pub(crate) metadata: Metadata,
+}
+
+/// The samples of a picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Samples<'a> {
+    Eight(&'a [u8]),
+    Sixteen(&'a [u16]),
+}
+
+impl Picture {
+    /// Reads a picture of any format that `image` reads, .gip included.
+    pub(crate) fn read(path: &Path) -> Result<Self> {
+        let name = || files::input_name(path);
+        let bytes = files::read(path)?;
+        let mut reader = ImageReader::new(Cursor::new(bytes));
+        // Some formats have no signature; for them the extension counts.
+        if let Ok(format) = ImageFormat::from_path(path) {
+            reader.set_format(format);
+        }
+        let reader = reader.with_guessed_format().with_context(name)?;
+        Self::decode(reader).with_context(name)
+    }
+
+    fn decode(mut reader: ImageReader<Cursor<Vec<u8>>>) -> Result<Self> {
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(MAX_SIDE);
+        limits.max_image_height = Some(MAX_SIDE);
+        limits.max_alloc = Some(MAX_MEMORY);
+        reader.limits(limits.clone());
+        let mut decoder = reader.into_decoder()?;
+        limits.reserve(decoder.total_bytes())?;
+        decoder.set_limits(limits)?;
+
+        let orientation = decoder.orientation()?;
+        let mut metadata = Metadata::default();
+        metadata.icc_profile = decoder.icc_profile()?;
+        metadata.exif = decoder.exif_metadata()?.and_then(tiff_stream);
+        metadata.xmp = decoder.xmp_metadata()?;
+        let image = stored_samples(DynamicImage::from_decoder(decoder)?);
+        let mut picture = Self { image, metadata };
+        picture.make_upright(orientation);
+        picture.drop_foreign_profile();
+        Ok(picture)
+    }
+
+    /// Applies an orientation to the pixels, and resets the Exif tag that may have asked for it,
+    /// so that nobody applies it again.
+    pub(crate) fn make_upright(&mut self, orientation: Orientation) {
+        self.image.apply_orientation(orientation);
+        if let Some(exif) = &mut self.metadata.exif {
+            let _reset = Orientation::remove_from_exif_chunk(exif);
+        }
+    }
+
+    /// Drops a profile that is for another colour space than the samples are in, such as that of
+    /// a CMYK picture that was converted to RGB.
+    pub(crate) fn drop_foreign_profile(&mut self) {
+        let expected: &[u8] = if self.color().channels() < 3 { b"GRAY" } else { b"RGB " };
+        self.metadata.icc_profile.take_if(|profile| profile.get(16..20) != Some(expected));
+    }
+
+    /// What the channels mean.
+    pub(crate) fn color(&self) -> ColorModel {
+        match self.image.color().channel_count() {
+            1 => ColorModel::Gray,
+            2 => ColorModel::GrayAlpha,
+            3 => ColorModel::Rgb,
+            _ => ColorModel::Rgba,
+        }
+    }
+
+    /// Bits per sample.
+    pub(crate) fn depth(&self) -> SampleDepth {
+        match self.samples() {
+            Samples::Eight(_) => SampleDepth::Eight,
+            Samples::Sixteen(_) => SampleDepth::Sixteen,
+        }
+    }
+
+    /// The interleaved samples.
+    pub(crate) fn samples(&self) -> Samples<'_> {
+        match &self.image {
+            DynamicImage::ImageLuma16(image) => Samples::Sixteen(image),
+            DynamicImage::ImageLumaA16(image) => Samples::Sixteen(image),
+            DynamicImage::ImageRgb16(image) => Samples::Sixteen(image),
+            DynamicImage::ImageRgba16(image) => Samples::Sixteen(image),
+            image => Samples::Eight(image.as_bytes()),
+        }
+    }
+
+    /// Drops an alpha channel that is opaque everywhere.
+    pub(crate) fn drop_opaque_alpha(&mut self) {
+        let color = match self.color() {
+            ColorModel::GrayAlpha => ColorModel::Gray,
+            ColorModel::Rgba => ColorModel::Rgb,
+            _ => return,
+        };
+        let channels = self.color().channels();
+        let opaque = match self.samples() {
+            Samples::Eight(samples) => is_opaque(samples, channels, &u8::MAX),
+            Samples::Sixteen(samples) => is_opaque(samples, channels, &u16::MAX),
+        };
+        if opaque {
+            self.convert(color, self.depth());
+        }
+    }
+
+    /// Changes colour model and depth. A model with the missing channels, or a greater depth,
+    /// changes no value; gray and alpha are expanded.
+    pub(crate) fn convert(&mut self, color: ColorModel, depth: SampleDepth) {
+        if (color, depth) == (self.color(), self.depth()) {
+            return;
+        }
+        let image = &self.image;
+        self.image = match (color, depth) {
+            (ColorModel::Gray, SampleDepth::Eight) => image.to_luma8().into(),
+            (ColorModel::GrayAlpha, SampleDepth::Eight) => image.to_luma_alpha8().into(),
+            (ColorModel::Rgb, SampleDepth::Eight) => image.to_rgb8().into(),
+            (_, SampleDepth::Eight) => image.to_rgba8().into(),
+            (ColorModel::Gray, _) => image.to_luma16().into(),
+            (ColorModel::GrayAlpha, _) => image.to_luma_alpha16().into(),
+            (ColorModel::Rgb, _) => image.to_rgb16().into(),
+            _ => image.to_rgba16().into(),
+        };
+    }
+}
+
+/// The narrowest model that has the channels of both.
+pub(crate) fn widest(a: ColorModel, b: ColorModel) -> ColorModel {
+    match (a.channels().max(b.channels()) >= 3, a.has_alpha() || b.has_alpha()) {
+        (false, false) => ColorModel::Gray,
+        (false, true) => ColorModel::GrayAlpha,
+        (true, false) => ColorModel::Rgb,
+        (true, true) => ColorModel::Rgba,
+    }
+}
+
+fn is_opaque<T: PartialEq>(samples: &[T], channels: usize, full: &T) -> bool {
+    samples.iter().skip(channels - 1).step_by(channels).all(|alpha| alpha == full)
+}
+
+/// Some writers put the JPEG marker's own prefix before the TIFF stream that Exif is. What is no
+/// TIFF stream then is dropped.
+fn tiff_stream(mut exif: Vec<u8>) -> Option<Vec<u8>> {
+    if exif.starts_with(b"Exif\0\0") {
+        exif.drain(..6);
+    }
+    (exif.starts_with(b"II") || exif.starts_with(b"MM")).then_some(exif)
+}
+
+/// The picture with samples that a .gip file can hold: floats are taken as linear light, clipped
+/// to what can be shown and encoded as 16-bit sRGB.
+fn stored_samples(image: DynamicImage) -> DynamicImage {
+    let encode = |linear: f32| match linear {
+        0.003_130_8.. => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
+        0.0.. => linear * 12.92,
+        // Negative, or not a number.
+        _ => 0.0,
+    };
+    match image {
+        DynamicImage::ImageRgb32F(mut image) => {
+            for pixel in image.pixels_mut() {
+                pixel.0 = pixel.0.map(encode);
+            }
+            DynamicImage::from(image).to_rgb16().into()
+        }
+        DynamicImage::ImageRgba32F(mut image) => {
+            for pixel in image.pixels_mut() {
+                let [r, g, b, a] = pixel.0;
+                pixel.0 = [encode(r), encode(g), encode(b), a];
+            }
+            DynamicImage::from(image).to_rgba16().into()
+        }
+        image => image,
+    }
+}

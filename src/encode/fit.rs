@@ -1,0 +1,370 @@
+//! The training loop: from a picture to Gaussians (paper, section "Methodology").
+
+use core::ops::ControlFlow;
+
+use glam::Vec2;
+use rayon::prelude::*;
+
+use super::budget::Budget;
+use super::densify::{Site, USELESS_COLOR};
+use super::gradient::{Pass, SplatGradient};
+use super::lsq::{Quantizers, StepGradients};
+use super::optimizer::{Bounds, Parameters, Row, shape_of};
+use super::raster::Raster;
+use super::training::{Portion, Training};
+use super::{EncodeError, Precision, Progress};
+use crate::gaussian::{Gaussian, MAX_COMPONENTS};
+use crate::quantizer::Quantizer;
+use crate::render::{Splat, View};
+
+/// What a caller is told, and may stop.
+pub(crate) type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
+
+/// How much the error is expected to fall by training alone, once growth has ended.
+const FORESEEN: f64 = 0.75;
+/// Gaussians whose steps are summed up in one go, in a fixed order.
+const CHUNK: usize = 512;
+
+/// A picture being fitted.
+#[derive(Debug)]
+pub(crate) struct Fit<'a> {
+    raster: &'a Raster,
+    training: &'a Training,
+    budget: Budget,
+    precision: Precision,
+    base: [f32; 4],
+    bounds: Bounds,
+    parameters: Parameters,
+    quantizers: Option<Quantizers>,
+    best: Option<Snapshot>,
+    pass: Pass,
+    splats: Vec<Splat>,
+    by_splat: Vec<SplatGradient>,
+    gradients: Vec<Row>,
+    /// Sum of squared errors of the last pass.
+    error: f64,
+    pub(crate) iterations: u32,
+    pub(crate) peak_memory: usize,
+    rng: fastrand::Rng,
+}
+
+/// A state of training that can be written to a file.
+#[derive(Clone, Debug)]
+struct Snapshot {
+    error: f64,
+    rows: Vec<Row>,
+    quantizers: Option<Quantizers>,
+}
+
+/// Fitted Gaussians as a file stores them.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitted {
+    pub(crate) quantizers: Vec<Quantizer>,
+    pub(crate) codes: Vec<[u32; MAX_COMPONENTS]>,
+}
+
+impl<'a> Fit<'a> {
+    pub(crate) fn new(
+        raster: &'a Raster,
+        training: &'a Training,
+        budget: Budget,
+        precision: Precision,
+        base: [f32; 4],
+        seed: u64,
+    ) -> Self {
+        Self {
+            raster,
+            training,
+            budget,
+            precision,
+            base,
+            bounds: Bounds {
+                chart: training.parameterization,
+                channels: raster.channels,
+                size: Vec2::new(raster.width as f32, raster.height as f32),
+            },
+            parameters: Parameters::default(),
+            quantizers: None,
+            best: None,
+            pass: Pass::new(raster),
+            splats: Vec::new(),
+            by_splat: Vec::new(),
+            gradients: Vec::new(),
+            error: 0.0,
+            iterations: 0,
+            peak_memory: 0,
+            rng: fastrand::Rng::with_seed(seed),
+        }
+    }
+
+    /// Trains from nothing.
+    pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+        let Training { iterations, densification, quantization, .. } = self.training;
+        let share = |share: f32| (share * *iterations as f32).round() as u32;
+        let growth_end = share(densification.end).min(iterations - 1);
+        let interval = (growth_end / densification.steps.max(1)).max(1);
+        let quantized_from = match self.precision {
+            Precision::Float => u32::MAX,
+            // Growth needs the float values; quantizers are fitted to all Gaussians.
+            Precision::Packed => share(quantization.warm_up).clamp(growth_end, iterations - 1),
+        };
+        self.forward();
+        let first = densification.initial * self.wanted(1.0) as f32;
+        self.grow((first.ceil() as usize).max(1));
+        for iteration in 0..*iterations {
+            if iteration == quantized_from {
+                self.start_quantization();
+            }
+            let factor = self.training.optimizer.schedule.factor(iteration, *iterations);
+            self.iterate(factor, *iterations, observer)?;
+            let done = iteration + 1;
+            if done % densification.prune_interval == 0 {
+                self.prune();
+            }
+            if done % interval == 0 && done <= growth_end {
+                let steps_left = (growth_end - done) / interval;
+                self.grow(self.portion(steps_left));
+            }
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// Adds `count` Gaussians to a finished fit and trains all for `iterations` more.
+    pub(crate) fn extend(
+        &mut self,
+        count: usize,
+        iterations: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        if let Some(best) = self.best.take() {
+            self.parameters.replace(best.rows);
+            self.quantizers = best.quantizers;
+        }
+        self.forward();
+        self.grow(count);
+        let total = self.iterations + iterations;
+        for iteration in 0..iterations {
+            let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
+            self.iterate(factor, total, observer)?;
+        }
+        self.settle();
+        Ok(())
+    }
+
+    /// The best Gaussians so far.
+    pub(crate) fn fitted(&self) -> Fitted {
+        let empty = Snapshot { error: 0.0, rows: Vec::new(), quantizers: None };
+        let Snapshot { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
+        match quantizers {
+            Some(quantizers) => Fitted {
+                quantizers: quantizers.stored(),
+                codes: rows.iter().map(|row| quantizers.codes(row)).collect(),
+            },
+            None => Fitted {
+                quantizers: vec![Quantizer::Float; 5 + self.raster.channels],
+                codes: rows.iter().map(|row| row.map(f32::to_bits)).collect(),
+            },
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.parameters.len()
+    }
+
+    /// The count that the budget asks for, if training lowers the error by `foreseen`.
+    fn wanted(&self, foreseen: f64) -> usize {
+        self.budget.wanted(self.parameters.len(), self.error * foreseen, self.raster.pixels())
+    }
+
+    /// How many Gaussians to add, with so many steps to come after this one.
+    fn portion(&self, steps_left: u32) -> usize {
+        let missing = self.wanted(FORESEEN).saturating_sub(self.parameters.len());
+        match self.training.densification.portion {
+            _ if steps_left == 0 => missing,
+            Portion::Even => missing.div_ceil(steps_left as usize + 1),
+            Portion::Half => missing.div_ceil(2),
+            Portion::Fixed(count) => missing.min(count as usize),
+        }
+    }
+
+    /// One iteration: a pass, and a step of everything that is trained.
+    fn iterate(
+        &mut self,
+        factor: f32,
+        iterations: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        self.forward();
+        self.remember();
+        let progress = Progress {
+            iteration: self.iterations,
+            iterations,
+            gaussians: self.parameters.len() as u32,
+            psnr: self.psnr(),
+        };
+        if observer(&progress).is_break() {
+            return Err(EncodeError::Cancelled);
+        }
+        self.iterations += 1;
+        let by_steps = self.backward();
+        let options = &self.training.optimizer;
+        self.parameters.step(&self.gradients, options, self.bounds, factor);
+        if let (Some(quantizers), Some(by_steps)) = (&mut self.quantizers, by_steps) {
+            let rate = self.training.quantization.learning_rate * factor;
+            quantizers.step(&by_steps, self.parameters.len(), rate);
+        }
+        let memory = self.memory();
+        self.peak_memory = self.peak_memory.max(memory);
+        Ok(())
+    }
+
+    /// Renders what the file would hold now, and takes the gradient.
+    fn forward(&mut self) {
+        let view = View::identity(self.raster.width as u32, self.raster.height as u32);
+        let (chart, quantizers) = (self.bounds.chart, &self.quantizers);
+        let components = 5 + self.raster.channels;
+        self.parameters
+            .values
+            .par_iter()
+            .with_min_len(CHUNK)
+            .map(|row| {
+                let row = decoded(quantizers.as_ref(), row);
+                let gaussian = Gaussian::from_components(&row[..components], chart);
+                Splat::new(&gaussian, &view).unwrap_or(Splat::NOWHERE)
+            })
+            .collect_into_vec(&mut self.splats);
+        let kernel = self.training.kernel;
+        self.error =
+            self.pass.run(self.raster, &self.splats, kernel, self.base, &mut self.by_splat);
+    }
+
+    /// Carries the pass's gradients on to the trained values, and to the quantizers.
+    fn backward(&mut self) -> Option<StepGradients> {
+        let (chart, quantizers) = (self.bounds.chart, self.quantizers.as_ref());
+        self.gradients.resize(self.parameters.len(), [0.0; MAX_COMPONENTS]);
+        let rows = self.parameters.values.par_chunks(CHUNK);
+        let by_splat = self.by_splat.par_chunks(CHUNK);
+        let gradients = self.gradients.par_chunks_mut(CHUNK);
+        let sums: Vec<StepGradients> = rows
+            .zip(by_splat)
+            .zip(gradients)
+            .map(|((rows, by_splat), gradients)| {
+                let mut sum = [[0.0; 2]; MAX_COMPONENTS];
+                for ((row, by_splat), gradient) in rows.iter().zip(by_splat).zip(gradients) {
+                    let decoded = decoded(quantizers, row);
+                    let (center, shape) = by_splat.moments.gradients(chart, shape_of(&decoded));
+                    gradient[..2].copy_from_slice(&center.to_array());
+                    gradient[2..5].copy_from_slice(&shape.to_array());
+                    gradient[5..].copy_from_slice(&by_splat.color);
+                    let Some(quantizers) = quantizers else { continue };
+                    let by_steps = quantizers.backward(row, &decoded, gradient);
+                    for (sum, value) in sum.iter_mut().flatten().zip(by_steps.as_flattened()) {
+                        *sum += value;
+                    }
+                }
+                sum
+            })
+            .collect();
+        quantizers?;
+        // In the order of the Gaussians, whatever thread was first.
+        Some(sums.into_iter().fold([[0.0; 2]; MAX_COMPONENTS], |mut total, sum| {
+            for (total, value) in total.iter_mut().flatten().zip(sum.as_flattened()) {
+                *total += value;
+            }
+            total
+        }))
+    }
+
+    fn grow(&mut self, count: usize) {
+        if count == 0 {
+            return;
+        }
+        let site = Site {
+            options: &self.training.densification,
+            filter: self.training.filter,
+            raster: self.raster,
+            pass: &self.pass,
+            bounds: self.bounds,
+            present: self.parameters.len(),
+        };
+        let newcomers = site.newcomers(count, &mut self.rng);
+        for row in newcomers {
+            self.parameters.push(row);
+        }
+        // What was best had other Gaussians.
+        self.best = None;
+    }
+
+    /// Removes Gaussians that are invalid, or that nobody would miss.
+    fn prune(&mut self) {
+        let values = &self.parameters.values;
+        let (chart, components) = (self.bounds.chart, 5 + self.raster.channels);
+        let quantizers = self.quantizers.as_ref();
+        let useful = |index: usize| {
+            let row = decoded(quantizers, &values[index]);
+            let gaussian = Gaussian::from_components(&row[..components], chart);
+            let visible = gaussian.color.iter().any(|color| color.abs() >= USELESS_COLOR);
+            let inside = self.pass.touches(index);
+            gaussian.is_drawable() && visible && inside
+        };
+        let keep: Vec<bool> = (0..values.len()).into_par_iter().map(useful).collect();
+        if keep.contains(&false) {
+            self.parameters.retain(|index| keep[index]);
+            self.best = None;
+        }
+    }
+
+    fn start_quantization(&mut self) {
+        for row in &mut self.parameters.values {
+            *row = self.bounds.confined(*row);
+        }
+        self.quantizers = Some(Quantizers::new(
+            &self.parameters.values,
+            self.bounds,
+            &self.training.quantization,
+        ));
+        self.best = None;
+    }
+
+    /// Looks at the values of the last step, which no pass has seen yet.
+    fn settle(&mut self) {
+        self.forward();
+        self.remember();
+    }
+
+    /// Keeps the values of the last pass if they are the best so far.
+    fn remember(&mut self) {
+        if self.best.as_ref().is_none_or(|best| self.error < best.error) {
+            let best = self.best.get_or_insert_with(|| Snapshot {
+                error: 0.0,
+                rows: Vec::new(),
+                quantizers: None,
+            });
+            best.error = self.error;
+            best.rows.clone_from(&self.parameters.values);
+            best.quantizers.clone_from(&self.quantizers);
+        }
+    }
+
+    /// PSNR of the last pass, in dB.
+    fn psnr(&self) -> f64 {
+        let samples = (self.raster.pixels() * self.raster.channels) as f64;
+        10.0 * (samples / self.error).log10()
+    }
+
+    fn memory(&self) -> usize {
+        let best = self.best.as_ref().map_or(0, |best| best.rows.capacity());
+        self.raster.memory()
+            + self.pass.memory()
+            + self.parameters.memory()
+            + (self.gradients.capacity() + best) * size_of::<Row>()
+            + self.splats.capacity() * size_of::<Splat>()
+            + self.by_splat.capacity() * size_of::<SplatGradient>()
+    }
+}
+
+/// The values that a file would hold for a trained row.
+fn decoded(quantizers: Option<&Quantizers>, row: &Row) -> Row {
+    quantizers.map_or(*row, |quantizers| quantizers.decoded(&quantizers.codes(row)))
+}

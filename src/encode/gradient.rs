@@ -1,0 +1,565 @@
+//! One pass over the picture: rendering, residual and gradient, tile by tile.
+//!
+//! The L2 loss is a sum over pixels, so a tile goes forward and backward while it sits in the
+//! first cache. Every (tile, Gaussian) pair has a slot of its own for its sums, gathered
+//! afterwards in a fixed order: no atomics, the same bits for any number of threads.
+
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, prelude::*};
+use rayon::prelude::*;
+
+use super::chart::Moments;
+use super::raster::Raster;
+use crate::limits::Limits;
+use crate::render::{
+    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, Tiling, centers, kernel_simd,
+};
+
+/// Sums that a pass takes per (tile, Gaussian): s, and the residual times the weight by channel.
+const SUMS: usize = 12;
+
+/// What a pass says about one Gaussian.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct SplatGradient {
+    /// See [`Moments`]; for the loss (sum of squared residuals) / 2.
+    pub(crate) moments: Moments,
+    /// Gradient by the colour.
+    pub(crate) color: [f32; 4],
+}
+
+/// The scratch memory of passes, kept from one to the next.
+#[derive(Debug)]
+pub(crate) struct Pass {
+    level: Level,
+    tiling: Tiling,
+    /// Sums by tile, then by Gaussian.
+    slots: Vec<[f32; SUMS]>,
+    /// For each splat, where its slots end in `positions`.
+    ends: Vec<u32>,
+    /// Where the slots of a splat are, splat by splat.
+    positions: Vec<u32>,
+    /// Rendering minus source, in the layout of the [`Raster`].
+    residuals: Vec<Plane>,
+    /// Squared error of every row of tiles.
+    row_errors: Vec<f64>,
+}
+
+impl Pass {
+    pub(crate) fn new(raster: &Raster) -> Self {
+        let rows = raster.height.div_ceil(TILE_HEIGHT);
+        let tiles = raster.width.div_ceil(TILE_WIDTH) * rows;
+        Self {
+            level: Level::new(),
+            tiling: Tiling::default(),
+            slots: Vec::new(),
+            ends: Vec::new(),
+            positions: Vec::new(),
+            residuals: vec![[[0.0; TILE_WIDTH]; TILE_HEIGHT]; tiles * raster.channels],
+            row_errors: vec![0.0; rows],
+        }
+    }
+
+    /// Renders `splats` over `base`, and sets `gradients`, one per splat. Returns the sum of
+    /// squared errors over all samples.
+    pub(crate) fn run(
+        &mut self,
+        raster: &Raster,
+        splats: &[Splat],
+        kernel: Kernel,
+        base: [f32; 4],
+        gradients: &mut Vec<SplatGradient>,
+    ) -> f64 {
+        match raster.channels {
+            1 => self.run_of::<1>(raster, splats, kernel, base),
+            2 => self.run_of::<2>(raster, splats, kernel, base),
+            3 => self.run_of::<3>(raster, splats, kernel, base),
+            _ => self.run_of::<4>(raster, splats, kernel, base),
+        }
+        self.gather(gradients);
+        self.row_errors.iter().sum()
+    }
+
+    /// Rendering minus source at a pixel, by channel; as large as it is visible, for output is
+    /// clamped.
+    pub(crate) fn residual(&self, x: usize, y: usize, channels: usize) -> [f32; 4] {
+        let tile = y / TILE_HEIGHT * self.tiling.columns() + x / TILE_WIDTH;
+        let mut residual = [0.0; 4];
+        for (channel, value) in residual[..channels].iter_mut().enumerate() {
+            *value = self.residuals[tile * channels + channel][y % TILE_HEIGHT][x % TILE_WIDTH];
+        }
+        residual
+    }
+
+    /// Whether a splat of the last pass touched the picture.
+    pub(crate) fn touches(&self, splat: usize) -> bool {
+        self.ends[splat] > splat.checked_sub(1).map_or(0, |before| self.ends[before])
+    }
+
+    /// Bytes held.
+    pub(crate) fn memory(&self) -> usize {
+        self.tiling.memory()
+            + self.slots.capacity() * size_of::<[f32; SUMS]>()
+            + (self.ends.capacity() + self.positions.capacity()) * size_of::<u32>()
+            + size_of_val(&self.residuals[..])
+    }
+
+    fn run_of<const CHANNELS: usize>(
+        &mut self,
+        raster: &Raster,
+        splats: &[Splat],
+        kernel: Kernel,
+        base: [f32; 4],
+    ) {
+        let region =
+            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
+        self.ends.clear();
+        self.ends.resize(splats.len(), 0);
+        self.positions.clear();
+        let (ends, positions) = (&mut self.ends, &mut self.positions);
+        self.tiling
+            .rebuild(splats, kernel.cutoff(), region, &Limits::none(), 0, |splat, entry| {
+                positions.push(entry as u32);
+                ends[splat as usize] = positions.len() as u32;
+            })
+            .expect("there are no limits");
+        // A splat outside the picture has no slots: it ends where the one before ends.
+        let mut last = 0;
+        for end in ends {
+            last = last.max(*end);
+            *end = last;
+        }
+        let tiling = &self.tiling;
+        self.slots.resize(positions.len(), [0.0; SUMS]);
+        let mut slots = &mut self.slots[..];
+        let rows: Vec<_> = (0..tiling.rows())
+            .map(|row| {
+                let entries = tiling.row_entries(row);
+                let (taken, rest) = core::mem::take(&mut slots).split_at_mut(entries);
+                slots = rest;
+                (row, taken)
+            })
+            .collect();
+        let residuals = self.residuals.par_chunks_exact_mut(tiling.columns() * CHANNELS);
+        let level = self.level;
+        rows.into_par_iter().zip(residuals).zip(&mut self.row_errors).for_each(
+            |(((row, mut slots), residuals), row_error)| {
+                let mut states = Vec::new();
+                *row_error = 0.0;
+                for (column, residual) in residuals.chunks_exact_mut(CHANNELS).enumerate() {
+                    let residual: &mut [Plane; CHANNELS] =
+                        residual.try_into().expect("a tile has all channels");
+                    let list = tiling.splats(column, row);
+                    let (taken, rest) = slots.split_at_mut(list.len());
+                    slots = rest;
+                    let tile = Tile::<CHANNELS> {
+                        x: (column * TILE_WIDTH) as u32,
+                        y: (row * TILE_HEIGHT) as u32,
+                        columns: TILE_WIDTH.min(raster.width - column * TILE_WIDTH),
+                        rows: TILE_HEIGHT.min(raster.height - row * TILE_HEIGHT),
+                        target: raster.tile(row * tiling.columns() + column),
+                        base,
+                        splats,
+                        list,
+                    };
+                    states.resize(list.len(), [[0.0; TILE_WIDTH]; TILE_HEIGHT]);
+                    *row_error += tile.run(level, kernel, &mut states, taken, residual);
+                }
+            },
+        );
+    }
+
+    /// Adds up the slots of every splat, in the order of its tiles.
+    fn gather(&self, gradients: &mut Vec<SplatGradient>) {
+        let (ends, positions, slots) = (&self.ends, &self.positions, &self.slots);
+        (0..ends.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(|splat| {
+                let start = if splat == 0 { 0 } else { ends[splat - 1] };
+                let mut sum = [0.0; SUMS];
+                for &position in &positions[start as usize..ends[splat] as usize] {
+                    for (sum, value) in sum.iter_mut().zip(&slots[position as usize]) {
+                        *sum += value;
+                    }
+                }
+                SplatGradient {
+                    moments: Moments { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
+                    color: [sum[5], sum[6], sum[7], sum[8]],
+                }
+            })
+            .collect_into_vec(gradients);
+    }
+}
+
+/// A kernel with what the backward half needs: dweight/dq = -slope / 2.
+trait TrainingKernel: Copy {
+    /// The state to keep per pixel, and the weight.
+    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>);
+    /// Weight and slope from the state.
+    fn backward<S: Simd>(self, state: f32x16<S>) -> (f32x16<S>, f32x16<S>);
+}
+
+impl TrainingKernel for kernel_simd::Exponential {
+    #[inline(always)]
+    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let weight = kernel_simd::Weight::weight(self, simd, q);
+        (weight, weight)
+    }
+
+    #[inline(always)]
+    fn backward<S: Simd>(self, weight: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        (weight, weight)
+    }
+}
+
+impl TrainingKernel for kernel_simd::Quartic {
+    #[inline(always)]
+    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let t = (f32x16::splat(simd, 1.0) - q * 0.125).max(0.0);
+        let t2 = t * t;
+        (t, t2 * t2)
+    }
+
+    #[inline(always)]
+    fn backward<S: Simd>(self, t: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let t3 = t * t * t;
+        (t3 * t, t3)
+    }
+}
+
+/// One tile of the pass.
+struct Tile<'a, const CHANNELS: usize> {
+    x: u32,
+    y: u32,
+    /// Columns and rows that lie inside the picture.
+    columns: usize,
+    rows: usize,
+    target: &'a [Plane; CHANNELS],
+    base: [f32; 4],
+    splats: &'a [Splat],
+    list: &'a [u32],
+}
+
+impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
+    /// Forward, residual, backward; returns the squared error.
+    fn run(
+        &self,
+        level: Level,
+        kernel: Kernel,
+        states: &mut [Plane],
+        slots: &mut [[f32; SUMS]],
+        planes: &mut [Plane; CHANNELS],
+    ) -> f64 {
+        match kernel {
+            Kernel::Exponential { cutoff } => {
+                let kernel = kernel_simd::Exponential { cutoff };
+                dispatch!(level, simd => self.run_with(simd, kernel, states, slots, planes))
+            }
+            Kernel::Quartic => {
+                let kernel = kernel_simd::Quartic;
+                dispatch!(level, simd => self.run_with(simd, kernel, states, slots, planes))
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn run_with<S: Simd, K: TrainingKernel>(
+        &self,
+        simd: S,
+        kernel: K,
+        states: &mut [Plane],
+        slots: &mut [[f32; SUMS]],
+        planes: &mut [Plane; CHANNELS],
+    ) -> f64 {
+        let px = centers(simd, self.x);
+        let py: [f32; TILE_HEIGHT] =
+            core::array::from_fn(|row| (self.y as usize + row) as f32 + 0.5);
+        for (plane, base) in planes.iter_mut().zip(self.base) {
+            *plane = [[base; TILE_WIDTH]; TILE_HEIGHT];
+        }
+        for (&index, state) in self.list.iter().zip(&mut *states) {
+            let splat = &self.splats[index as usize];
+            let dx = px - splat.x;
+            let u = dx * splat.i11;
+            let (u2, slant) = (u * u, dx * splat.w);
+            for row in 0..TILE_HEIGHT {
+                let v = slant + splat.i22 * (py[row] - splat.y);
+                let (kept, weight) = kernel.forward(simd, u2 + v * v);
+                kept.store_array(&mut state[row]);
+                for (plane, color) in planes.iter_mut().zip(splat.color) {
+                    let sum = f32x16::load_array_ref(simd, &plane[row]) + weight * color;
+                    sum.store_array(&mut plane[row]);
+                }
+            }
+        }
+        let squared = self.residual(simd, planes);
+        for ((&index, state), slot) in self.list.iter().zip(states).zip(slots) {
+            let splat = &self.splats[index as usize];
+            let zero = f32x16::splat(simd, 0.0);
+            let (mut s0, mut s1, mut s2) = (zero, zero, zero);
+            let mut by_color = [zero; CHANNELS];
+            for row in 0..TILE_HEIGHT {
+                let (weight, slope) = kernel.backward(f32x16::load_array_ref(simd, &state[row]));
+                let mut along = zero;
+                for channel in 0..CHANNELS {
+                    let residual = f32x16::load_array_ref(simd, &planes[channel][row]);
+                    by_color[channel] += residual * weight;
+                    along += residual * splat.color[channel];
+                }
+                let dy = py[row] - splat.y;
+                let s = along * slope;
+                let t = s * dy;
+                s0 += s;
+                s1 += t;
+                s2 += t * dy;
+            }
+            let dx = px - splat.x;
+            let x0 = dx * s0;
+            let geometry = [x0, s1, dx * x0, dx * s1];
+            slot[..4].copy_from_slice(&sums(geometry));
+            let mut rest = [zero; 8];
+            rest[0] = s2;
+            rest[1..=CHANNELS].copy_from_slice(&by_color);
+            slot[4..8].copy_from_slice(&sums([rest[0], rest[1], rest[2], rest[3]]));
+            if CHANNELS == 4 {
+                slot[8..12].copy_from_slice(&sums([rest[4], rest[5], rest[6], rest[7]]));
+            }
+        }
+        squared
+    }
+
+    /// Turns the rendering into residuals; returns the squared error.
+    #[inline(always)]
+    fn residual<S: Simd>(&self, simd: S, planes: &mut [Plane; CHANNELS]) -> f64 {
+        let zero = f32x16::splat(simd, 0.0);
+        let one = f32x16::splat(simd, 1.0);
+        let mut inside = zero;
+        inside.as_mut_array()[..self.columns].fill(1.0);
+        let mut total = zero;
+        for row in 0..TILE_HEIGHT {
+            let inside = if row < self.rows { inside } else { zero };
+            for (plane, target) in planes.iter_mut().zip(self.target) {
+                let target = f32x16::load_array_ref(simd, &target[row]);
+                let value = f32x16::load_array_ref(simd, &plane[row]);
+                let mut residual = (value - target) * inside;
+                // Output is clamped: beyond white or black where the source is so, all is well.
+                residual = target.simd_ge(one).select(residual.min(zero), residual);
+                residual = target.simd_le(zero).select(residual.max(zero), residual);
+                residual.store_array(&mut plane[row]);
+                let clamped = (value.max(zero).min(one) - target) * inside;
+                total += clamped * clamped;
+            }
+        }
+        total.to_array().iter().map(|&squared| f64::from(squared)).sum()
+    }
+}
+
+/// The sums of the lanes of four vectors.
+#[inline(always)]
+fn sums<S: Simd>(vectors: [f32x16<S>; 4]) -> [f32; 4] {
+    let quarter = |vector: f32x16<S>| -> f32x4<S> {
+        let (low, high) = vector.split();
+        let (low, high) = (low + high).split();
+        low + high
+    };
+    let quarters = vectors.map(|vector| quarter(vector).to_array());
+    quarters.map(|[a, b, c, d]| (a + c) + (b + d))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::source::Source;
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
+    use crate::render::View;
+
+    const WIDTH: u32 = 37;
+    const HEIGHT: u32 = 21;
+    const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
+    const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
+
+    /// Half the sum of squared residuals, straight from the formulas, in f64.
+    fn loss(
+        rows: &[[f64; MAX_COMPONENTS]],
+        chart: Chart,
+        kernel: Kernel,
+        source: &Source<'_>,
+    ) -> f64 {
+        let channels = source.color().channels();
+        let mut loss = 0.0;
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let mut sums = BASE.map(f64::from);
+                for row in rows {
+                    let [a, b, c] = [row[2], row[3], row[4]];
+                    let (xx, xy, yy) = match chart {
+                        Chart::Covariance => (a, b, c),
+                        Chart::Cholesky => (a * a, a * b, b * b + c * c),
+                        Chart::RotationScale => {
+                            let (sin, cos) = c.sin_cos();
+                            let (a, b) = (a * a, b * b);
+                            (
+                                cos * cos * a + sin * sin * b,
+                                cos * sin * (a - b),
+                                sin * sin * a + cos * cos * b,
+                            )
+                        }
+                    };
+                    let (dx, dy) = (f64::from(x) + 0.5 - row[0], f64::from(y) + 0.5 - row[1]);
+                    let determinant = xx * yy - xy * xy;
+                    let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+                    let weight = match kernel {
+                        Kernel::Quartic => (1.0 - q / 8.0).max(0.0).powi(4),
+                        Kernel::Exponential { cutoff } if q <= f64::from(cutoff) => {
+                            (-q / 2.0).exp()
+                        }
+                        Kernel::Exponential { .. } => 0.0,
+                    };
+                    for (sum, color) in sums.iter_mut().zip(&row[5..]) {
+                        *sum += color * weight;
+                    }
+                }
+                for (channel, sum) in sums[..channels].iter().enumerate() {
+                    let index = (y * WIDTH + x) as usize * channels + channel;
+                    loss += 0.5 * (sum - f64::from(source.sample(index))).powi(2);
+                }
+            }
+        }
+        loss
+    }
+
+    /// Gaussians of many shapes: round, slanted both ways, needles, over the border.
+    fn scene(chart: Chart, channels: usize, rng: &mut fastrand::Rng) -> Vec<[f32; MAX_COMPONENTS]> {
+        (0..12)
+            .map(|index| {
+                let (s1, s2) = match index % 3 {
+                    0 => (2.0 + 3.0 * rng.f32(), 2.0 + 3.0 * rng.f32()),
+                    1 => (6.0, 1.0 + rng.f32()),
+                    _ => (12.0, 0.8),
+                };
+                let angle = rng.f32() * 6.0 - 3.0;
+                let factor = Chart::RotationScale.to_cholesky([s1, s2, angle]);
+                let shape = match chart {
+                    Chart::RotationScale => Vec3::new(s1, s2, angle),
+                    _ => super::super::chart::from_cholesky(chart, factor),
+                };
+                let mut row = [0.0; MAX_COMPONENTS];
+                row[0] = rng.f32() * 45.0 - 4.0;
+                row[1] = rng.f32() * 27.0 - 3.0;
+                row[2..5].copy_from_slice(&shape.to_array());
+                for value in &mut row[5..5 + channels] {
+                    *value = rng.f32() * 0.4 - 0.2;
+                }
+                row
+            })
+            .collect()
+    }
+
+    fn gradients(
+        rows: &[[f32; MAX_COMPONENTS]],
+        chart: Chart,
+        kernel: Kernel,
+        raster: &Raster,
+    ) -> Vec<[f32; MAX_COMPONENTS]> {
+        let view = View::identity(WIDTH, HEIGHT);
+        let splats: Vec<_> = rows
+            .iter()
+            .map(|row| {
+                let gaussian = Gaussian::from_components(&row[..5 + raster.channels], chart);
+                Splat::new(&gaussian, &view).expect("the scene is sound")
+            })
+            .collect();
+        let mut by_splat = Vec::new();
+        Pass::new(raster).run(raster, &splats, kernel, BASE, &mut by_splat);
+        let by_row = by_splat.iter().zip(rows).map(|(gradient, row)| {
+            let (center, shape) = gradient.moments.gradients(chart, Vec3::from_slice(&row[2..5]));
+            let mut out = [0.0; MAX_COMPONENTS];
+            out[..2].copy_from_slice(&center.to_array());
+            out[2..5].copy_from_slice(&shape.to_array());
+            out[5..].copy_from_slice(&gradient.color);
+            out
+        });
+        by_row.collect()
+    }
+
+    #[test]
+    fn every_gradient_equals_its_finite_difference() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        // Away from black and white, where the residual saturates on purpose. A cut-off so far out
+        // that the jump there is below what f32 resolves.
+        let kernels = [Kernel::Quartic, Kernel::Exponential { cutoff: 40.0 }];
+        let colors = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+        for (chart, kernel) in CHARTS.into_iter().flat_map(|c| kernels.map(|k| (c, k))) {
+            for color in colors {
+                let channels = color.channels();
+                let samples: Vec<u8> = (0..WIDTH as usize * HEIGHT as usize * channels)
+                    .map(|_| rng.u8(1..255))
+                    .collect();
+                let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
+                let rows = scene(chart, channels, &mut rng);
+                let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
+                let found = gradients(&rows, chart, kernel, &Raster::new(&source));
+                for (index, found) in found.iter().enumerate() {
+                    for component in 0..5 + channels {
+                        let step = 1e-5 * exact[index][component].abs().max(1.0);
+                        let moved = |by: f64| {
+                            let mut rows = exact.clone();
+                            rows[index][component] += by;
+                            loss(&rows, chart, kernel, &source)
+                        };
+                        let expected = (moved(step) - moved(-step)) / (2.0 * step);
+                        let error = (f64::from(found[component]) - expected).abs();
+                        assert!(
+                            error <= 2e-3 * expected.abs() + 2e-4,
+                            "{chart:?} {kernel:?} {color:?}, Gaussian {index}, component \
+                             {component}: {} against {expected}",
+                            found[component]
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_simd_level_gives_the_same_bits() {
+        let mut rng = fastrand::Rng::with_seed(2);
+        let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+        let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+        let raster = Raster::new(&source);
+        let rows = scene(Chart::Cholesky, 3, &mut rng);
+        let view = View::identity(WIDTH, HEIGHT);
+        let splats: Vec<_> = rows
+            .iter()
+            .filter_map(|row| {
+                Splat::new(&Gaussian::from_components(&row[..8], Chart::Cholesky), &view)
+            })
+            .collect();
+        let run = |level| {
+            let mut pass = Pass { level, ..Pass::new(&raster) };
+            let mut gradients = Vec::new();
+            let error = pass.run(&raster, &splats, Kernel::Quartic, BASE, &mut gradients);
+            (error, gradients)
+        };
+        let expected = run(Level::baseline());
+        assert!(expected.0 > 0.0);
+        assert_eq!(run(Level::new()), expected);
+    }
+
+    #[test]
+    fn what_lies_outside_the_picture_or_beyond_white_is_no_error() {
+        let white = [255; 5 * 3 * 3];
+        let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
+        let raster = Raster::new(&source);
+        let gaussian =
+            Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
+        let splat = Splat::new(&gaussian, &View::identity(5, 3)).expect("it is sound");
+        let mut gradients = Vec::new();
+        let error =
+            Pass::new(&raster).run(&raster, &[splat], Kernel::Quartic, [0.9; 4], &mut gradients);
+        assert_eq!(error, 0.0);
+        assert_eq!(gradients[0], SplatGradient::default());
+    }
+}

@@ -1,0 +1,127 @@
+//! Fitted Gaussians to a file: order, layers, chunks (spec, sections 4 to 7).
+
+use super::fit::Fitted;
+use super::source::Source;
+use super::training::Training;
+use crate::coding::fixed;
+use crate::container::{ChunkType, Header, Metadata, SIGNATURE, write_chunk};
+use crate::gaussian::{Gaussian, MAX_COMPONENTS};
+use crate::quantizer::Quantizer;
+
+/// Fewest Gaussians that are worth a layer of their own.
+const LEAST_LAYER: usize = 64;
+/// The layers of a file with enough Gaussians, as shares of them: each ends with a checksum, and
+/// the first already shows the picture.
+const LAYERS: [f64; 4] = [0.125, 0.125, 0.25, 0.5];
+
+/// All of a file but its Gaussians.
+#[derive(Debug)]
+pub(crate) struct Layout<'a> {
+    header: Header,
+    metadata: &'a Metadata,
+}
+
+impl<'a> Layout<'a> {
+    /// `mean` is the mean of each channel.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        training: &Training,
+        mean: [f32; 4],
+        metadata: &'a Metadata,
+    ) -> Self {
+        let header = Header {
+            version: crate::container::VERSION,
+            width: source.width(),
+            height: source.height(),
+            color: source.color(),
+            depth: source.depth(),
+            gaussians: 0,
+            layers: 0,
+            kernel: training.kernel,
+            chart: training.parameterization,
+            base_color: mean.map(|value| (value * 65535.0).round() as u16),
+        };
+        Self { header, metadata }
+    }
+
+    /// The colour that Gaussians are added to, as the decoder has it.
+    pub(crate) fn base(&self) -> [f32; 4] {
+        self.header.base()
+    }
+
+    /// The file.
+    pub(crate) fn write(&self, fitted: &Fitted) -> Vec<u8> {
+        let quantizers = &fitted.quantizers;
+        let Fitted { codes, .. } = self.ordered(fitted);
+        let layers = layers(codes.len());
+        let header = Header {
+            gaussians: codes.len() as u32,
+            layers: layers.len() as u16,
+            ..self.header.clone()
+        };
+        let mut file = SIGNATURE.to_vec();
+        write_chunk(&mut file, ChunkType::GHDR, &header.to_payload());
+        let entries: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
+        write_chunk(&mut file, ChunkType::QNTZ, &entries);
+        for (kind, payload) in self.metadata.chunks() {
+            write_chunk(&mut file, kind, &payload);
+        }
+        let mut rest = &codes[..];
+        for count in layers {
+            let (layer, later) = rest.split_at(count);
+            rest = later;
+            write_chunk(&mut file, ChunkType::GAUS, &fixed::write_layer(layer, quantizers));
+        }
+        write_chunk(&mut file, ChunkType::GEND, &[]);
+        file
+    }
+
+    /// The bytes of a file with `count` Gaussians stored by `quantizers`.
+    pub(crate) fn length(&self, quantizers: &[Quantizer], count: usize) -> u64 {
+        let empty = Fitted { quantizers: quantizers.to_vec(), codes: Vec::new() };
+        let layers = layers(count)
+            .into_iter()
+            .map(|count| 12 + fixed::LAYER_PREFIX + fixed::packed_length(quantizers, count as u32));
+        self.write(&empty).len() as u64 + layers.sum::<u64>()
+    }
+
+    /// The Gaussian that adds most to the picture first, so that every prefix of the file is a
+    /// picture.
+    pub(crate) fn ordered(&self, fitted: &Fitted) -> Fitted {
+        let mut order: Vec<_> = fitted
+            .codes
+            .iter()
+            .map(|codes| {
+                let mut values = [0.0; MAX_COMPONENTS];
+                for ((value, &code), quantizer) in
+                    values.iter_mut().zip(codes).zip(&fitted.quantizers)
+                {
+                    *value = quantizer.value(code);
+                }
+                let values = &values[..fitted.quantizers.len()];
+                let gaussian = Gaussian::from_components(values, self.header.chart);
+                let [l11, _, l22] = gaussian.cholesky;
+                let energy = gaussian.color.iter().map(|color| color * color).sum::<f32>();
+                (energy * l11 * l22, codes)
+            })
+            .collect();
+        order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let codes = order.into_iter().map(|(_, codes)| *codes).collect();
+        Fitted { quantizers: fitted.quantizers.clone(), codes }
+    }
+}
+
+/// The sizes of the layers of a file with `count` Gaussians.
+fn layers(count: usize) -> Vec<usize> {
+    if count == 0 {
+        return Vec::new();
+    }
+    if count < LEAST_LAYER * 8 {
+        return vec![count];
+    }
+    let mut sizes: Vec<_> = LAYERS.map(|share| (share * count as f64) as usize).into();
+    // Rounding leaves a few over.
+    let last = sizes.len() - 1;
+    sizes[last] += count - sizes.iter().sum::<usize>();
+    sizes
+}

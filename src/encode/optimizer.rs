@@ -1,0 +1,179 @@
+//! The trained values of all Gaussians, and Adam.
+
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::chart::{self, Frame};
+use super::training;
+use crate::gaussian::{Chart, MAX_COMPONENTS};
+
+/// The components of a Gaussian in the order of the file: centre, shape, colour.
+pub(crate) type Row = [f32; MAX_COMPONENTS];
+
+/// Largest magnitude of a trained colour: large ones that cancel make the picture depend on
+/// rounding.
+const MAX_COLOR: f32 = 8.0;
+
+/// Adam's state of one Gaussian.
+#[derive(Clone, Copy, Debug)]
+struct Moments {
+    mean: Row,
+    square: Row,
+    /// Steps since birth, for the bias correction of newcomers.
+    age: u32,
+}
+
+impl Moments {
+    const NEW: Self = Self { mean: [0.0; MAX_COMPONENTS], square: [0.0; MAX_COMPONENTS], age: 0 };
+}
+
+/// Trained values and their optimizer state; one entry per Gaussian in both.
+#[derive(Debug, Default)]
+pub(crate) struct Parameters {
+    pub(crate) values: Vec<Row>,
+    moments: Vec<Moments>,
+}
+
+/// What does not change from one Gaussian to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    pub(crate) chart: Chart,
+    pub(crate) channels: usize,
+    /// Width and height of the picture.
+    pub(crate) size: Vec2,
+}
+
+impl Bounds {
+    /// Largest standard deviation that is trained: twice the picture.
+    fn max_deviation(self) -> f32 {
+        2.0 * self.size.max_element()
+    }
+
+    /// The values nearest to `row` that make a Gaussian worth storing.
+    pub(crate) fn confined(self, mut row: Row) -> Row {
+        let shape = chart::confined(self.chart, shape_of(&row), self.max_deviation());
+        row[2..5].copy_from_slice(&shape.to_array());
+        self.confine_rest(&mut row);
+        row
+    }
+
+    fn confine_rest(self, row: &mut Row) {
+        // A centre farther outside widens the range that positions are quantized in and shows
+        // little.
+        let margin = 8.0 + 0.05 * self.size;
+        for (value, (low, high)) in row[..2]
+            .iter_mut()
+            .zip([(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)])
+        {
+            *value = value.clamp(low, high);
+        }
+        for value in &mut row[5..] {
+            *value = value.clamp(-MAX_COLOR, MAX_COLOR);
+        }
+    }
+}
+
+/// The shape components of a row.
+pub(crate) fn shape_of(row: &Row) -> Vec3 {
+    Vec3::from_slice(&row[2..5])
+}
+
+impl Parameters {
+    pub(crate) fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Adds a Gaussian.
+    pub(crate) fn push(&mut self, row: Row) {
+        self.values.push(row);
+        self.moments.push(Moments::NEW);
+    }
+
+    /// Goes back to other values, for as many Gaussians as they are; Adam starts anew.
+    pub(crate) fn replace(&mut self, values: Vec<Row>) {
+        self.moments.clear();
+        self.moments.resize(values.len(), Moments::NEW);
+        self.values = values;
+    }
+
+    /// Removes the Gaussians that `keep` does not want, asked by index.
+    pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
+        let mut index = 0..;
+        self.values.retain(|_| keep(index.next().expect("endless")));
+        let mut index = 0..;
+        self.moments.retain(|_| keep(index.next().expect("endless")));
+    }
+
+    /// Takes one step against `gradients`, given by the values themselves; `factor` scales all
+    /// learning rates.
+    pub(crate) fn step(
+        &mut self,
+        gradients: &[Row],
+        options: &training::Optimizer,
+        bounds: Bounds,
+        factor: f32,
+    ) {
+        self.values
+            .par_iter_mut()
+            .zip(&mut self.moments)
+            .zip(gradients)
+            .with_min_len(128)
+            .for_each(|((row, moments), gradient)| {
+                // A Gaussian that floats cannot describe any more stands still until pruned.
+                if gradient.iter().all(|value| value.is_finite()) {
+                    step(row, moments, gradient, options, bounds, factor);
+                }
+            });
+    }
+
+    /// Bytes held.
+    pub(crate) fn memory(&self) -> usize {
+        self.values.capacity() * size_of::<Row>() + self.moments.capacity() * size_of::<Moments>()
+    }
+}
+
+fn step(
+    row: &mut Row,
+    moments: &mut Moments,
+    gradient: &Row,
+    options: &training::Optimizer,
+    bounds: Bounds,
+    factor: f32,
+) {
+    let relative = options.units == training::Units::Relative;
+    let frame =
+        if relative { Frame::relative(bounds.chart, shape_of(row)) } else { Frame::ABSOLUTE };
+    let mut gradient = *gradient;
+    let center = frame.center.transpose() * Vec2::from_slice(&gradient);
+    let shape = frame.shape.transpose() * shape_of(&gradient);
+    gradient[..2].copy_from_slice(&center.to_array());
+    gradient[2..5].copy_from_slice(&shape.to_array());
+
+    let (beta1, beta2) = (options.beta1, options.beta2);
+    moments.age += 1;
+    let age = moments.age.min(i32::MAX as u32) as i32;
+    let (unbias1, unbias2) = (1.0 - beta1.powi(age), 1.0 - beta2.powi(age));
+    let mut steps = [0.0; MAX_COMPONENTS];
+    for index in 0..5 + bounds.channels {
+        let (mean, square) = (&mut moments.mean[index], &mut moments.square[index]);
+        *mean = beta1 * *mean + (1.0 - beta1) * gradient[index];
+        *square = beta2 * *square + (1.0 - beta2) * (gradient[index] * gradient[index]);
+        let root = (*square / unbias2).sqrt() + options.epsilon;
+        // 0 / 0: a parameter that no pixel depends on.
+        steps[index] = if root > 0.0 { *mean / unbias1 / root * factor } else { 0.0 };
+    }
+    let center = frame.center * Vec2::from_slice(&steps) * options.center;
+    let shape = shape_of(row) - frame.shape * shape_of(&steps) * options.shape;
+    row[0] -= center.x;
+    row[1] -= center.y;
+    row[2..5].copy_from_slice(&shape.to_array());
+    for (value, step) in row[5..].iter_mut().zip(&steps[5..]) {
+        *value -= options.color * step;
+    }
+    // The paper's covariance may leave the positive definite ones; it is pruned then.
+    if relative || bounds.chart != Chart::Covariance {
+        *row = bounds.confined(*row);
+    } else {
+        bounds.confine_rest(row);
+    }
+}

@@ -1,0 +1,381 @@
+//! Everything that touches the `image` crate: hooks, [`GipDecoder`], and with the feature `encode`
+//! `GipEncoder`.
+//!
+//! The names are prefixed because they are used next to `image`'s own.
+
+use std::io::Read;
+use std::sync::OnceLock;
+
+use ::image::error::{
+    DecodingError, ImageFormatHint, LimitError, LimitErrorKind, ParameterError, ParameterErrorKind,
+    UnsupportedError, UnsupportedErrorKind,
+};
+use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
+use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
+
+use crate::color::{ColorModel, SampleDepth};
+use crate::container::SIGNATURE;
+use crate::decoder::Decoder;
+use crate::error::{DecodeError, LimitKind};
+use crate::limits::Limits;
+use crate::render::{Region, RenderOptions};
+
+/// The extension of `.gip` files, in the form in which `image` keeps it.
+const EXTENSION: &str = "gip";
+
+/// Makes `image` read `.gip` files: by their extension, as `image::open` does, and by their
+/// content, as `ImageReader::with_guessed_format` and `image::load_from_memory` do.
+///
+/// Call it once at the start of the program; further calls do nothing. Returns whether `.gip` is
+/// read by this crate now: `false` means that another decoder had taken the extension before, and
+/// that one stays.
+///
+/// `image` has no such hook for writing: use `GipEncoder` (feature `encode`) with
+/// `DynamicImage::write_with_encoder`.
+///
+/// ```no_run
+/// # fn main() -> image::ImageResult<()> {
+/// image_gip::register();
+/// let picture = image::open("picture.gip")?;
+/// # Ok(())
+/// # }
+/// ```
+pub fn register() -> bool {
+    static REGISTERED: OnceLock<bool> = OnceLock::new();
+    *REGISTERED.get_or_init(|| {
+        // `image` bounds width, height and memory itself, as its caller wishes.
+        let limits = Limits {
+            max_width: u32::MAX,
+            max_height: u32::MAX,
+            max_pixels: u64::MAX,
+            ..Limits::default()
+        };
+        let registered = register_decoding_hook(
+            EXTENSION.into(),
+            Box::new(move |reader| Ok(Box::new(GipDecoder::with_limits(reader, limits.clone())?))),
+        );
+        if registered {
+            register_format_detection_hook(EXTENSION.into(), &SIGNATURE, None);
+        }
+        registered
+    })
+}
+
+/// Decodes `.gip` for `image`: an [`ImageDecoder`] and [`ImageDecoderRect`] over any reader.
+///
+/// A file that ends before its last Gaussian is an error, as `image` has it. For the picture so
+/// far use [`Decoder`].
+#[derive(Debug)]
+pub struct GipDecoder<R> {
+    decoder: Decoder<R>,
+    limits: Limits,
+    /// Width and height of the whole output.
+    size: (u32, u32),
+}
+
+impl<R: Read> GipDecoder<R> {
+    /// Reads header and metadata, with the default [`Limits`].
+    ///
+    /// # Errors
+    /// As [`Decoder::new`].
+    pub fn new(reader: R) -> ImageResult<Self> {
+        Self::with_limits(reader, Limits::default())
+    }
+
+    /// Reads header and metadata, with the given limits.
+    ///
+    /// # Errors
+    /// As [`Decoder::with_limits`].
+    pub fn with_limits(reader: R, limits: Limits) -> ImageResult<Self> {
+        let decoder = Decoder::with_limits(reader, limits.clone())?;
+        let size = (decoder.header().width, decoder.header().height);
+        Ok(Self { decoder, limits, size })
+    }
+
+    /// Renders the whole picture `width` by `height` pixels large instead of at its stored size;
+    /// see [`RenderOptions::size`]. Dimensions and rectangles are in pixels of that size then.
+    ///
+    /// # Errors
+    /// When a side is zero or exceeds the limits. The size stays as it was then.
+    pub fn set_size(&mut self, width: u32, height: u32) -> ImageResult<()> {
+        if width == 0 || height == 0 {
+            return Err(parameter(format!("an output size of {width}x{height}")));
+        }
+        self.limits.check_size(width, height)?;
+        self.size = (width, height);
+        Ok(())
+    }
+
+    /// Renders a rectangle into rows that begin `row_pitch` bytes apart.
+    fn render(&mut self, region: Region, buf: &mut [u8], row_pitch: usize) -> ImageResult<()> {
+        self.decoder.read_to_end()?;
+        let (width, height) = self.size;
+        let options = RenderOptions::new().size(width, height).region(region);
+        let picture = self.decoder.picture();
+        let row = region.width as usize * usize::from(self.color_type().bytes_per_pixel());
+        let samples = options.output_len(picture.header()).unwrap_or(usize::MAX);
+        // A copy of the output stands next to what the renderer holds.
+        let copy = (samples as u64).saturating_mul(picture.header().depth.bytes() as u64);
+        let scratch = || self.limits.check_memory(copy);
+        match picture.header().depth {
+            SampleDepth::Eight if row_pitch == row => {
+                let length = samples.min(buf.len());
+                picture.render_u8(&options, &mut buf[..length])?;
+            }
+            SampleDepth::Eight => {
+                scratch()?;
+                let mut out = vec![0; samples];
+                picture.render_u8(&options, &mut out)?;
+                for (to, from) in buf.chunks_mut(row_pitch).zip(out.chunks_exact(row)) {
+                    to[..row].copy_from_slice(from);
+                }
+            }
+            SampleDepth::Sixteen => {
+                scratch()?;
+                let mut out = vec![0_u16; samples];
+                picture.render_u16(&options, &mut out)?;
+                for (to, from) in buf.chunks_mut(row_pitch).zip(out.chunks_exact(row / 2)) {
+                    for (to, from) in to.chunks_exact_mut(2).zip(from) {
+                        to.copy_from_slice(&from.to_ne_bytes());
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<R: Read> ImageDecoder for GipDecoder<R> {
+    fn dimensions(&self) -> (u32, u32) {
+        self.size
+    }
+
+    fn color_type(&self) -> ColorType {
+        let header = self.decoder.header();
+        match (header.color, header.depth) {
+            (ColorModel::Gray, SampleDepth::Eight) => ColorType::L8,
+            (ColorModel::GrayAlpha, SampleDepth::Eight) => ColorType::La8,
+            (ColorModel::Rgb, SampleDepth::Eight) => ColorType::Rgb8,
+            (ColorModel::Rgba, SampleDepth::Eight) => ColorType::Rgba8,
+            (ColorModel::Gray, SampleDepth::Sixteen) => ColorType::L16,
+            (ColorModel::GrayAlpha, SampleDepth::Sixteen) => ColorType::La16,
+            (ColorModel::Rgb, SampleDepth::Sixteen) => ColorType::Rgb16,
+            (ColorModel::Rgba, SampleDepth::Sixteen) => ColorType::Rgba16,
+        }
+    }
+
+    fn icc_profile(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.decoder.metadata().icc_profile.clone())
+    }
+
+    fn exif_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.decoder.metadata().exif.clone())
+    }
+
+    fn xmp_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
+        Ok(self.decoder.metadata().xmp.clone())
+    }
+
+    /// Takes over `max_image_width`, `max_image_height` and, for all that this decoder holds next
+    /// to the caller's buffer, `max_alloc`. What `image` has no limit for, the number of Gaussians
+    /// and the work of rendering, stays limited as it was.
+    fn set_limits(&mut self, limits: ::image::Limits) -> ImageResult<()> {
+        limits.check_support(&::image::LimitSupport::default())?;
+        let (width, height) = self.dimensions();
+        limits.check_dimensions(width, height)?;
+        // The stored size may be larger than what was asked for: it costs nothing.
+        self.limits.max_memory = limits.max_alloc.unwrap_or(u64::MAX);
+        Ok(self.decoder.set_limits(self.limits.clone())?)
+    }
+
+    fn read_image(mut self, buf: &mut [u8]) -> ImageResult<()> {
+        assert_eq!(buf.len() as u64, self.total_bytes(), "the buffer has the picture's size");
+        let (width, height) = self.size;
+        let row_pitch = buf.len() / height as usize;
+        self.render(Region { x: 0, y: 0, width, height }, buf, row_pitch)
+    }
+
+    fn read_image_boxed(self: Box<Self>, buf: &mut [u8]) -> ImageResult<()> {
+        (*self).read_image(buf)
+    }
+}
+
+impl<R: Read> ImageDecoderRect for GipDecoder<R> {
+    /// Renders only this rectangle, at a cost that follows its size. It may be called any number
+    /// of times; the reader is read to its end by the first call.
+    fn read_rect(
+        &mut self,
+        x: u32,
+        y: u32,
+        width: u32,
+        height: u32,
+        buf: &mut [u8],
+        row_pitch: usize,
+    ) -> ImageResult<()> {
+        let row = u64::from(width) * u64::from(self.color_type().bytes_per_pixel());
+        let needed = (row_pitch as u64)
+            .checked_mul(u64::from(height.saturating_sub(1)))
+            .and_then(|bytes| bytes.checked_add(row));
+        if (row_pitch as u64) < row || needed.is_none_or(|needed| (buf.len() as u64) < needed) {
+            return Err(parameter(format!(
+                "a buffer of {} bytes with {row_pitch} per row for {width}x{height} pixels",
+                buf.len()
+            )));
+        }
+        self.render(Region { x, y, width, height }, buf, row_pitch)
+    }
+}
+
+impl From<DecodeError> for ImageError {
+    fn from(error: DecodeError) -> Self {
+        match error {
+            DecodeError::Limit { kind, .. } => {
+                let kind = match kind {
+                    LimitKind::Width | LimitKind::Height | LimitKind::Pixels => {
+                        LimitErrorKind::DimensionError
+                    }
+                    // `image` knows no other kind.
+                    LimitKind::Gaussians | LimitKind::Memory | LimitKind::Work => {
+                        LimitErrorKind::InsufficientMemory
+                    }
+                };
+                Self::Limits(LimitError::from_kind(kind))
+            }
+            DecodeError::Unsupported { .. } => {
+                let kind = UnsupportedErrorKind::GenericFeature(error.to_string());
+                Self::Unsupported(UnsupportedError::from_format_and_kind(hint(), kind))
+            }
+            DecodeError::Request(what) => parameter(what),
+            DecodeError::AlreadyFailed => {
+                Self::Parameter(ParameterError::from_kind(ParameterErrorKind::FailedAlready))
+            }
+            DecodeError::Io(error) => Self::IoError(error),
+            DecodeError::Signature
+            | DecodeError::Malformed { .. }
+            | DecodeError::UnexpectedEnd { .. } => {
+                Self::Decoding(DecodingError::new(hint(), error))
+            }
+        }
+    }
+}
+
+fn parameter(what: String) -> ImageError {
+    ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::Generic(what)))
+}
+
+fn hint() -> ImageFormatHint {
+    ImageFormatHint::Name("GIP".into())
+}
+
+#[cfg(feature = "encode")]
+pub use encoder::GipEncoder;
+
+#[cfg(feature = "encode")]
+mod encoder {
+    use core::fmt;
+    use std::io::Write;
+
+    use ::image::error::{EncodingError, UnsupportedError, UnsupportedErrorKind};
+    use ::image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
+
+    use super::{hint, parameter};
+    use crate::color::{ColorModel, SampleDepth};
+    use crate::encode::{EncodeError, Encoder, Source};
+
+    /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and RGB
+    /// pictures with or without alpha.
+    ///
+    /// ```no_run
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let picture = image::DynamicImage::new_rgb8(64, 64);
+    /// let file = std::fs::File::create("picture.gip")?;
+    /// picture.write_with_encoder(image_gip::GipEncoder::new(file))?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub struct GipEncoder<W> {
+        writer: W,
+        encoder: Encoder,
+    }
+
+    impl<W> GipEncoder<W> {
+        /// Writes a file with the default options of [`Encoder`].
+        pub fn new(writer: W) -> Self {
+            Self::with_encoder(writer, Encoder::new())
+        }
+
+        /// Writes a file with the options of `encoder`.
+        pub fn with_encoder(writer: W, encoder: Encoder) -> Self {
+            Self { writer, encoder }
+        }
+    }
+
+    // By hand, for writers that have no `Debug`.
+    impl<W> fmt::Debug for GipEncoder<W> {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.debug_struct("GipEncoder").field("encoder", &self.encoder).finish_non_exhaustive()
+        }
+    }
+
+    impl<W: Write> ImageEncoder for GipEncoder<W> {
+        fn write_image(
+            mut self,
+            buf: &[u8],
+            width: u32,
+            height: u32,
+            color_type: ExtendedColorType,
+        ) -> ImageResult<()> {
+            let (color, depth) = match color_type {
+                ExtendedColorType::L8 => (ColorModel::Gray, SampleDepth::Eight),
+                ExtendedColorType::La8 => (ColorModel::GrayAlpha, SampleDepth::Eight),
+                ExtendedColorType::Rgb8 => (ColorModel::Rgb, SampleDepth::Eight),
+                ExtendedColorType::Rgba8 => (ColorModel::Rgba, SampleDepth::Eight),
+                ExtendedColorType::L16 => (ColorModel::Gray, SampleDepth::Sixteen),
+                ExtendedColorType::La16 => (ColorModel::GrayAlpha, SampleDepth::Sixteen),
+                ExtendedColorType::Rgb16 => (ColorModel::Rgb, SampleDepth::Sixteen),
+                ExtendedColorType::Rgba16 => (ColorModel::Rgba, SampleDepth::Sixteen),
+                _ => {
+                    let kind = UnsupportedErrorKind::Color(color_type);
+                    let error = UnsupportedError::from_format_and_kind(hint(), kind);
+                    return Err(ImageError::Unsupported(error));
+                }
+            };
+            let encoded = match depth {
+                SampleDepth::Eight => {
+                    self.encoder.encode(&Source::new_u8(width, height, color, buf)?)
+                }
+                SampleDepth::Sixteen => {
+                    let (samples, rest) = buf.as_chunks();
+                    if !rest.is_empty() {
+                        return Err(parameter(
+                            "half a 16-bit sample at the end of the buffer".into(),
+                        ));
+                    }
+                    let samples: Vec<_> = samples.iter().copied().map(u16::from_ne_bytes).collect();
+                    self.encoder.encode(&Source::new_u16(width, height, color, &samples)?)
+                }
+            }?;
+            self.writer.write_all(&encoded.bytes)?;
+            Ok(self.writer.flush()?)
+        }
+
+        fn set_icc_profile(&mut self, icc_profile: Vec<u8>) -> Result<(), UnsupportedError> {
+            self.encoder.metadata.icc_profile = Some(icc_profile);
+            Ok(())
+        }
+
+        fn set_exif_metadata(&mut self, exif: Vec<u8>) -> Result<(), UnsupportedError> {
+            self.encoder.metadata.exif = Some(exif);
+            Ok(())
+        }
+    }
+
+    impl From<EncodeError> for ImageError {
+        fn from(error: EncodeError) -> Self {
+            match error {
+                EncodeError::Source(_) | EncodeError::Option(_) => parameter(error.to_string()),
+                EncodeError::Cancelled => Self::Encoding(EncodingError::new(hint(), error)),
+            }
+        }
+    }
+}

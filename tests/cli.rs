@@ -1,0 +1,601 @@
+//! The command line, from outside: files, streams, JSON, exit status.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use image::metadata::Orientation;
+use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const WIDTH: u32 = 48;
+const HEIGHT: u32 = 36;
+
+/// An Exif block with one entry, the orientation "rotate by 90 degrees".
+const EXIF_ROTATE_90: &[u8] = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+
+/// A directory for one test.
+struct Room(TempDir);
+
+impl Room {
+    fn new() -> Self {
+        Self(TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).expect("the directory is writable"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs `gip` in this directory.
+    fn run(&self, args: &[&str]) -> Output {
+        self.pipe(args, &[])
+    }
+
+    /// Runs `gip` in this directory with bytes on its standard input.
+    fn pipe(&self, args: &[&str], input: &[u8]) -> Output {
+        let mut gip = Command::new(env!("CARGO_BIN_EXE_gip"))
+            .args(args)
+            .current_dir(self.0.path())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the binary was built");
+        // A tool that fails early reads nothing; that is no failure of the test.
+        let _ = gip.stdin.take().expect("piped").write_all(input);
+        gip.wait_with_output().expect("the tool ends")
+    }
+
+    /// Runs `gip`, which must succeed, and returns what it printed.
+    fn ok(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    fn json(&self, args: &[&str]) -> Value {
+        let line = self.ok(args);
+        assert_eq!(line.lines().count(), 1, "one object on one line: {line}");
+        serde_json::from_str(&line).expect("JSON")
+    }
+
+    /// Runs `gip`, which must fail with one line of error; returns that line.
+    fn fails(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {error}");
+        assert!(error.starts_with("error: ") && error.lines().count() == 1, "{args:?}: {error}");
+        assert!(output.stdout.is_empty(), "{args:?}");
+        error
+    }
+
+    /// Saves a test picture as `name`.
+    fn save(&self, name: &str, color: ColorType) -> DynamicImage {
+        let picture = picture(color);
+        picture.save(self.path(name)).expect("the format takes the colour type");
+        picture
+    }
+
+    /// Makes a small .gip file from a test picture.
+    fn gip(&self, name: &str, color: ColorType) {
+        let source = format!("{name}.source.png");
+        self.save(&source, color);
+        self.encode(&source, name);
+    }
+
+    fn encode(&self, input: &str, output: &str) {
+        self.ok(&["encode", input, output, "--gaussians", "20", "--effort", "1"]);
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.0.path()).expect("the directory exists");
+        let mut names: Vec<_> = entries
+            .map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn open(path: &Path) -> DynamicImage {
+    let reader = ImageReader::open(path).expect("the file exists");
+    reader.with_guessed_format().expect("readable").decode().expect("a sound picture")
+}
+
+/// A ramp with a bright spot, in any colour type; alpha is a ramp, too.
+fn picture(color: ColorType) -> DynamicImage {
+    let rgba = image::Rgba32FImage::from_fn(WIDTH, HEIGHT, |x, y| {
+        let ramp = x as f32 / WIDTH as f32;
+        let spot = if (x / 6, y / 6) == (2, 3) { 0.9 } else { 0.2 };
+        image::Rgba([ramp, spot, 1.0 - ramp, y as f32 / HEIGHT as f32])
+    });
+    let picture = DynamicImage::ImageRgba32F(rgba);
+    match color {
+        ColorType::L8 => picture.to_luma8().into(),
+        ColorType::La8 => picture.to_luma_alpha8().into(),
+        ColorType::Rgb8 => picture.to_rgb8().into(),
+        ColorType::Rgba8 => picture.to_rgba8().into(),
+        ColorType::L16 => picture.to_luma16().into(),
+        ColorType::La16 => picture.to_luma_alpha16().into(),
+        ColorType::Rgb16 => picture.to_rgb16().into(),
+        ColorType::Rgba16 => picture.to_rgba16().into(),
+        _ => picture,
+    }
+}
+
+#[test]
+fn encode_info_decode_compare() {
+    let room = Room::new();
+    room.save("a.png", ColorType::Rgb8);
+    let report =
+        room.json(&["encode", "a.png", "a.gip", "--gaussians", "30", "--effort", "1", "--json"]);
+    let bytes = fs::metadata(room.path("a.gip")).expect("written").len();
+    assert_eq!((&report["width"], &report["height"]), (&48.into(), &36.into()));
+    assert_eq!(report["bytes"], bytes);
+    let bpp = report["bpp"].as_f64().expect("a number");
+    assert!((bpp - bytes as f64 * 8.0 / (48.0 * 36.0)).abs() < 1e-9);
+    assert!(report["gaussians"].as_u64().expect("a number") <= 30);
+    for field in ["psnr", "psnr_float", "iterations", "seconds", "peak_memory"] {
+        assert!(report[field].is_number(), "{field}: {report}");
+    }
+    assert!(report["shortfall"].is_null() || report["shortfall"].is_string());
+
+    let info = room.json(&["info", "a.gip", "--json"]);
+    for field in ["width", "height", "gaussians", "bytes", "bpp"] {
+        assert_eq!(info[field], report[field], "{field}");
+    }
+    assert_eq!((&info["color"], &info["depth"]), (&"rgb".into(), &8.into()));
+    for field in ["version", "layers", "kernel", "cutoff", "chart", "base_color", "metadata"] {
+        assert!(!info[field].is_null(), "{field}: {info}");
+    }
+    let chunks = info["chunks"].as_array().expect("an array");
+    let sum: u64 = chunks.iter().map(|c| c["bytes"].as_u64().expect("a number")).sum();
+    assert_eq!(sum + 8, bytes, "the chunks and the signature are the whole file");
+    let components = info["components"].as_array().expect("an array");
+    assert_eq!(components.len(), 8);
+    let sum: u64 = components.iter().map(|c| c["bits"].as_u64().expect("a number")).sum();
+    let bits = &info["bits_per_gaussian"];
+    assert_eq!(bits["total"], sum);
+    let by_attribute = ["position", "shape", "color"].map(|name| bits[name].as_u64().unwrap());
+    assert_eq!(by_attribute.iter().sum::<u64>(), sum);
+
+    room.ok(&["decode", "a.gip", "b.png"]);
+    let decoded = open(&room.path("b.png"));
+    assert_eq!((decoded.width(), decoded.height()), (WIDTH, HEIGHT));
+    assert_eq!(decoded.color(), ColorType::Rgb8);
+
+    // A .gip file compares as what it decodes to.
+    let with_gip = room.json(&["compare", "a.png", "a.gip", "--json"]);
+    assert_eq!(with_gip, room.json(&["compare", "a.png", "b.png", "--json"]));
+    for field in ["psnr", "ms_ssim", "max_abs_error"] {
+        assert!(with_gip[field].is_number(), "{field}: {with_gip}");
+    }
+}
+
+#[test]
+fn prints_for_humans() {
+    let room = Room::new();
+    room.save("a.png", ColorType::L16);
+    let line = room.ok(&["encode", "a.png", "a.gip", "--gaussians", "5", "--effort", "1"]);
+    assert!(line.starts_with("a.gip: 48x36, ") && line.contains(" dB, "), "{line}");
+    let info = room.ok(&["info", "a.gip"]);
+    assert!(info.contains("48x36, gray, 16 bits per sample"), "{info}");
+    assert!(info.contains("chunk GEND"), "{info}");
+    assert_eq!(room.ok(&["compare", "a.gip", "a.gip"]), "identical\n");
+    assert!(room.ok(&["compare", "a.png", "a.gip"]).starts_with("PSNR "));
+}
+
+#[test]
+fn standard_streams() {
+    let room = Room::new();
+    room.save("a.png", ColorType::Rgb8);
+    let source = fs::read(room.path("a.png")).expect("just written");
+    let args = ["encode", "-", "-", "--gaussians", "20", "--effort", "1", "--json"];
+    let encoded = room.pipe(&args, &source);
+    assert!(encoded.status.success());
+    let report: Value = serde_json::from_slice(&encoded.stderr).expect("the report is on stderr");
+    assert_eq!(report["bytes"], encoded.stdout.len());
+    room.encode("a.png", "a.gip");
+    assert_eq!(encoded.stdout, fs::read(room.path("a.gip")).expect("just written"));
+
+    let decoded = room.pipe(&["decode", "-", "-"], &encoded.stdout);
+    assert!(decoded.status.success() && decoded.stderr.is_empty());
+    room.ok(&["decode", "a.gip", "b.png"]);
+    assert_eq!(decoded.stdout, fs::read(room.path("b.png")).expect("just written"));
+
+    let info = room.pipe(&["info", "-"], &encoded.stdout);
+    assert_eq!(text(&info.stdout), room.ok(&["info", "a.gip"]));
+    let compared = room.pipe(&["compare", "-", "b.png"], &encoded.stdout);
+    assert_eq!(text(&compared.stdout), "identical\n");
+    assert!(room.fails(&["compare", "-", "-"]).contains("only one"));
+}
+
+#[test]
+fn color_model_and_depth_are_kept() {
+    let room = Room::new();
+    for (color, model, depth) in [
+        (ColorType::L8, "gray", 8),
+        (ColorType::La8, "gray-alpha", 8),
+        (ColorType::Rgba8, "rgba", 8),
+        (ColorType::L16, "gray", 16),
+        (ColorType::La16, "gray-alpha", 16),
+        (ColorType::Rgb16, "rgb", 16),
+        (ColorType::Rgba16, "rgba", 16),
+    ] {
+        room.gip("a.gip", color);
+        let info = room.json(&["info", "a.gip", "--json"]);
+        assert_eq!((&info["color"], &info["depth"]), (&model.into(), &depth.into()));
+        room.ok(&["decode", "a.gip", "b.png"]);
+        assert_eq!(open(&room.path("b.png")).color(), color);
+    }
+}
+
+#[test]
+fn alpha_is_stored_only_where_there_is_any() {
+    let room = Room::new();
+    for (opaque, model) in [
+        (DynamicImage::from(picture(ColorType::Rgb8).to_rgba8()), "rgb"),
+        (DynamicImage::from(picture(ColorType::L16).to_luma_alpha16()), "gray"),
+    ] {
+        opaque.save(room.path("a.png")).expect("writable");
+        room.encode("a.png", "a.gip");
+        assert_eq!(room.json(&["info", "a.gip", "--json"])["color"], model);
+    }
+}
+
+#[test]
+fn floats_are_stored_as_srgb() {
+    let room = Room::new();
+    let linear = image::Rgb32FImage::from_pixel(20, 20, image::Rgb([0.5, 7.0, f32::NAN]));
+    DynamicImage::from(linear).save(room.path("a.exr")).expect("writable");
+    // sRGB of one half, of more than full, and of what is no number.
+    let stored = image::ImageBuffer::from_pixel(20, 20, image::Rgb([48192_u16, 65535, 0]));
+    DynamicImage::from(stored).save(room.path("b.png")).expect("writable");
+    let comparison = room.json(&["compare", "a.exr", "b.png", "--json"]);
+    assert!(comparison["max_abs_error"].as_u64().expect("a number") <= 1, "{comparison}");
+    room.encode("a.exr", "a.gip");
+    assert_eq!(room.json(&["info", "a.gip", "--json"])["depth"], 16);
+}
+
+#[test]
+fn every_output_format_can_be_read_back() {
+    let room = Room::new();
+    room.gip("gray.gip", ColorType::L16);
+    room.gip("color.gip", ColorType::Rgb16);
+    room.gip("alpha.gip", ColorType::Rgba16);
+    for (name, extension, color) in [
+        ("gray", "png", ColorType::L16),
+        ("gray", "tif", ColorType::L16),
+        ("gray", "pgm", ColorType::L16),
+        ("gray", "pnm", ColorType::L16),
+        ("gray", "pam", ColorType::L16),
+        ("gray", "jpg", ColorType::L8),
+        ("gray", "qoi", ColorType::Rgb8),
+        ("color", "png", ColorType::Rgb16),
+        ("color", "TIFF", ColorType::Rgb16),
+        ("color", "ppm", ColorType::Rgb16),
+        ("color", "pnm", ColorType::Rgb16),
+        ("color", "JPEG", ColorType::Rgb8),
+        ("color", "bmp", ColorType::Rgb8),
+        ("color", "webp", ColorType::Rgb8),
+        ("color", "qoi", ColorType::Rgb8),
+        ("color", "gif", ColorType::Rgba8),
+        ("alpha", "png", ColorType::Rgba16),
+        ("alpha", "tif", ColorType::Rgba16),
+        ("alpha", "pam", ColorType::Rgba16),
+        ("alpha", "ff", ColorType::Rgba16),
+        ("alpha", "webp", ColorType::Rgba8),
+        ("alpha", "tga", ColorType::Rgba8),
+        ("alpha", "ico", ColorType::Rgba8),
+        ("alpha", "bmp", ColorType::Rgba8),
+    ] {
+        let output = format!("{name}.{extension}");
+        room.ok(&["decode", &format!("{name}.gip"), &output]);
+        let decoded = open(&room.path(&output));
+        assert_eq!(decoded.color(), color, "{output}");
+        assert_eq!((decoded.width(), decoded.height()), (WIDTH, HEIGHT), "{output}");
+        if color.bytes_per_pixel() / color.channel_count() == 2 {
+            let compared = room.ok(&["compare", &format!("{name}.gip"), &output]);
+            assert_eq!(compared, "identical\n", "{output}");
+        }
+    }
+    for (input, output, missing) in [
+        ("alpha.gip", "a.jpg", "alpha"),
+        ("alpha.gip", "a.ppm", "alpha"),
+        ("color.gip", "a.pgm", "colour"),
+        ("color.gip", "a", "extension"),
+        ("color.gip", "a.exr", "extension"),
+    ] {
+        let error = room.fails(&["decode", input, output]);
+        assert!(error.contains(missing), "{output}: {error}");
+        assert!(!room.path(output).exists());
+    }
+}
+
+#[test]
+fn sizes_and_regions() {
+    let room = Room::new();
+    room.gip("a.gip", ColorType::Rgb8);
+    let size = |flags: &[&str]| {
+        room.ok(&[&["decode", "a.gip", "b.png"], flags].concat());
+        let decoded = open(&room.path("b.png"));
+        (decoded.width(), decoded.height())
+    };
+    assert_eq!(size(&["--scale", "2"]), (96, 72));
+    assert_eq!(size(&["--scale", "0.3"]), (14, 11));
+    assert_eq!(size(&["--scale", "0.001"]), (1, 1));
+    assert_eq!(size(&["--size", "33x7"]), (33, 7));
+    assert_eq!(size(&["--region", "40,30,8,6"]), (8, 6));
+    assert_eq!(size(&["--scale", "3", "--region", "100,50,44,58"]), (44, 58));
+
+    room.ok(&["decode", "a.gip", "whole.png", "--scale", "3"]);
+    let crop = open(&room.path("whole.png")).crop_imm(100, 50, 44, 58);
+    assert_eq!(open(&room.path("b.png")), crop);
+
+    for flags in [["--region", "41,30,8,6"], ["--size", "4000000000x1"], ["--scale", "1000"]] {
+        let error = room.fails(&["decode", "a.gip", "c.png", flags[0], flags[1]]);
+        assert!(error.contains("region") || error.contains("limit exceeded"), "{error}");
+        assert!(!room.path("c.png").exists());
+    }
+}
+
+#[test]
+fn threads_change_nothing() {
+    let room = Room::new();
+    room.save("a.png", ColorType::Rgb8);
+    for threads in ["1", "2"] {
+        let name = format!("{threads}.gip");
+        let flags = ["--gaussians", "20", "--effort", "1", "--threads", threads];
+        room.ok(&[&["encode", "a.png", &name], &flags[..]].concat());
+        room.ok(&["decode", &name, &format!("{threads}.png"), "--threads", threads]);
+    }
+    for extension in ["gip", "png"] {
+        let read = |threads| fs::read(room.path(&format!("{threads}.{extension}"))).unwrap();
+        assert_eq!(read(1), read(2), "{extension}");
+    }
+}
+
+#[test]
+fn metadata_is_carried_and_orientation_applied_once() {
+    let room = Room::new();
+    let source = room.save("a.png", ColorType::Rgb8);
+    let mut profile = vec![7; 200];
+    profile[16..20].copy_from_slice(b"RGB ");
+    let mut file = Vec::new();
+    let mut png = image::codecs::png::PngEncoder::new(&mut file);
+    png.set_icc_profile(profile.clone()).expect("PNG has profiles");
+    png.set_exif_metadata(EXIF_ROTATE_90.to_vec()).expect("PNG has Exif");
+    source.write_with_encoder(png).expect("writable");
+    fs::write(room.path("turned.png"), file).expect("writable");
+
+    room.encode("turned.png", "a.gip");
+    let info = room.json(&["info", "a.gip", "--json"]);
+    assert_eq!((&info["width"], &info["height"]), (&HEIGHT.into(), &WIDTH.into()));
+    assert_eq!(info["metadata"]["icc_profile"], 200);
+    assert_eq!(info["metadata"]["exif"], EXIF_ROTATE_90.len());
+
+    for name in ["b.png", "b.jpg", "b.webp"] {
+        room.ok(&["decode", "a.gip", name]);
+        let reader = ImageReader::open(room.path(name)).unwrap();
+        let mut decoder = reader.into_decoder().unwrap();
+        assert_eq!(decoder.dimensions(), (HEIGHT, WIDTH), "{name}");
+        assert_eq!(decoder.icc_profile().unwrap().as_ref(), Some(&profile), "{name}");
+        let exif = decoder.exif_metadata().unwrap().expect("carried");
+        assert_eq!(Orientation::from_exif_chunk(&exif), Some(Orientation::NoTransforms), "{name}");
+    }
+    // Turned by hand, it is the same picture.
+    source.rotate90().save(room.path("upright.png")).unwrap();
+    assert_eq!(room.ok(&["compare", "turned.png", "upright.png"]), "identical\n");
+}
+
+#[test]
+fn a_profile_for_another_color_space_is_dropped() {
+    let room = Room::new();
+    let mut profile = vec![7; 200];
+    profile[16..20].copy_from_slice(b"CMYK");
+    let mut file = Vec::new();
+    let mut png = image::codecs::png::PngEncoder::new(&mut file);
+    png.set_icc_profile(profile).expect("PNG has profiles");
+    picture(ColorType::Rgb8).write_with_encoder(png).expect("writable");
+    fs::write(room.path("a.png"), file).expect("writable");
+    room.encode("a.png", "a.gip");
+    assert!(room.json(&["info", "a.gip", "--json"])["metadata"]["icc_profile"].is_null());
+}
+
+#[test]
+fn comparison_meets_at_the_richer_picture() {
+    let room = Room::new();
+    let gray = room.save("gray.png", ColorType::L8);
+    DynamicImage::from(gray.to_rgb8()).save(room.path("rgb.png")).unwrap();
+    DynamicImage::from(gray.to_rgba16()).save(room.path("rgba16.png")).unwrap();
+    for (b, channels, depth) in [("gray.png", 1, 8), ("rgb.png", 3, 8), ("rgba16.png", 4, 16)] {
+        let comparison = room.json(&["compare", "gray.png", b, "--json"]);
+        assert_eq!(comparison["psnr"], 999.0);
+        assert_eq!(comparison["ms_ssim"], 1.0);
+        assert_eq!(comparison["max_abs_error"], 0);
+        assert_eq!(
+            (&comparison["channels"], &comparison["depth"]),
+            (&channels.into(), &depth.into())
+        );
+    }
+
+    let mut changed = gray.to_luma8();
+    changed.get_pixel_mut(3, 4).0[0] += 51;
+    changed.save(room.path("changed.png")).unwrap();
+    let comparison = room.json(&["compare", "gray.png", "changed.png", "--json"]);
+    let expected = 10.0 * (25.0 * f64::from(WIDTH * HEIGHT)).log10();
+    assert!((comparison["psnr"].as_f64().expect("a number") - expected).abs() < 1e-9);
+    assert_eq!(comparison["max_abs_error"], 51);
+
+    gray.crop_imm(0, 0, WIDTH, 8).save(room.path("small.png")).unwrap();
+    assert!(room.fails(&["compare", "gray.png", "small.png"]).contains("48x36 and 48x8"));
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    let room = Room::new();
+    room.save("a.png", ColorType::L8);
+    let encode = ["encode", "a.png", "a.gip"];
+    let decode = ["decode", "a.gip", "b.png"];
+    for (command, flags, allowed) in [
+        (&[][..], &[][..], "subcommand"),
+        (&["frobnicate"], &[], "unrecognized"),
+        (&["encode", "a.png"], &[], "OUTPUT"),
+        (&encode, &["--effort", "0"], "1..=9"),
+        (&encode, &["--effort", "10"], "1..=9"),
+        (&encode, &["--psnr", "-3"], "from 1 to 120"),
+        (&encode, &["--psnr", "NaN"], "from 1 to 120"),
+        (&encode, &["--psnr", "inf"], "from 1 to 120"),
+        (&encode, &["--bpp", "0"], "from 0.0001 to 1000"),
+        (&encode, &["--quality", "101"], "from 0 to 100"),
+        (&encode, &["--size", "0"], "1.."),
+        (&encode, &["--gaussians", "-5"], "1..=4194304"),
+        (&encode, &["--gaussians", "5", "--bpp", "1"], "cannot be used with"),
+        (&encode, &["--size", "5000", "--quality", "60"], "cannot be used with"),
+        (&encode, &["--precision", "f16"], "f32, packed"),
+        (&encode, &["--threads", "0"], "1..=1024"),
+        (&decode, &["--scale", "0"], "from 0.001 to 1000"),
+        (&decode, &["--size", "640"], "640x480"),
+        (&decode, &["--scale", "2", "--size", "6x4"], "cannot be used with"),
+        (&decode, &["--region", "1,2,3"], "X,Y,W,H"),
+    ] {
+        let args = [command, flags].concat();
+        let output = room.run(&args);
+        let error = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
+        assert!(error.starts_with("error: ") && error.contains(allowed), "{args:?}: {error}");
+        assert!(output.stdout.is_empty(), "{args:?}");
+    }
+    assert_eq!(room.names(), ["a.png"], "nothing was written");
+}
+
+#[test]
+fn failures_leave_no_output() {
+    let room = Room::new();
+    room.save("a.png", ColorType::Rgb8);
+    let png = fs::read(room.path("a.png")).expect("just written");
+    let mut corrupt = png.clone();
+    let middle = corrupt.len() / 2;
+    corrupt[middle] ^= 0xFF;
+    fs::write(room.path("corrupt.png"), corrupt).expect("writable");
+    fs::write(room.path("short.png"), &png[..png.len() / 2]).expect("writable");
+    fs::write(room.path("text.png"), "not a picture").expect("writable");
+    room.encode("a.png", "a.gip");
+    let gip = fs::read(room.path("a.gip")).expect("just written");
+    fs::write(room.path("short.gip"), &gip[..gip.len() - 5]).expect("writable");
+    fs::write(room.path("kept"), "precious").expect("writable");
+    fs::write(room.path("kept.png"), "precious").expect("writable");
+    let before = room.names();
+
+    for input in ["corrupt.png", "short.png", "text.png", "missing.png", "short.gip"] {
+        for output in ["new", "kept"] {
+            let error = room.fails(&["encode", input, output, "--effort", "1"]);
+            assert!(error.contains(input), "{error}");
+        }
+    }
+    for input in ["short.gip", "a.png", "missing.gip"] {
+        for output in ["new.png", "kept.png"] {
+            let error = room.fails(&["decode", input, output]);
+            assert!(error.contains(input), "{error}");
+        }
+        room.fails(&["info", input]);
+    }
+    assert!(room.fails(&["encode", "a.png", "nowhere/a.gip"]).contains("no directory nowhere"));
+    assert!(room.fails(&["encode", "a.png", "."]).contains("is a directory"));
+    room.fails(&["compare", "a.png", "corrupt.png"]);
+
+    assert_eq!(room.names(), before, "nothing new, no temporary file");
+    for kept in ["kept", "kept.png"] {
+        assert_eq!(fs::read(room.path(kept)).expect("kept"), b"precious");
+    }
+}
+
+#[test]
+fn existing_output_is_replaced_with_its_permissions() {
+    let room = Room::new();
+    room.save("a.png", ColorType::L8);
+    fs::write(room.path("a.gip"), "old").expect("writable");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = fs::Permissions::from_mode(0o640);
+        fs::set_permissions(room.path("a.gip"), mode).expect("our file");
+        std::os::unix::fs::symlink("a.gip", room.path("link.gip")).expect("links are supported");
+        room.encode("a.png", "link.gip");
+        assert!(room.path("link.gip").is_symlink(), "the link stays");
+        let mode = fs::metadata(room.path("a.gip")).expect("written").permissions().mode();
+        assert_eq!(mode & 0o777, 0o640);
+    }
+    room.encode("a.png", "a.gip");
+    room.ok(&["info", "a.gip"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn devices_are_written_to_not_replaced() {
+    let room = Room::new();
+    room.save("a.png", ColorType::L8);
+    room.encode("a.png", "a.gip");
+    room.encode("a.png", "/dev/null");
+    assert!(!Path::new("/dev/null").is_file());
+    let args = ["encode", "a.png", "/dev/stdout", "--gaussians", "20", "--effort", "1"];
+    assert_eq!(room.run(&args).stdout, fs::read(room.path("a.gip")).expect("just written"));
+}
+
+#[test]
+fn partial_files_are_shown_on_request() {
+    let room = Room::new();
+    room.gip("a.gip", ColorType::Rgb8);
+    let gip = fs::read(room.path("a.gip")).expect("just written");
+    fs::write(room.path("short.gip"), &gip[..gip.len() - 20]).expect("writable");
+    let args = ["decode", "short.gip", "b.png", "--allow-partial"];
+    let output = room.run(&args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let warning = text(&output.stderr);
+    assert!(warning.starts_with("warning: short.gip: ") && warning.lines().count() == 1);
+    assert_eq!(open(&room.path("b.png")).width(), WIDTH);
+
+    // Without a header there is nothing to show.
+    fs::write(room.path("stub.gip"), &gip[..20]).expect("writable");
+    room.fails(&["decode", "stub.gip", "c.png", "--allow-partial"]);
+    // A whole file is not warned about.
+    let output = room.run(&["decode", "a.gip", "d.png", "--allow-partial"]);
+    assert!(output.status.success() && output.stderr.is_empty());
+}
+
+#[test]
+fn help_names_every_flag() {
+    let room = Room::new();
+    assert!(room.ok(&["--help"]).contains("gip encode photo.jpg photo.gip"));
+    for (command, flags) in [
+        (
+            "encode",
+            &[
+                "--gaussians",
+                "--bpp",
+                "--size",
+                "--psnr",
+                "--quality",
+                "--effort",
+                "--precision",
+                "--seed",
+                "--threads",
+                "--json",
+            ][..],
+        ),
+        ("decode", &["--scale", "--size", "--region", "--allow-partial", "--threads"]),
+        ("info", &["--json"]),
+        ("compare", &["--json", "999"]),
+    ] {
+        let help = room.ok(&[command, "--help"]);
+        for flag in flags {
+            assert!(help.contains(flag), "{command} {flag}");
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! The encoder through its public interface: what it promises about files, targets and hard
+//! pictures.
+#![cfg(feature = "encode")]
+
+use std::ops::ControlFlow;
+
+use image_gip::training::{
+    Distortion, Filter, NewColor, NewShape, Placement, Portion, Schedule, Training, Units,
+};
+use image_gip::{
+    Chart, ColorModel, EncodeError, Encoded, Encoder, Gaussian, Kernel, Limits, Metadata,
+    Precision, RenderOptions, SampleDepth, Source, StreamDecoder, Target, Text,
+};
+
+const COLORS: [ColorModel; 4] =
+    [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+
+/// A picture with ramps, edges and texture: no format finds it trivial.
+fn scene(width: u32, height: u32, channels: usize) -> Vec<u8> {
+    let mut samples = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
+            let ramp = 0.2 + 0.6 * u;
+            let disc = if (u - 0.6).hypot(v - 0.4) < 0.2 { 0.5 } else { 0.0 };
+            let wave = 0.15 * (40.0 * u * v).sin();
+            for channel in 0..channels {
+                let tint = 1.0 - 0.2 * channel as f32;
+                let value = (ramp * tint + disc * (1.0 - tint) + wave) * 255.0;
+                samples.push(value.clamp(0.0, 255.0) as u8);
+            }
+        }
+    }
+    samples
+}
+
+/// Pseudo-random samples.
+fn noise(count: usize) -> Vec<u8> {
+    let mut state = 1_u32;
+    let next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    };
+    std::iter::repeat_with(next).take(count).collect()
+}
+
+/// An encoder quick enough for tests.
+fn quick(target: Target) -> Encoder {
+    Encoder::new().with_effort(1).with_target(target)
+}
+
+fn decode(bytes: &[u8]) -> StreamDecoder {
+    let mut stream = StreamDecoder::with_limits(Limits::default());
+    stream.feed(bytes).expect("the decoder reads what the encoder writes");
+    stream.finish().expect("the file is whole");
+    stream
+}
+
+fn pixels_u8(stream: &StreamDecoder) -> Vec<u8> {
+    let picture = stream.picture().expect("the header was read");
+    let options = RenderOptions::new();
+    let mut out = vec![0; options.output_len(picture.header()).expect("small")];
+    picture.render_u8(&options, &mut out).expect("within limits");
+    out
+}
+
+fn psnr_u8(a: &[u8], b: &[u8]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let squares: u64 = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
+    10.0 * (255.0 * 255.0 / (squares as f64 / a.len() as f64)).log10()
+}
+
+/// Checks what every file must hold, and returns the decoder.
+fn check(encoded: &Encoded, source: &[u8]) -> StreamDecoder {
+    let stream = decode(&encoded.bytes);
+    assert_eq!(stream.header().expect("read").gaussians, encoded.report.gaussians);
+    assert!(stream.gaussians().iter().all(Gaussian::is_drawable), "a Gaussian is lost");
+    let psnr = psnr_u8(&pixels_u8(&stream), source);
+    assert_eq!(psnr, encoded.report.psnr, "the reported PSNR is that of the file");
+    assert!(encoded.report.peak_memory > 0);
+    stream
+}
+
+#[test]
+fn reported_figures_are_those_of_the_file() {
+    for color in COLORS {
+        let samples = scene(61, 45, color.channels());
+        let source = Source::new_u8(61, 45, color, &samples).expect("sizes agree");
+        for precision in [Precision::Float, Precision::Packed] {
+            let encoder = quick(Target::Gaussians(120)).with_precision(precision);
+            let encoded = encoder.encode(&source).expect("it encodes");
+            let stream = check(&encoded, &samples);
+            let report = &encoded.report;
+            assert!(report.gaussians > 100 && report.gaussians <= 120, "{}", report.gaussians);
+            assert!(report.psnr > 24.0, "{color:?} {precision:?}: {} dB", report.psnr);
+            // Rounding to 8 bits alone leaves 58.9 dB, and may cost 0.3 dB of 47.
+            let rounded = -10.0 * (10_f64.powf(-report.psnr_float / 10.0) + 1.28e-6).log10();
+            assert!((report.psnr - rounded).abs() < 0.3, "{report:?}");
+            assert_eq!(report.iterations, 75);
+            let bits: u32 = stream.quantizers().iter().map(|q| u32::from(q.bits())).sum();
+            let channels = color.channels() as u32;
+            match precision {
+                Precision::Float => assert_eq!(bits, 32 * (5 + channels)),
+                _ => assert_eq!(bits, 24 + 30 + 6 * channels),
+            }
+        }
+    }
+}
+
+#[test]
+fn sixteen_bits_are_kept() {
+    let samples: Vec<u16> = (0..64 * 48).map(|i| (i % 64 * 1000 + i / 64 * 37) as u16).collect();
+    let source = Source::new_u16(64, 48, ColorModel::Gray, &samples).expect("sizes agree");
+    let encoder = quick(Target::Gaussians(100)).with_effort(3).with_precision(Precision::Float);
+    let encoded = encoder.encode(&source).expect("it encodes");
+    let stream = decode(&encoded.bytes);
+    assert_eq!(stream.header().expect("read").depth, SampleDepth::Sixteen);
+    let mut out = vec![0; samples.len()];
+    let picture = stream.picture().expect("read");
+    picture.render_u16(&RenderOptions::new(), &mut out).expect("within limits");
+    let squares: u64 =
+        out.iter().zip(&samples).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
+    let psnr = 10.0 * (65535.0 * 65535.0 / (squares as f64 / out.len() as f64)).log10();
+    assert_eq!(psnr, encoded.report.psnr);
+    assert!(psnr > 40.0, "{psnr} dB");
+    // A smooth ramp must not come back in steps of eight bits.
+    assert!(out.iter().any(|value| value % 257 != 0));
+}
+
+#[test]
+fn the_file_does_not_depend_on_threads_but_on_the_seed() {
+    let samples = scene(90, 70, 3);
+    let source = Source::new_u8(90, 70, ColorModel::Rgb, &samples).expect("sizes agree");
+    let encode = |threads, seed| {
+        let encoder = quick(Target::Gaussians(300)).with_threads(threads).with_seed(seed);
+        encoder.encode(&source).expect("it encodes").bytes
+    };
+    let one = encode(Some(1), 7);
+    assert_eq!(one, encode(Some(2), 7));
+    assert_eq!(one, encode(Some(5), 7));
+    assert_eq!(one, encode(None, 7));
+    assert_ne!(one, encode(Some(1), 8));
+}
+
+#[test]
+fn sizes_and_rates_are_met_within_one_percent() {
+    let samples = scene(128, 96, 3);
+    let source = Source::new_u8(128, 96, ColorModel::Rgb, &samples).expect("sizes agree");
+    for (target, bytes) in [
+        (Target::Bytes(2000), 2000.0),
+        (Target::Bytes(5001), 5001.0),
+        (Target::BitsPerPixel(1.5), 1.5 * 128.0 * 96.0 / 8.0),
+    ] {
+        let encoded = quick(target).encode(&source).expect("it encodes");
+        check(&encoded, &samples);
+        assert_eq!(encoded.report.shortfall, None, "{target:?}");
+        let ratio = encoded.bytes.len() as f64 / bytes;
+        assert!((0.99..=1.0).contains(&ratio), "{target:?}: {} bytes", encoded.bytes.len());
+    }
+    let error = quick(Target::Bytes(20)).encode(&source).expect_err("no file is that small");
+    assert!(error.to_string().contains("at least"), "{error}");
+}
+
+#[test]
+fn a_psnr_is_met_within_a_twentieth_of_a_decibel() {
+    let samples = scene(96, 80, 3);
+    let source = Source::new_u8(96, 80, ColorModel::Rgb, &samples).expect("sizes agree");
+    for precision in [Precision::Float, Precision::Packed] {
+        let encoder = quick(Target::Psnr(36.0)).with_effort(2).with_precision(precision);
+        let encoded = encoder.encode(&source).expect("it encodes");
+        check(&encoded, &samples);
+        let psnr = encoded.report.psnr;
+        assert_eq!(encoded.report.shortfall, None, "{psnr} dB");
+        assert!((36.0..36.05).contains(&psnr), "{precision:?}: {psnr} dB");
+    }
+    // Noise at a PSNR that nothing but a copy has.
+    let samples = noise(24 * 24);
+    let source = Source::new_u8(24, 24, ColorModel::Gray, &samples).expect("sizes agree");
+    let encoded = quick(Target::Psnr(60.0)).encode(&source).expect("it encodes");
+    check(&encoded, &samples);
+    assert!(encoded.report.shortfall.is_some_and(|text| text.contains("dB")));
+}
+
+#[test]
+fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
+    let count = |samples: &[u8], target| {
+        let source = Source::new_u8(96, 64, ColorModel::Rgb, samples).expect("sizes agree");
+        quick(target).encode(&source).expect("it encodes").report.gaussians
+    };
+    let picture = scene(96, 64, 3);
+    let counts = [0.0, 30.0, 60.0, 90.0].map(|q| count(&picture, Target::Quality(q)));
+    assert!(counts.is_sorted() && counts[0] < counts[3], "{counts:?}");
+    assert_eq!(count(&picture, Target::Auto), count(&picture, Target::Quality(50.0)));
+    // Whatever is asked for, a flat picture has nothing to model.
+    assert_eq!(count(&[77; 96 * 64 * 3], Target::Auto), 0);
+    assert_eq!(count(&[77; 96 * 64 * 3], Target::Gaussians(5000)), 0);
+    let ramp: Vec<u8> = (0..96 * 64 * 3).map(|i| (40 + i / 3 % 96) as u8).collect();
+    let (simple, busy) = (count(&ramp, Target::Auto), count(&noise(96 * 64 * 3), Target::Auto));
+    assert!(simple < 60 && simple * 3 < busy, "{simple} against {busy}");
+}
+
+#[test]
+fn hard_pictures_become_sound_files() {
+    let checkers: Vec<u8> = (0..64 * 64).map(|i| ((i + i / 64) % 2 * 255) as u8).collect();
+    let mut impulse = vec![0; 64 * 64];
+    impulse[20 * 64 + 30] = 255;
+    let ramp: Vec<u8> = (0..256 * 16).map(|i| (i % 256) as u8).collect();
+    let text: Vec<u8> =
+        (0..64 * 64).map(|i| if (i % 7 < 2) ^ (i / 64 % 5 < 1) { 0 } else { 255 }).collect();
+    let binary_alpha: Vec<u8> = (0..48 * 48)
+        .flat_map(|i| [200, 30, 90, if (i % 48) + i / 48 < 48 { 255 } else { 0 }])
+        .collect();
+    let soft_alpha: Vec<u8> = (0..48 * 48).flat_map(|i| [120, (i % 48 * 5) as u8]).collect();
+    let cases: [(&str, u32, u32, ColorModel, Vec<u8>); 14] = [
+        ("1x1", 1, 1, ColorModel::Rgb, vec![9, 200, 31]),
+        ("2x1", 2, 1, ColorModel::Rgba, vec![0, 0, 0, 0, 255, 255, 255, 255]),
+        ("1xN", 1, 300, ColorModel::Gray, noise(300)),
+        ("Nx1", 300, 1, ColorModel::Gray, noise(300)),
+        ("wide", 2048, 4, ColorModel::Gray, scene(2048, 4, 1)),
+        ("black", 33, 17, ColorModel::Rgb, vec![0; 33 * 17 * 3]),
+        ("white", 33, 17, ColorModel::Rgb, vec![255; 33 * 17 * 3]),
+        ("impulse", 64, 64, ColorModel::Gray, impulse),
+        ("checkers", 64, 64, ColorModel::Gray, checkers),
+        ("ramp", 256, 16, ColorModel::Gray, ramp),
+        ("noise", 40, 40, ColorModel::Rgb, noise(40 * 40 * 3)),
+        ("text", 64, 64, ColorModel::Gray, text),
+        ("binary alpha", 48, 48, ColorModel::Rgba, binary_alpha),
+        ("soft alpha", 48, 48, ColorModel::GrayAlpha, soft_alpha),
+    ];
+    for (name, width, height, color, samples) in cases {
+        let source = Source::new_u8(width, height, color, &samples).expect("sizes agree");
+        for target in [Target::Auto, Target::Gaussians(50), Target::Gaussians(100_000)] {
+            // A fit of one Gaussian per pixel takes long on all but the smallest.
+            if target == Target::Gaussians(100_000) && samples.len() > 2000 {
+                continue;
+            }
+            for precision in [Precision::Float, Precision::Packed] {
+                let encoder = quick(target).with_precision(precision);
+                let encoded = encoder.encode(&source).expect("it encodes");
+                let stream = check(&encoded, &samples);
+                assert!(
+                    u64::from(encoded.report.gaussians) <= u64::from(width) * u64::from(height)
+                );
+                let report = &encoded.report;
+                let least =
+                    if matches!(name, "1x1" | "black" | "white") { f64::INFINITY } else { 5.0 };
+                assert!(report.psnr >= least, "{name} {target:?} {precision:?}: {}", report.psnr);
+                assert_eq!(stream.header().expect("read").width, width);
+            }
+        }
+    }
+}
+
+#[test]
+fn one_bright_pixel_is_found() {
+    let mut samples = vec![20; 64 * 48];
+    samples[17 * 64 + 40] = 255;
+    let source = Source::new_u8(64, 48, ColorModel::Gray, &samples).expect("sizes agree");
+    let encoder = quick(Target::Gaussians(8)).with_effort(5).with_precision(Precision::Float);
+    let encoded = encoder.encode(&source).expect("it encodes");
+    let out = pixels_u8(&check(&encoded, &samples));
+    assert!(out[17 * 64 + 40] > 150, "{}", out[17 * 64 + 40]);
+}
+
+#[test]
+fn a_prefix_of_the_file_already_shows_the_picture() {
+    let samples = scene(128, 96, 3);
+    let source = Source::new_u8(128, 96, ColorModel::Rgb, &samples).expect("sizes agree");
+    let encoder = Encoder::new().with_effort(2).with_target(Target::Gaussians(800));
+    let encoded = encoder.encode(&source).expect("it encodes");
+    let shown = |bytes: usize| {
+        let mut stream = StreamDecoder::new();
+        stream.feed(&encoded.bytes[..bytes]).expect("a prefix is sound");
+        psnr_u8(&pixels_u8(&stream), &samples)
+    };
+    let steps = [200, encoded.bytes.len() / 4, encoded.bytes.len() / 2, encoded.bytes.len()];
+    let psnr = steps.map(shown);
+    assert!(psnr[1] > psnr[0] + 3.0 && psnr[3] > psnr[2], "{psnr:?}");
+    assert_eq!(psnr[3], encoded.report.psnr);
+}
+
+#[test]
+fn every_published_variant_trains() {
+    let samples = scene(80, 60, 3);
+    let source = Source::new_u8(80, 60, ColorModel::Rgb, &samples).expect("sizes agree");
+    let mut paper = Training::paper();
+    paper.iterations = 400;
+    paper.densification.prune_interval = 20;
+    // The published rate is meant for 50,000 iterations.
+    paper.optimizer.center = 0.1;
+    paper.optimizer.shape = 0.1;
+    let mut trainings = vec![paper.clone()];
+    for chart in [Chart::Covariance, Chart::Cholesky, Chart::RotationScale] {
+        // GaussianImage: all Gaussians at once, a constant filter.
+        let mut training = paper.clone();
+        training.parameterization = chart;
+        training.densification.initial = 1.0;
+        training.filter = Filter::Constant(0.5);
+        trainings.push(training);
+        let mut training = Training::fast(100);
+        training.parameterization = chart;
+        training.kernel = Kernel::PAPER;
+        trainings.push(training);
+    }
+    for portion in [Portion::Even, Portion::Half, Portion::Fixed(20)] {
+        for color in [NewColor::Zero, NewColor::Source] {
+            let mut training = Training::fast(60);
+            training.densification.portion = portion;
+            training.densification.color = color;
+            training.densification.shape = NewShape::Random;
+            training.densification.distortion = Distortion::L1;
+            training.densification.placement = Placement::Top;
+            training.optimizer.schedule = Schedule::Halving(40);
+            training.optimizer.units = Units::Relative;
+            trainings.push(training);
+        }
+    }
+    for training in trainings {
+        for precision in [Precision::Float, Precision::Packed] {
+            let encoder = Encoder::new()
+                .with_target(Target::Gaussians(150))
+                .with_precision(precision)
+                .with_training(training.clone());
+            let encoded = encoder.encode(&source).expect("it encodes");
+            let stream = check(&encoded, &samples);
+            assert_eq!(stream.header().expect("read").chart, training.parameterization);
+            assert!(encoded.report.psnr > 14.0, "{} dB: {training:?}", encoded.report.psnr);
+        }
+    }
+}
+
+#[test]
+fn options_out_of_range_are_refused_with_what_is_allowed() {
+    let samples = [0; 12];
+    let source = Source::new_u8(2, 2, ColorModel::Rgb, &samples).expect("sizes agree");
+    let mut training = Training::fast(10);
+    training.quantization.color_bits = 17;
+    let long = Text { keyword: "k".repeat(80), text: String::new() };
+    let mut metadata = Metadata::default();
+    metadata.texts.push(long);
+    let cases = [
+        (Encoder::new().with_effort(0), "1 to 9"),
+        (Encoder::new().with_effort(10), "1 to 9"),
+        (Encoder::new().with_threads(Some(0)), "1 to 1024"),
+        (Encoder::new().with_target(Target::Gaussians(0)), "1 to"),
+        (Encoder::new().with_target(Target::Psnr(f64::NAN)), "1 to 120"),
+        (Encoder::new().with_target(Target::Psnr(-3.0)), "1 to 120"),
+        (Encoder::new().with_target(Target::BitsPerPixel(f64::INFINITY)), "bits per pixel"),
+        (Encoder::new().with_target(Target::BitsPerPixel(0.0)), "bits per pixel"),
+        (Encoder::new().with_target(Target::Quality(101.0)), "0 to 100"),
+        (Encoder::new().with_target(Target::Bytes(0)), "size"),
+        (Encoder::new().with_training(training), "1 to 16"),
+        (Encoder::new().with_metadata(metadata), "1 to 79"),
+    ];
+    for (encoder, allowed) in cases {
+        let error = encoder.encode(&source).expect_err("out of range");
+        assert!(matches!(error, EncodeError::Option(_)), "{error:?}");
+        assert!(error.to_string().contains(allowed), "{error}");
+    }
+    for (width, height, count) in [(0, 1, 0), (1, 0, 0), (2, 2, 11), ((1 << 20) + 1, 1, 3)] {
+        let samples = vec![0; count];
+        let error = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect_err("wrong");
+        assert!(matches!(error, EncodeError::Source(_)));
+    }
+}
+
+#[test]
+fn progress_is_told_and_may_cancel() {
+    let samples = scene(64, 64, 3);
+    let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("sizes agree");
+    let mut seen = Vec::new();
+    let encoder = quick(Target::Gaussians(100));
+    let encoded = encoder.encode_with(&source, &mut |progress| {
+        assert!(progress.iteration < progress.iterations);
+        seen.push((progress.iteration, progress.gaussians));
+        ControlFlow::Continue(())
+    });
+    assert_eq!(seen.len() as u32, encoded.expect("it encodes").report.iterations);
+    assert!(seen.is_sorted_by_key(|(iteration, _)| *iteration));
+    assert!(seen.last().expect("not empty").1 > seen[0].1);
+    let mut calls = 0;
+    let error = encoder.encode_with(&source, &mut |_| {
+        calls += 1;
+        if calls == 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(error, Err(EncodeError::Cancelled)));
+    assert_eq!(calls, 5);
+}
+
+#[test]
+fn metadata_is_carried() {
+    let samples = scene(16, 16, 3);
+    let source = Source::new_u8(16, 16, ColorModel::Rgb, &samples).expect("sizes agree");
+    let mut metadata = Metadata::default();
+    metadata.icc_profile = Some(vec![1, 2, 3]);
+    metadata.exif = Some(b"II*\0".to_vec());
+    metadata.xmp = Some(b"<x/>".to_vec());
+    metadata.texts.push(Text { keyword: "Title".into(), text: "Gr\u{fc}n".into() });
+    metadata.texts.push(Text { keyword: "Title".into(), text: String::new() });
+    let encoder = quick(Target::Gaussians(10)).with_metadata(metadata.clone());
+    let encoded = encoder.encode(&source).expect("it encodes");
+    assert_eq!(decode(&encoded.bytes).metadata(), &metadata);
+}
