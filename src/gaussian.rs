@@ -138,6 +138,7 @@ impl Chart {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::config;
     use proptest::prelude::*;
 
     /// The covariance that a chart's values stand for, in f64.
@@ -155,6 +156,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(config(200))]
+
         #[test]
         fn every_chart_yields_its_covariance(
             s1 in 0.01_f32..1000.0, s2 in 0.01_f32..1000.0, angle in -7.0_f32..7.0,

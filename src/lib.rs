@@ -90,6 +90,8 @@ pub mod metrics;
 mod quantizer;
 #[cfg(feature = "decode")]
 mod render;
+#[cfg(all(test, feature = "decode"))]
+mod testing;
 
 #[cfg(all(feature = "encode", feature = "image"))]
 pub use crate::image::GipEncoder;

@@ -68,9 +68,12 @@ impl BitWriter {
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::*;
+    use crate::testing::config;
     use proptest::prelude::*;
 
     proptest! {
+        #![proptest_config(config(200))]
+
         #[test]
         fn any_fields_round_trip_through_any_slicing(
             fields in prop::collection::vec((any::<u32>(), 1_u32..=32), 0..200),

@@ -180,6 +180,7 @@ mod tests {
 
     use super::*;
     use crate::gaussian::Gaussian;
+    use crate::testing::config;
 
     const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
 
@@ -189,7 +190,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(128))]
+        #![proptest_config(config(128))]
 
         #[test]
         fn shapes_survive_the_way_through_every_chart(

@@ -225,6 +225,7 @@ mod tests {
 
     use super::*;
     use crate::encode::training::Training;
+    use crate::testing::config;
 
     const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
 
@@ -253,7 +254,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(config(24))]
 
         #[test]
         fn no_gaussian_is_lost_by_rounding(seed: u64, shape_bits in 2_u8..=12, drift in -30..30) {
