@@ -324,7 +324,7 @@ impl StreamDecoder {
     fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
         self.limits.check_size(header.width, header.height)?;
         self.limits.check_gaussians(header.gaussians)?;
-        self.limits.check_memory(growing::<Gaussian>(header.gaussians))
+        self.limits.check_memory(self.metadata.size() + growing::<Gaussian>(header.gaussians))
     }
 
     fn count(&mut self, kind: ChunkType, length: u32) {

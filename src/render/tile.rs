@@ -145,11 +145,11 @@ mod simd {
 mod tests {
     use fearless_simd::{Level, Simd};
     use proptest::prelude::*;
-    use proptest::test_runner::RngSeed;
 
     use super::*;
     use crate::gaussian::Gaussian;
     use crate::render::view::{Region, View};
+    use crate::testing::config;
 
     /// Every level that this machine has, not only its best.
     fn levels() -> Vec<Level> {
@@ -193,12 +193,8 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig {
-            cases: 200,
-            failure_persistence: None,
-            rng_seed: RngSeed::Fixed(1),
-            ..ProptestConfig::default()
-        })]
+        #![proptest_config(config(200))]
+
         #[test]
         fn every_simd_level_gives_the_bits_of_the_reference(
             shapes in prop::collection::vec(
