@@ -40,7 +40,7 @@ impl AnyTarget {
             Self::Auto => Target::Auto,
             Self::Gaussians(count) => Target::Gaussians(u32::from(1 + count % 32)),
             Self::Bytes(bytes) => Target::Bytes(1 + u64::from(bytes % 1024)),
-            Self::BitsPerPixel(rate) => Target::BitsPerPixel(f64::from(1 + rate) / 16.0),
+            Self::BitsPerPixel(rate) => Target::BitsPerPixel((f64::from(rate) + 1.0) / 16.0),
             Self::Psnr(psnr) => Target::Psnr(f64::from(10 + psnr % 30)),
             Self::Quality(quality) => Target::Quality(f64::from(quality % 101)),
         }
