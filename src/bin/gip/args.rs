@@ -194,7 +194,7 @@ pub(crate) struct Info {
 ///
 /// Each may be a .gip file or any picture that `gip encode` reads. Their sizes must agree. They
 /// are compared with the channels and the depth of the richer one: gray is expanded to RGB,
-/// missing alpha is opaque, 8 bits become 16. PSNR and the largest error are over all samples of
+/// missing alpha is opaque (and an opaque one does not count), 8 bits become 16. PSNR and the largest error are over all samples of
 /// all channels; MS-SSIM is the mean over the channels, on up to five scales as the size allows.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Compare {

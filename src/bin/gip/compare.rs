@@ -21,6 +21,9 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
         let ((w, h), (v, g)) = (size(&a), size(&b));
         bail!("the sizes differ: {w}x{h} and {v}x{g}");
     }
+    // An opaque alpha channel is as good as none, and `encode` stores none.
+    a.drop_opaque_alpha();
+    b.drop_opaque_alpha();
     let color = widest(a.color(), b.color());
     let depth = if a.depth().bits() > b.depth().bits() { a.depth() } else { b.depth() };
     a.convert(color, depth);
