@@ -430,7 +430,7 @@ fn comparison_meets_at_the_richer_picture() {
     let gray = room.save("gray.png", ColorType::L8);
     DynamicImage::from(gray.to_rgb8()).save(room.path("rgb.png")).unwrap();
     DynamicImage::from(gray.to_rgba16()).save(room.path("rgba16.png")).unwrap();
-    for (b, channels, depth) in [("gray.png", 1, 8), ("rgb.png", 3, 8), ("rgba16.png", 4, 16)] {
+    for (b, channels, depth) in [("gray.png", 1, 8), ("rgb.png", 3, 8), ("rgba16.png", 3, 16)] {
         let comparison = room.json(&["compare", "gray.png", b, "--json"]);
         assert_eq!(comparison["psnr"], 999.0);
         assert_eq!(comparison["ms_ssim"], 1.0);
