@@ -32,7 +32,7 @@ const MAX_CHUNK_KINDS: usize = 64;
 ///     decoder.feed(&next_piece())?;
 ///     if let Some(picture) = decoder.picture() {
 ///         let options = RenderOptions::new();
-///         let mut pixels = vec![0; options.output_len(picture.header()).unwrap()];
+///         let mut pixels = vec![0; picture.output_len(&options)?];
 ///         picture.render_u8(&options, &mut pixels)?;
 ///     }
 /// }

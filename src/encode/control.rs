@@ -49,7 +49,7 @@ pub(crate) fn encode(
     let mut file = layout.write(&fit.fitted());
     for _ in 0..MAX_ROUNDS {
         let more = missing(encoder.target, budget, &file, source, &fit);
-        let more = more.min(raster.pixels().saturating_sub(fit.len()));
+        let more = more.min(fit.most().saturating_sub(fit.len()));
         if more == 0 {
             break;
         }

@@ -10,6 +10,7 @@ use super::densify::{Site, USELESS_COLOR};
 use super::gradient::{Pass, SplatGradient};
 use super::lsq::{Quantizers, StepGradients};
 use super::optimizer::{Bounds, Parameters, Row, shape_of};
+use super::options::MAX_GAUSSIANS;
 use super::raster::Raster;
 use super::training::{Portion, Training};
 use super::{EncodeError, Precision, Progress};
@@ -172,9 +173,14 @@ impl<'a> Fit<'a> {
         self.parameters.len()
     }
 
+    /// Most Gaussians that this picture may get: one per pixel.
+    pub(crate) fn most(&self) -> usize {
+        self.raster.pixels().min(MAX_GAUSSIANS as usize)
+    }
+
     /// The count that the budget asks for, if training lowers the error by `foreseen`.
     fn wanted(&self, foreseen: f64) -> usize {
-        self.budget.wanted(self.parameters.len(), self.error * foreseen, self.raster.pixels())
+        self.budget.wanted(self.parameters.len(), self.error * foreseen, self.most())
     }
 
     /// How many Gaussians to add, with so many steps to come after this one.

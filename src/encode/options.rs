@@ -22,6 +22,9 @@ pub enum Target {
     Quality(f64),
 }
 
+/// Most Gaussians that an encoder writes: as many as a decoder accepts by default.
+pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
+
 /// The quality of [`Target::Auto`].
 const AUTO_QUALITY: f64 = 50.0;
 
@@ -38,7 +41,7 @@ impl Target {
         match self {
             Self::Auto => Ok(()),
             Self::Gaussians(count) => {
-                within("number of Gaussians", count.into(), 1.0, f64::from(1 << 22))
+                within("number of Gaussians", count.into(), 1.0, MAX_GAUSSIANS.into())
             }
             Self::Bytes(bytes) => within("size in bytes", bytes as f64, 1.0, f64::from(1 << 30)),
             Self::BitsPerPixel(rate) => within("bits per pixel", rate, 1e-6, 1e6),
