@@ -216,7 +216,7 @@ fn hard_pictures_become_sound_files() {
         ("2x1", 2, 1, ColorModel::Rgba, vec![0, 0, 0, 0, 255, 255, 255, 255]),
         ("1xN", 1, 300, ColorModel::Gray, noise(300)),
         ("Nx1", 300, 1, ColorModel::Gray, noise(300)),
-        ("wide", 2048, 4, ColorModel::Gray, scene(2048, 4, 1)),
+        ("wide", 8192, 16, ColorModel::Gray, scene(8192, 16, 1)),
         ("black", 33, 17, ColorModel::Rgb, vec![0; 33 * 17 * 3]),
         ("white", 33, 17, ColorModel::Rgb, vec![255; 33 * 17 * 3]),
         ("impulse", 64, 64, ColorModel::Gray, impulse),
@@ -229,7 +229,8 @@ fn hard_pictures_become_sound_files() {
     ];
     for (name, width, height, color, samples) in cases {
         let source = Source::new_u8(width, height, color, &samples).expect("sizes agree");
-        for target in [Target::Auto, Target::Gaussians(50), Target::Gaussians(100_000)] {
+        let counts = [1, 50, 100_000].map(Target::Gaussians);
+        for target in counts.into_iter().chain([Target::Auto]) {
             // A fit of one Gaussian per pixel takes long on all but the smallest.
             if target == Target::Gaussians(100_000) && samples.len() > 2000 {
                 continue;
