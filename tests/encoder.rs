@@ -287,9 +287,6 @@ fn every_published_variant_trains() {
     let mut paper = Training::paper();
     paper.iterations = 400;
     paper.densification.prune_interval = 20;
-    // The published rate is meant for 50,000 iterations.
-    paper.optimizer.center = 0.1;
-    paper.optimizer.shape = 0.1;
     let mut trainings = vec![paper.clone()];
     for chart in [Chart::Covariance, Chart::Cholesky, Chart::RotationScale] {
         // GaussianImage: all Gaussians at once, a constant filter.
