@@ -4,7 +4,7 @@
 //! first cache. Every (tile, Gaussian) pair has a slot of its own for its sums, gathered
 //! afterwards in a fixed order: no atomics, the same bits for any number of threads.
 
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::chart::Moments;
@@ -14,8 +14,13 @@ use crate::render::{
     Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, Tiling, centers, kernel_simd,
 };
 
-/// Sums that a pass takes per (tile, Gaussian): s, and the residual times the weight by channel.
-const SUMS: usize = 12;
+/// Sums of one (tile, Gaussian) pair: five of the geometry, then one by channel.
+type Slot = [f32; 8];
+
+/// How many slots a pair takes.
+const fn slots_per_pair(channels: usize) -> usize {
+    (5 + channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
+}
 
 /// What a pass says about one Gaussian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,7 +37,7 @@ pub(crate) struct Pass {
     level: Level,
     tiling: Tiling,
     /// Sums by tile, then by Gaussian.
-    slots: Vec<[f32; SUMS]>,
+    slots: Vec<Slot>,
     /// For each splat, where its slots end in `positions`.
     ends: Vec<u32>,
     /// Where the slots of a splat are, splat by splat.
@@ -74,7 +79,7 @@ impl Pass {
             3 => self.run_of::<3>(raster, splats, kernel, base),
             _ => self.run_of::<4>(raster, splats, kernel, base),
         }
-        self.gather(gradients);
+        self.gather(raster.channels, gradients);
         self.row_errors.iter().sum()
     }
 
@@ -97,7 +102,7 @@ impl Pass {
     /// Bytes held.
     pub(crate) fn memory(&self) -> usize {
         self.tiling.memory()
-            + self.slots.capacity() * size_of::<[f32; SUMS]>()
+            + self.slots.capacity() * size_of::<Slot>()
             + (self.ends.capacity() + self.positions.capacity()) * size_of::<u32>()
             + size_of_val(&self.residuals[..])
     }
@@ -128,12 +133,13 @@ impl Pass {
             *end = last;
         }
         let tiling = &self.tiling;
-        self.slots.resize(positions.len(), [0.0; SUMS]);
+        let per_pair = slots_per_pair(CHANNELS);
+        self.slots.resize(positions.len() * per_pair, Slot::default());
         let mut slots = &mut self.slots[..];
         let rows: Vec<_> = (0..tiling.rows())
             .map(|row| {
-                let entries = tiling.row_entries(row);
-                let (taken, rest) = core::mem::take(&mut slots).split_at_mut(entries);
+                let length = tiling.row_entries(row) * per_pair;
+                let (taken, rest) = core::mem::take(&mut slots).split_at_mut(length);
                 slots = rest;
                 (row, taken)
             })
@@ -148,7 +154,7 @@ impl Pass {
                     let residual: &mut [Plane; CHANNELS] =
                         residual.try_into().expect("a tile has all channels");
                     let list = tiling.splats(column, row);
-                    let (taken, rest) = slots.split_at_mut(list.len());
+                    let (taken, rest) = slots.split_at_mut(list.len() * per_pair);
                     slots = rest;
                     let tile = Tile::<CHANNELS> {
                         x: (column * TILE_WIDTH) as u32,
@@ -168,19 +174,22 @@ impl Pass {
     }
 
     /// Adds up the slots of every splat, in the order of its tiles.
-    fn gather(&self, gradients: &mut Vec<SplatGradient>) {
+    fn gather(&self, channels: usize, gradients: &mut Vec<SplatGradient>) {
         let (ends, positions, slots) = (&self.ends, &self.positions, &self.slots);
+        let per_pair = slots_per_pair(channels);
         (0..ends.len())
             .into_par_iter()
             .with_min_len(256)
             .map(|splat| {
                 let start = if splat == 0 { 0 } else { ends[splat - 1] };
-                let mut sum = [0.0; SUMS];
+                let mut sum = [Slot::default(); 2];
                 for &position in &positions[start as usize..ends[splat] as usize] {
-                    for (sum, value) in sum.iter_mut().zip(&slots[position as usize]) {
+                    let slots = &slots[position as usize * per_pair..][..per_pair];
+                    for (sum, value) in sum.iter_mut().flatten().zip(slots.as_flattened()) {
                         *sum += value;
                     }
                 }
+                let sum = sum.as_flattened();
                 SplatGradient {
                     moments: Moments { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
                     color: [sum[5], sum[6], sum[7], sum[8]],
@@ -246,7 +255,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         level: Level,
         kernel: Kernel,
         states: &mut [Plane],
-        slots: &mut [[f32; SUMS]],
+        slots: &mut [Slot],
         planes: &mut [Plane; CHANNELS],
     ) -> f64 {
         match kernel {
@@ -267,7 +276,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         simd: S,
         kernel: K,
         states: &mut [Plane],
-        slots: &mut [[f32; SUMS]],
+        slots: &mut [Slot],
         planes: &mut [Plane; CHANNELS],
     ) -> f64 {
         let px = centers(simd, self.x);
@@ -292,7 +301,9 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             }
         }
         let squared = self.residual(simd, planes);
-        for ((&index, state), slot) in self.list.iter().zip(states).zip(slots) {
+        for ((&index, state), slot) in
+            self.list.iter().zip(states).zip(slots.chunks_exact_mut(slots_per_pair(CHANNELS)))
+        {
             let splat = &self.splats[index as usize];
             let zero = f32x16::splat(simd, 0.0);
             let (mut s0, mut s1, mut s2) = (zero, zero, zero);
@@ -314,14 +325,12 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             }
             let dx = px - splat.x;
             let x0 = dx * s0;
-            let geometry = [x0, s1, dx * x0, dx * s1];
-            slot[..4].copy_from_slice(&sums(geometry));
-            let mut rest = [zero; 8];
-            rest[0] = s2;
-            rest[1..=CHANNELS].copy_from_slice(&by_color);
-            slot[4..8].copy_from_slice(&sums([rest[0], rest[1], rest[2], rest[3]]));
-            if CHANNELS == 4 {
-                slot[8..12].copy_from_slice(&sums([rest[4], rest[5], rest[6], rest[7]]));
+            // In the order of a slot; the second half serves the fourth channel only.
+            let mut all = [[zero; 8]; 2];
+            all[0][..5].copy_from_slice(&[x0, s1, dx * x0, dx * s1, s2]);
+            all.as_flattened_mut()[5..5 + CHANNELS].copy_from_slice(&by_color);
+            for (slot, vectors) in slot.iter_mut().zip(all) {
+                *slot = sums(vectors);
             }
         }
         squared
@@ -353,16 +362,21 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
     }
 }
 
-/// The sums of the lanes of four vectors.
+/// The sums of the lanes of each of eight vectors, in the low eight lanes; added as a tree whose
+/// order no SIMD level changes.
 #[inline(always)]
-fn sums<S: Simd>(vectors: [f32x16<S>; 4]) -> [f32; 4] {
-    let quarter = |vector: f32x16<S>| -> f32x4<S> {
-        let (low, high) = vector.split();
-        let (low, high) = (low + high).split();
-        low + high
-    };
-    let quarters = vectors.map(|vector| quarter(vector).to_array());
-    quarters.map(|[a, b, c, d]| (a + c) + (b + d))
+fn sums<S: Simd>([a, b, c, d, e, f, g, h]: [f32x16<S>; 8]) -> Slot {
+    let abcd = folded(folded(a, b), folded(c, d));
+    let efgh = folded(folded(e, f), folded(g, h));
+    let all = folded(abcd, efgh);
+    let (low, _) = folded(all, all).split();
+    low.to_array()
+}
+
+/// The sums of neighbouring lanes: of `a` in the low half, of `b` in the high one.
+#[inline(always)]
+fn folded<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    a.unzip_low(b) + a.unzip_high(b)
 }
 
 #[cfg(test)]
