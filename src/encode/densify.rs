@@ -2,6 +2,7 @@
 //! "Distortion Driven Densification").
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::chart;
 use super::gradient::Pass;
@@ -71,19 +72,19 @@ impl Site<'_> {
     /// The distortion of every pixel, row by row; 0 where the output could not be improved.
     fn distortions(&self) -> Vec<f32> {
         let raster = self.raster;
-        let mut map = Vec::with_capacity(raster.pixels());
-        for y in 0..raster.height {
-            for x in 0..raster.width {
+        let mut map = vec![0.0; raster.pixels()];
+        map.par_chunks_exact_mut(raster.width).enumerate().for_each(|(y, line)| {
+            for (x, value) in line.iter_mut().enumerate() {
                 let residual = self.pass.residual(x, y, raster.channels);
                 // Less than half a step of the source's depth: exact after rounding.
                 let exact = residual.iter().all(|value| value.abs() < raster.half_step);
-                map.push(match self.options.distortion {
+                *value = match self.options.distortion {
                     _ if exact => 0.0,
                     Distortion::L1 => residual.iter().map(|value| value.abs()).sum(),
                     Distortion::L2 => residual.iter().map(|value| value * value).sum(),
-                });
+                };
             }
-        }
+        });
         map
     }
 }

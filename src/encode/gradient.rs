@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::chart::Moments;
 use super::raster::Raster;
-use crate::limits::Limits;
 use crate::render::{
     Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, Tiling, centers, kernel_simd,
 };
@@ -120,12 +119,10 @@ impl Pass {
         self.ends.resize(splats.len(), 0);
         self.positions.clear();
         let (ends, positions) = (&mut self.ends, &mut self.positions);
-        self.tiling
-            .rebuild(splats, kernel.cutoff(), region, &Limits::none(), 0, |splat, entry| {
-                positions.push(entry as u32);
-                ends[splat as usize] = positions.len() as u32;
-            })
-            .expect("there are no limits");
+        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, entry| {
+            positions.push(entry as u32);
+            ends[splat as usize] = positions.len() as u32;
+        });
         // A splat outside the picture has no slots: it ends where the one before ends.
         let mut last = 0;
         for end in ends {
