@@ -95,7 +95,7 @@ impl Pass {
 
     /// Whether a splat of the last pass touched the picture.
     pub(crate) fn touches(&self, splat: usize) -> bool {
-        self.ends[splat] > splat.checked_sub(1).map_or(0, |before| self.ends[before])
+        !self.slots_of(splat).is_empty()
     }
 
     /// Bytes held.
@@ -106,20 +106,21 @@ impl Pass {
             + size_of_val(&self.residuals[..])
     }
 
-    fn run_of<const CHANNELS: usize>(
-        &mut self,
-        raster: &Raster,
-        splats: &[Splat],
-        kernel: Kernel,
-        base: [f32; 4],
-    ) {
+    /// Where the slots of a splat are, in the order of its tiles.
+    fn slots_of(&self, splat: usize) -> &[u32] {
+        let start = splat.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.positions[start as usize..self.ends[splat] as usize]
+    }
+
+    /// Says which splats touch which tile.
+    fn bin(&mut self, raster: &Raster, splats: &[Splat], cutoff: f32) {
         let region =
             Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
         self.ends.clear();
         self.ends.resize(splats.len(), 0);
         self.positions.clear();
         let (ends, positions) = (&mut self.ends, &mut self.positions);
-        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, entry| {
+        self.tiling.rebuild(splats, cutoff, region, |splat, entry| {
             positions.push(entry as u32);
             ends[splat as usize] = positions.len() as u32;
         });
@@ -129,9 +130,19 @@ impl Pass {
             last = last.max(*end);
             *end = last;
         }
+    }
+
+    fn run_of<const CHANNELS: usize>(
+        &mut self,
+        raster: &Raster,
+        splats: &[Splat],
+        kernel: Kernel,
+        base: [f32; 4],
+    ) {
+        self.bin(raster, splats, kernel.cutoff());
         let tiling = &self.tiling;
         let per_pair = slots_per_pair(CHANNELS);
-        self.slots.resize(positions.len() * per_pair, Slot::default());
+        self.slots.resize(self.positions.len() * per_pair, Slot::default());
         let mut slots = &mut self.slots[..];
         let rows: Vec<_> = (0..tiling.rows())
             .map(|row| {
@@ -172,16 +183,14 @@ impl Pass {
 
     /// Adds up the slots of every splat, in the order of its tiles.
     fn gather(&self, channels: usize, gradients: &mut Vec<SplatGradient>) {
-        let (ends, positions, slots) = (&self.ends, &self.positions, &self.slots);
         let per_pair = slots_per_pair(channels);
-        (0..ends.len())
+        (0..self.ends.len())
             .into_par_iter()
             .with_min_len(256)
             .map(|splat| {
-                let start = if splat == 0 { 0 } else { ends[splat - 1] };
                 let mut sum = [Slot::default(); 2];
-                for &position in &positions[start as usize..ends[splat] as usize] {
-                    let slots = &slots[position as usize * per_pair..][..per_pair];
+                for &position in self.slots_of(splat) {
+                    let slots = &self.slots[position as usize * per_pair..][..per_pair];
                     for (sum, value) in sum.iter_mut().flatten().zip(slots.as_flattened()) {
                         *sum += value;
                     }
