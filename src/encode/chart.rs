@@ -7,7 +7,7 @@ use crate::gaussian::{Chart, inverse_cholesky};
 
 /// Smallest standard deviation that is trained, in pixels: narrower Gaussians fall between the
 /// pixels, where no error is seen.
-pub(crate) const MIN_DEVIATION: f32 = 0.2;
+pub(crate) const MIN_DEVIATION: f32 = 0.4;
 
 /// What a pass over the pixels says about the geometry of one Gaussian. With s = -2 dLoss/dq at a
 /// pixel and d = pixel centre - centre of the Gaussian, these are sums over the pixels.
@@ -135,11 +135,14 @@ pub(crate) fn confined(chart: Chart, values: Vec3, max: f32) -> Vec3 {
         return from_cholesky(chart, [1.0, 0.0, 1.0]);
     }
     match chart {
-        Chart::Cholesky => Vec3::new(
-            values.x.clamp(MIN_DEVIATION, max),
-            values.y.clamp(-max, max),
-            values.z.clamp(MIN_DEVIATION, max),
-        ),
+        Chart::Cholesky => {
+            let l11 = values.x.clamp(MIN_DEVIATION, max);
+            let l21 = values.y.clamp(-max, max);
+            // The product of both deviations is l11 l22, and the larger one at most the length of
+            // all three.
+            let least = MIN_DEVIATION * (l11.hypot(l21) / l11).max(1.0);
+            Vec3::new(l11, l21, values.z.clamp(MIN_DEVIATION, max).max(least))
+        }
         Chart::Covariance => {
             let xx = values.x.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
             let yy = values.z.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
