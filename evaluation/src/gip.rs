@@ -15,6 +15,8 @@ pub(crate) const EFFORT: u8 = 5;
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.
 const REPEATS: usize = 5;
+/// What is wrong with a file that ends too early.
+const NO_PICTURE: &str = "the file has no picture";
 
 /// One `.gip` file.
 #[derive(Clone, Debug)]
@@ -26,17 +28,32 @@ pub(crate) struct Coded {
 }
 
 impl Coded {
-    /// How long decoding takes, with all threads or with one: the median of several times.
+    /// How long decoding takes, from the file to samples, with all threads or with one.
     pub(crate) fn decode_seconds(&self, parallel: bool) -> Result<f64> {
-        let mut seconds = Vec::new();
-        for _ in 0..REPEATS {
-            let start = Instant::now();
-            decode(&self.file, parallel)?;
-            seconds.push(start.elapsed().as_secs_f64());
-        }
-        seconds.sort_by(f64::total_cmp);
-        Ok(seconds[REPEATS / 2])
+        median_seconds(|| decode(&self.file, parallel).map(|_| ()))
     }
+
+    /// How long rendering takes, from the Gaussians to samples, with all threads.
+    pub(crate) fn render_seconds(&self) -> Result<f64> {
+        let options = RenderOptions::new();
+        let mut decoder = StreamDecoder::new();
+        decoder.feed(&self.file)?;
+        let picture = decoder.picture().context(NO_PICTURE)?;
+        let mut samples = vec![0; picture.output_len(&options)?];
+        median_seconds(|| Ok(picture.render_u8(&options, &mut samples)?))
+    }
+}
+
+/// How long something takes: the median of several times.
+fn median_seconds(mut work: impl FnMut() -> Result<()>) -> Result<f64> {
+    let mut seconds = Vec::new();
+    for _ in 0..REPEATS {
+        let start = Instant::now();
+        work()?;
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    seconds.sort_by(f64::total_cmp);
+    Ok(seconds[REPEATS / 2])
 }
 
 /// The encoder at an effort, with the seed of all measurements.
@@ -59,7 +76,7 @@ fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
     let options = RenderOptions::new().parallel(parallel);
     let mut decoder = StreamDecoder::new();
     decoder.feed(file)?;
-    let picture = decoder.picture().context("the file has no picture")?;
+    let picture = decoder.picture().context(NO_PICTURE)?;
     let mut samples = vec![0; picture.output_len(&options)?];
     picture.render_u8(&options, &mut samples)?;
     Ok(samples)

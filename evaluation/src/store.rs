@@ -12,6 +12,7 @@ use anyhow::{Context, Result, ensure};
 const PROVENANCE: [&str; 2] = ["machine", "version"];
 
 /// Measurements of one kind: `K` columns say what was measured, `V` columns what came out.
+#[derive(Debug)]
 pub(crate) struct Store<const K: usize, const V: usize> {
     file: File,
     rows: HashMap<Vec<String>, [f64; V]>,

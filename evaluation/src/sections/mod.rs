@@ -1,6 +1,9 @@
 //! The report's sections. Each measures what it lacks and returns its text.
 
+mod ablation;
+mod methods;
 mod rate;
+mod representation;
 mod scene;
 mod speed;
 
@@ -13,6 +16,10 @@ use crate::bench::Bench;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Section {
+    /// The fit itself, without quantization: against GaussianImage and GaussianImage++
+    Representation,
+    /// What each part of the method is worth
+    Ablation,
     /// Rate and distortion, against every baseline
     Rate,
     /// Time against error, and how both grow
@@ -23,10 +30,13 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 3] = [Self::Rate, Self::Speed, Self::Scene];
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Representation, Self::Ablation, Self::Rate, Self::Speed, Self::Scene];
 
     pub(crate) fn title(self) -> &'static str {
         match self {
+            Self::Representation => "Representation",
+            Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
             Self::Speed => "Speed against error",
             Self::Scene => "Only what a scene needs",
@@ -40,6 +50,8 @@ impl Section {
 
     pub(crate) fn measure(self, bench: &mut Bench) -> Result<String> {
         match self {
+            Self::Representation => representation::measure(bench),
+            Self::Ablation => ablation::measure(bench),
             Self::Rate => rate::measure(bench),
             Self::Speed => speed::measure(bench),
             Self::Scene => scene::measure(bench),
