@@ -62,7 +62,7 @@ pub(crate) const BASELINES: [Baseline; 6] = [
     },
     Baseline {
         id: "avif420_s6_psnr",
-        name: "AVIF, tune=psnr",
+        name: "AVIF tune=psnr",
         settings: &[
             "1", "5", "10", "15", "20", "25", "30", "35", "40", "45", "50", "55", "60", "65", "70",
             "75",

@@ -33,7 +33,7 @@ pub(crate) fn product() -> String {
 
 /// The commit that is checked out.
 pub(crate) fn commit() -> String {
-    git(&["rev-parse", "HEAD"], &[]).unwrap_or_else(|| "none: a copy outside of git".into())
+    git(&["log", "-1", "--format=%H"], &[]).unwrap_or_else(|| "none: a copy outside of git".into())
 }
 
 /// The compiler, as far as it tells.

@@ -25,9 +25,9 @@ impl Table {
         self.text.push_str("|\n");
     }
 
-    /// The table between blank lines.
+    /// The table behind a blank line.
     pub(crate) fn finish(&self) -> String {
-        format!("\n{}\n", self.text)
+        format!("\n{}", self.text)
     }
 }
 

@@ -1,11 +1,13 @@
 //! The report's sections. Each measures what it lacks and returns its text.
 
 mod ablation;
+mod handmade;
 mod methods;
 mod rate;
 mod representation;
 mod scene;
 mod speed;
+mod stability;
 
 use std::fmt;
 
@@ -24,14 +26,22 @@ pub(crate) enum Section {
     Rate,
     /// Time against error, and how both grow
     Speed,
+    /// Arithmetic at its edges, and pictures that are hard to fit
+    Stability,
     /// How much is spent on simple and on difficult pictures
     Scene,
 }
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Representation, Self::Ablation, Self::Rate, Self::Speed, Self::Scene];
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Representation,
+        Self::Ablation,
+        Self::Rate,
+        Self::Speed,
+        Self::Stability,
+        Self::Scene,
+    ];
 
     pub(crate) fn title(self) -> &'static str {
         match self {
@@ -39,6 +49,7 @@ impl Section {
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
             Self::Speed => "Speed against error",
+            Self::Stability => "Numerical stability",
             Self::Scene => "Only what a scene needs",
         }
     }
@@ -54,6 +65,7 @@ impl Section {
             Self::Ablation => ablation::measure(bench),
             Self::Rate => rate::measure(bench),
             Self::Speed => speed::measure(bench),
+            Self::Stability => stability::measure(bench),
             Self::Scene => scene::measure(bench),
         }
     }

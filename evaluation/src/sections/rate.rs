@@ -15,7 +15,7 @@ use crate::table::{Table, decibels, from_decibels, mean, percent};
 
 /// Rates in bits per pixel at which our codec is measured.
 const RATES: [f64; 9] = [0.1, 0.15, 0.2, 0.25, 0.35, 0.5, 0.75, 1.0, 1.25];
-const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.0];
+const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.05];
 /// Of the baselines' settings a quick run takes one in so many, and the last.
 const QUICK_STEP: usize = 3;
 /// Rates of the tables.
