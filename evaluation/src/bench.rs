@@ -13,11 +13,16 @@ use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
+/// Iterations of the published methods, if no others are asked for.
+const ITERATIONS: u32 = 5_000;
+const QUICK_ITERATIONS: u32 = 2_000;
 
 #[derive(Debug)]
 pub(crate) struct Bench {
     pub(crate) pictures: Vec<Picture>,
     pub(crate) quick: bool,
+    /// Of the published methods.
+    pub(crate) iterations: u32,
     /// CSV with measurements of the baselines from elsewhere.
     pub(crate) reference: Option<PathBuf>,
     /// The version of our codec.
@@ -32,11 +37,13 @@ impl Bench {
         images: &Path,
         folder: PathBuf,
         quick: bool,
+        iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
         Ok(Self {
             pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
             quick,
+            iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
             product: provenance::product(),
             machine: provenance::machine(),

@@ -40,6 +40,9 @@ struct Args {
     /// Only these sections [default: all].
     #[arg(long, value_enum, value_name = "SECTION")]
     only: Vec<Section>,
+    /// Iterations of the published methods [default: 5000, quick: 2000; the paper: 50000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: Option<u32>,
     /// CSV with measurements of the same baselines from elsewhere, to compare ours with; columns
     /// codec, quality, image, bytes, bpp, psnr, msssim, as in `rate.csv`.
     #[arg(long, value_name = "CSV")]
@@ -51,7 +54,8 @@ fn main() -> Result<()> {
     let args = Args::parse();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench = Bench::new(&args.images, args.out, args.quick, args.reference)?;
+    let mut bench =
+        Bench::new(&args.images, args.out, args.quick, args.iterations, args.reference)?;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());

@@ -27,6 +27,15 @@ pub(crate) struct Plot<'a> {
     pub(crate) title: &'a str,
     pub(crate) x: (&'a str, Scale),
     pub(crate) y: (&'a str, Scale),
+    /// A corner that the series leave free.
+    pub(crate) legend: Corner,
+}
+
+/// Where a legend may stand.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Corner {
+    UpperLeft,
+    LowerRight,
 }
 
 /// Colours that can be told apart, also by those who see no red or green (Okabe and Ito).
@@ -97,7 +106,10 @@ impl Plot<'_> {
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::LowerRight)
+            .position(match self.legend {
+                Corner::UpperLeft => SeriesLabelPosition::UpperLeft,
+                Corner::LowerRight => SeriesLabelPosition::LowerRight,
+            })
             .background_style(WHITE.mix(0.85))
             .border_style(RGBColor(200, 200, 200))
             .draw()

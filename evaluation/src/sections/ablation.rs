@@ -18,9 +18,6 @@ const QUICK_GAUSSIANS: u32 = 2_500;
 /// Gaussians for the curves of bit depths.
 const CURVE: [u32; 4] = [1_500, 2_500, 4_000, 6_500];
 const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
-/// Iterations of the published methods.
-const ITERATIONS: u32 = 5_000;
-const QUICK_ITERATIONS: u32 = 400;
 /// Iterations of ours for bit depths and seeds.
 const OWN_ITERATIONS: u32 = 600;
 const QUICK_OWN_ITERATIONS: u32 = 150;
@@ -75,13 +72,13 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         product: &bench.product,
         pictures: &bench.pictures[..pictures.min(bench.pictures.len())],
         gaussians: choose(QUICK_GAUSSIANS, GAUSSIANS),
-        iterations: choose(QUICK_ITERATIONS, ITERATIONS),
+        iterations: bench.iterations,
         own_iterations: choose(QUICK_OWN_ITERATIONS, OWN_ITERATIONS),
     };
     let curve: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (bit depths, seeds). {} Mean over {} pictures.\n",
+         (bit depths, seeds). {} Means; pictures: {}.\n",
         methods::description(ablation.iterations),
         ablation.pictures.len(),
     );

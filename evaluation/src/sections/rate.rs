@@ -6,11 +6,13 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use image_gip::Target;
 
-use crate::baselines::{BASELINES, DESCRIPTION};
+use crate::baselines::{BASELINES, Baseline, DESCRIPTION, Worker};
 use crate::bench::Bench;
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
-use crate::plot::{Plot, Scale, Series};
+use crate::pictures::Picture;
+use crate::plot::{Corner, Plot, Scale, Series};
+use crate::store::Store;
 use crate::table::{Table, decibels, from_decibels, mean, percent};
 
 /// Rates in bits per pixel at which our codec is measured.
@@ -25,12 +27,63 @@ const RANGE: (f64, f64) = (0.1, 1.25);
 
 /// One file.
 #[derive(Clone, Copy, Debug)]
-struct Point {
+pub(super) struct Point {
     bytes: f64,
     /// In bits per pixel.
-    rate: f64,
+    pub(super) rate: f64,
     psnr: f64,
     ms_ssim: f64,
+}
+
+/// All files that were measured.
+#[derive(Debug)]
+pub(super) struct Files(Store<3, 4>);
+
+impl Files {
+    pub(super) fn open(bench: &Bench) -> Result<Self> {
+        let keys = ["codec", "quality", "image"];
+        Ok(Self(bench.store("rate.csv", keys, ["bytes", "bpp", "psnr", "msssim"])?))
+    }
+
+    fn ours(
+        &mut self,
+        version: &str,
+        rate: f64,
+        setting: &str,
+        picture: &Picture,
+    ) -> Result<Point> {
+        self.point(version, [gip::NAME, setting, &picture.name], || {
+            let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
+            let coded = gip::code(encoder, picture, None)?;
+            let distortion = coded.distortion;
+            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+        })
+    }
+
+    pub(super) fn baseline(
+        &mut self,
+        worker: &mut Worker,
+        versions: &str,
+        baseline: &Baseline,
+        setting: &str,
+        picture: &Picture,
+    ) -> Result<Point> {
+        self.point(versions, [baseline.id, setting, &picture.name], || {
+            let coded = worker.code(baseline.id, setting, picture, Some(1), 1)?;
+            let distortion = coded.distortion;
+            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+        })
+    }
+
+    fn point(
+        &mut self,
+        version: &str,
+        key: [&str; 3],
+        measure: impl FnOnce() -> Result<[f64; 4]>,
+    ) -> Result<Point> {
+        let [bytes, rate, psnr, ms_ssim] = self.0.get(version, key, measure)?;
+        Ok(Point { bytes, rate, psnr, ms_ssim })
+    }
 }
 
 /// All files of a codec.
@@ -132,29 +185,18 @@ fn rates(quick: bool) -> &'static [f64] {
 
 /// All codecs measured on all pictures, ours first.
 fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
-    let mut store = bench.store(
-        "rate.csv",
-        ["codec", "quality", "image"],
-        ["bytes", "bpp", "psnr", "msssim"],
-    )?;
+    let mut store = Files::open(bench)?;
     let pictures = bench.pictures.clone();
     let (quick, product) = (bench.quick, bench.product.clone());
     let (worker, versions) = bench.baselines()?;
 
-    let point = |[bytes, rate, psnr, ms_ssim]: [f64; 4]| Point { bytes, rate, psnr, ms_ssim };
     let mut ours = Codec { id: gip::NAME, name: gip::NAME, settings: vec![], points: vec![] };
     ours.settings =
         rates(quick).iter().map(|rate| format!("{rate} bpp, effort {}", gip::EFFORT)).collect();
     for picture in &pictures {
         let mut points = Vec::new();
         for (rate, setting) in rates(quick).iter().zip(&ours.settings) {
-            let values = store.get(&product, [ours.id, setting, &picture.name], || {
-                let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(*rate));
-                let coded = gip::code(encoder, picture, None)?;
-                let distortion = coded.distortion;
-                Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
-            })?;
-            points.push(point(values));
+            points.push(store.ours(&product, *rate, setting, picture)?);
         }
         ours.points.push(points);
     }
@@ -172,12 +214,7 @@ fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
         for picture in &pictures {
             let mut points = Vec::new();
             for setting in &settings {
-                let values = store.get(&versions, [baseline.id, setting, &picture.name], || {
-                    let coded = worker.code(baseline.id, setting, picture, Some(1), 1)?;
-                    let (bytes, distortion) = (coded.bytes, coded.distortion);
-                    Ok([bytes, picture.rate(bytes), distortion.psnr, distortion.ms_ssim])
-                })?;
-                points.push(point(values));
+                points.push(store.baseline(worker, &versions, baseline, setting, picture)?);
             }
             all.push(points);
         }
@@ -294,6 +331,7 @@ fn plot(bench: &Bench, codecs: &[Codec], metric: Metric) -> Result<String> {
         title: &format!("{}, mean over {} pictures", metric.name(), bench.pictures.len()),
         x: ("bits per pixel", Scale::Linear),
         y: (&format!("{} in dB", metric.name()), Scale::Linear),
+        legend: Corner::LowerRight,
     };
     plot.write(&bench.path(&name), &series)?;
     Ok(name)

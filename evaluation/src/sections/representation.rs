@@ -11,9 +11,6 @@ use crate::table::{Table, mean};
 /// Numbers of Gaussians, as in the paper.
 const GAUSSIANS: [u32; 2] = [5_000, 10_000];
 const QUICK_GAUSSIANS: [u32; 1] = [5_000];
-/// Iterations of the published methods.
-const ITERATIONS: u32 = 5_000;
-const QUICK_ITERATIONS: u32 = 400;
 const QUICK_PICTURES: usize = 1;
 /// Attributes of a Gaussian: two for the centre, three for the shape, three for the colour.
 const PARAMETERS: f64 = 8.0;
@@ -35,7 +32,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         ["method", "iterations", "gaussians", "image"],
         ["psnr", "msssim", "used", "peak_memory", "seconds", "frames_per_second"],
     )?;
-    let iterations = if bench.quick { QUICK_ITERATIONS } else { ITERATIONS };
+    let iterations = bench.iterations;
     let pictures = if bench.quick { QUICK_PICTURES } else { bench.pictures.len() };
     let pictures = &bench.pictures[..pictures.min(bench.pictures.len())];
     let counts: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
@@ -50,7 +47,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut text = format!(
         "Compared with: GaussianImage, GaussianImage++ and the direct covariance without its two \
          components. {} Ours is the encoder at effort {}. Attributes are 32-bit floats; PSNR is that \
-         of the float rendering, as papers have it. Mean over {} pictures; all threads. Rows marked \
+         of the float rendering, as papers have it. Means; pictures: {}; all threads. Rows marked \
          as printed are the paper's own figures for all of Kodak on an NVIDIA A30, with GPU memory; \
          what our processor is worse at than that GPU is frames per second.\n",
         methods::description(iterations),

@@ -3,11 +3,12 @@
 use anyhow::Result;
 use image_gip::Target;
 
+use super::rate::Files;
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::Bench;
 use crate::gip;
 use crate::pictures::Picture;
-use crate::plot::{Plot, Scale, Series};
+use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::Table;
 
@@ -34,9 +35,9 @@ const GROWTH_EFFORT: u8 = 1;
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let rows = against_error(bench)?;
     let mut text = format!(
-        "Compared with: {DESCRIPTION} Each is at one setting, near {RATE} bits per pixel; ours is \
-         asked for {RATE} at every effort. Wall-clock time from samples in memory to a file in \
-         memory and back, mean over {} pictures; all threads are {}. JPEG, JPEG 2000 and WebP have \
+        "Compared with: {DESCRIPTION} Each is at the setting that comes nearest to {RATE} bits per \
+         pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from samples in memory to a file in \
+         memory and back, means; pictures: {}; all threads are {}. JPEG, JPEG 2000 and WebP have \
          one thread here in any case. Other programs on the machine make times longer.\n",
         pictures(bench).len(),
         cores(),
@@ -44,10 +45,10 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     text.push_str(&table(&rows));
     text.push_str(&verdict(&rows));
     for (name, title, seconds, unit) in [
-        ("speed-encode.svg", "Encoding, all threads", Row::encoding as fn(&Row) -> f64, "s"),
-        ("speed-decode.svg", "Decoding, all threads", Row::decoding, "ms"),
+        ("speed-encode.svg", "Encoding, all threads", Row::encoding as fn(&Row) -> f64, "seconds"),
+        ("speed-decode.svg", "Decoding, all threads", Row::decoding, "milliseconds"),
     ] {
-        let factor = if unit == "ms" { 1000.0 } else { 1.0 };
+        let factor = if unit == "milliseconds" { 1000.0 } else { 1.0 };
         plot_scatter(bench, name, title, &rows, &|row| factor * seconds(row), unit)?;
         text.push_str(&format!("\n![{title}]({name})\n"));
     }
@@ -89,6 +90,7 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         ["codec", "quality", "threads", "image"],
         ["bytes", "bpp", "psnr", "encode_seconds", "decode_seconds"],
     )?;
+    let mut files = Files::open(bench)?;
     let pictures = pictures(bench);
     let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &EFFORTS };
     let product = bench.product.clone();
@@ -96,7 +98,8 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
     for &effort in efforts {
         let setting = format!("{RATE} bpp, effort {effort}");
-        rows.push(row(gip::NAME, &format!("effort {effort}"), &pictures, |picture, threads| {
+        rows.push(row(gip::NAME, &format!("effort {effort}"), &pictures, |index, threads| {
+            let picture = &pictures[index];
             let key = [gip::NAME, &setting, called(threads), &picture.name];
             store.get(&product, key, || {
                 let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
@@ -108,8 +111,16 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         })?);
     }
     for baseline in &BASELINES {
-        let setting = baseline.middle;
-        rows.push(row(baseline.name, setting, &pictures, |picture, threads| {
+        let mut settings = Vec::new();
+        for picture in &pictures {
+            let rate = |setting: &str| {
+                let point = files.baseline(worker, &versions, baseline, setting, picture)?;
+                Ok(point.rate)
+            };
+            settings.push(nearest(baseline.settings, rate)?);
+        }
+        rows.push(row(baseline.name, &settings.join(", "), &pictures, |index, threads| {
+            let (setting, picture) = (settings[index], &pictures[index]);
             let key = [baseline.id, setting, called(threads), &picture.name];
             store.get(&versions, key, || {
                 let coded = worker.code(baseline.id, setting, picture, threads, REPEATS)?;
@@ -119,6 +130,18 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         })?);
     }
     Ok(rows)
+}
+
+/// Of settings from small files to large ones, that whose rate is nearest to [`RATE`].
+fn nearest<'a>(settings: &[&'a str], mut rate: impl FnMut(&str) -> Result<f64>) -> Result<&'a str> {
+    let (mut low, mut high) = (0, settings.len() - 1);
+    while high - low > 1 {
+        let middle = usize::midpoint(low, high);
+        if rate(settings[middle])? < RATE { low = middle } else { high = middle }
+    }
+    let below = RATE / rate(settings[low])?;
+    let above = rate(settings[high])? / RATE;
+    Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
 }
 
 fn called(threads: Option<usize>) -> &'static str {
@@ -133,13 +156,13 @@ fn row(
     codec: &'static str,
     setting: &str,
     pictures: &[Picture],
-    mut get: impl FnMut(&Picture, Option<usize>) -> Result<[f64; 5]>,
+    mut get: impl FnMut(usize, Option<usize>) -> Result<[f64; 5]>,
 ) -> Result<Row> {
     let mut means = Vec::new();
     for threads in [Some(1), None] {
         let mut sums = [0.0; 5];
-        for picture in pictures {
-            for (sum, value) in sums.iter_mut().zip(get(picture, threads)?) {
+        for index in 0..pictures.len() {
+            for (sum, value) in sums.iter_mut().zip(get(index, threads)?) {
                 *sum += value / pictures.len() as f64;
             }
         }
@@ -221,6 +244,7 @@ fn plot_scatter(
         title: &format!("{title}: about {RATE} bits per pixel"),
         x: (unit, Scale::Logarithmic),
         y: ("PSNR in dB", Scale::Linear),
+        legend: Corner::UpperLeft,
     };
     plot.write(&bench.path(name), &series)
 }
@@ -334,6 +358,30 @@ fn plot_growth(
         series("decode, one thread", |cost| cost.decode[0]),
         series("decode, all threads", |cost| cost.decode[1]),
     ];
-    let plot = Plot { title, x: (label, Scale::Logarithmic), y: ("seconds", Scale::Logarithmic) };
+    let plot = Plot {
+        title,
+        x: (label, Scale::Logarithmic),
+        y: ("seconds", Scale::Logarithmic),
+        legend: Corner::UpperLeft,
+    };
     plot.write(&bench.path(name), &series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_setting_is_found() {
+        let find = |rates: &[f64]| {
+            let names: Vec<String> = rates.iter().map(f64::to_string).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            nearest(&names, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
+        };
+        assert_eq!(find(&[0.1, 0.2, 0.45, 0.6, 0.9]), "0.45");
+        assert_eq!(find(&[0.1, 0.2, 0.3, 0.52, 0.9]), "0.52");
+        assert_eq!(find(&[0.1, 0.2]), "0.2");
+        assert_eq!(find(&[0.7, 0.8, 0.9]), "0.7");
+        assert_eq!(find(&[0.4]), "0.4");
+    }
 }
