@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
 use crate::pictures::{self, Picture};
@@ -40,7 +40,7 @@ impl Bench {
         iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
-        Ok(Self {
+        let bench = Self {
             pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
@@ -49,7 +49,25 @@ impl Bench {
             machine: provenance::machine(),
             folder,
             worker: None,
-        })
+        };
+        bench.check_pictures()?;
+        Ok(bench)
+    }
+
+    /// Makes sure that pictures of equal names are those that the folder's measurements are of.
+    fn check_pictures(&self) -> Result<()> {
+        let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
+        for picture in &self.pictures {
+            let crc = f64::from(crc32fast::hash(&picture.rgb));
+            let known = [picture.width.into(), picture.height.into(), crc];
+            ensure!(
+                store.get("all", [&picture.name], || Ok(known))? == known,
+                "{} has measurements of another picture called {}: choose another folder",
+                self.folder.display(),
+                picture.name
+            );
+        }
+        Ok(())
     }
 
     /// The path of a file of the report.
@@ -115,5 +133,25 @@ impl Bench {
         let path = self.path("report.md");
         fs::write(&path, report)?;
         Ok(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_picture_of_the_same_name_is_refused() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        let open = |gray: u8| {
+            let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
+            picture.save(images.path().join("a.png")).expect("it is written");
+            Bench::new(images.path(), report.path().into(), false, None, None)
+        };
+        assert!(open(1).is_ok());
+        assert!(open(1).is_ok());
+        let refusal = open(2).expect_err("it is another picture").to_string();
+        assert!(refusal.contains("another picture called a"), "{refusal}");
     }
 }

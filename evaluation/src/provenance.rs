@@ -1,7 +1,7 @@
 //! What was measured, and where.
 
 use std::fs;
-use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::available_parallelism;
 
@@ -22,13 +22,29 @@ pub(crate) fn cores() -> usize {
     available_parallelism().map_or(1, Into::into)
 }
 
-/// The commit that last changed the codec, and a hash of what was changed since.
+/// The commit that last changed the codec, and a checksum of what it is now if that differs.
 pub(crate) fn product() -> String {
-    let Some(commit) = git(&["log", "-1", "--format=%h", "--abbrev=10"], &PRODUCT) else {
-        return "a copy outside of git".into();
+    let checksum = || {
+        let mut hasher = crc32fast::Hasher::new();
+        PRODUCT.iter().for_each(|path| hash(&Path::new(FOLDER).join(path), &mut hasher));
+        format!("{:08x}", hasher.finalize())
     };
-    let change = git(&["diff", "HEAD"], &PRODUCT).unwrap_or_default();
-    if change.is_empty() { commit } else { format!("{commit}+{}", hash(&change)) }
+    let Some(commit) = git(&["log", "-1", "--format=%h", "--abbrev=10"], &PRODUCT) else {
+        return format!("a copy outside of git, {}", checksum());
+    };
+    let changes = git(&["status", "--porcelain"], &PRODUCT).unwrap_or_default();
+    if changes.is_empty() { commit } else { format!("{commit}+{}", checksum()) }
+}
+
+/// Adds a file, or all files of a folder in the order of their names.
+fn hash(path: &Path, hasher: &mut crc32fast::Hasher) {
+    if let Ok(folder) = fs::read_dir(path) {
+        let mut paths: Vec<PathBuf> = folder.flatten().map(|entry| entry.path()).collect();
+        paths.sort();
+        paths.iter().for_each(|path| hash(path, hasher));
+    } else if let Ok(bytes) = fs::read(path) {
+        hasher.update(&bytes);
+    }
 }
 
 /// The commit that is checked out.
@@ -51,18 +67,24 @@ fn output(command: &mut Command) -> Option<String> {
     output.status.success().then_some(text)
 }
 
-/// Eight digits that tell one text from another.
-fn hash(text: &str) -> String {
-    let hashed = || -> Option<String> {
-        let mut git = Command::new("git")
-            .args(["hash-object", "--stdin"])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .ok()?;
-        git.stdin.take()?.write_all(text.as_bytes()).ok()?;
-        let output = git.wait_with_output().ok()?;
-        Some(String::from_utf8_lossy(&output.stdout).chars().take(8).collect())
-    };
-    hashed().unwrap_or_else(|| "changed".into())
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checksums_follow_every_file_of_a_folder() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let checksum = || {
+            let mut hasher = crc32fast::Hasher::new();
+            hash(folder.path(), &mut hasher);
+            hasher.finalize()
+        };
+        fs::create_dir(folder.path().join("inner")).expect("a folder");
+        let file = folder.path().join("inner/file");
+        fs::write(&file, "one").expect("it is written");
+        let one = checksum();
+        assert_eq!(checksum(), one);
+        fs::write(&file, "two").expect("it is written");
+        assert_ne!(checksum(), one);
+    }
 }
