@@ -1,0 +1,121 @@
+"""Encodes and decodes pictures with established codecs, on request.
+
+Prints the versions of the libraries, one per line and an empty line at the end. Then reads one
+request per line, fields separated by tabs:
+
+    codec, quality, threads (0: all), repeats, picture to encode, file for the decoded samples
+
+and answers each with the number of bytes of the file, the seconds to encode and the seconds to
+decode it, from samples in memory to bytes in memory and back: the median over the repeats.
+The decoded samples are interleaved 8-bit RGB.
+"""
+
+import io
+import os
+import statistics
+import sys
+import time
+
+import imagecodecs
+import numpy
+from PIL import AvifImagePlugin, Image, features
+
+
+def through_pillow(name, options, quality_option="quality"):
+    def encode(image, quality, threads):
+        out = io.BytesIO()
+        more = {"max_threads": threads} if name == "AVIF" else {}
+        image.save(out, name, **{quality_option: quality}, **options, **more)
+        return out.getvalue()
+
+    def decode(data, threads):
+        AvifImagePlugin.DEFAULT_MAX_THREADS = threads
+        image = Image.open(io.BytesIO(data))
+        image.load()
+        return image
+
+    return encode, decode
+
+
+def jpeg_2000():
+    encode_as, decode = through_pillow(
+        "JPEG2000",
+        {"irreversible": True, "mct": 1, "quality_mode": "rates"},
+        "quality_layers",
+    )
+
+    def encode(image, bits_per_pixel, threads):
+        # OpenJPEG takes the ratio to the samples' 24 bits.
+        return encode_as(image, [24 / bits_per_pixel], threads)
+
+    return encode, decode
+
+
+def jpeg_xl():
+    def encode(image, distance, threads):
+        samples = numpy.asarray(image)
+        return imagecodecs.jpegxl_encode(samples, distance=distance, effort=7, numthreads=threads)
+
+    def decode(data, threads):
+        return imagecodecs.jpegxl_decode(data, numthreads=threads)
+
+    return encode, decode
+
+
+AVIF = {"speed": 6, "subsampling": "4:2:0"}
+CODECS = {
+    "jpeg420prog": through_pillow(
+        "JPEG", {"subsampling": "4:2:0", "optimize": True, "progressive": True}
+    ),
+    "jp2": jpeg_2000(),
+    "webp_m6": through_pillow("WEBP", {"method": 6}),
+    "avif420_s6": through_pillow("AVIF", AVIF),
+    "avif420_s6_psnr": through_pillow("AVIF", AVIF | {"advanced": {"tune": "psnr"}}),
+    "jxl_e7": jpeg_xl(),
+}
+
+
+def timed(repeats, work, *arguments):
+    seconds = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        result = work(*arguments)
+        seconds.append(time.perf_counter() - start)
+    return result, statistics.median(seconds)
+
+
+def answer(codec, quality, threads, repeats, source, decoded):
+    encode, decode = CODECS[codec]
+    image = Image.open(source).convert("RGB")
+    quality = float(quality)
+    if codec not in ("jp2", "jxl_e7"):
+        quality = int(quality)
+    threads = int(threads) or len(os.sched_getaffinity(0))
+    repeats = int(repeats)
+    data, encode_seconds = timed(repeats, encode, image, quality, threads)
+    result, decode_seconds = timed(repeats, decode, data, threads)
+    with open(decoded, "wb") as out:
+        out.write(numpy.asarray(result).tobytes())
+    return len(data), encode_seconds, decode_seconds
+
+
+def versions():
+    yield f"Pillow {Image.__version__}"
+    yield f"libjpeg-turbo {features.version('libjpeg_turbo')}"
+    yield f"OpenJPEG {features.version('jpg_2000')}"
+    yield f"libwebp {features.version('webp')}"
+    yield f"libavif {features.version('avif')} ({AvifImagePlugin.get_codec_version('aom')})"
+    yield f"imagecodecs {imagecodecs.__version__}"
+    yield f"libjxl {imagecodecs.jpegxl_version().split()[-1]}"
+
+
+def main():
+    for version in versions():
+        print(version)
+    print(flush=True)
+    for request in sys.stdin:
+        print(*answer(*request.rstrip("\n").split("\t")), sep="\t", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,190 @@
+//! Established codecs, run by a Python program in a virtual environment that is set up here.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::pictures::{Distortion, Picture};
+use crate::provenance::FOLDER;
+
+/// A codec with the settings to sweep.
+#[derive(Debug)]
+pub(crate) struct Baseline {
+    /// What the worker calls it.
+    pub(crate) id: &'static str,
+    pub(crate) name: &'static str,
+    /// From small files to large ones: about 0.1 to 1.25 bits per pixel on photographs.
+    pub(crate) settings: &'static [&'static str],
+}
+
+/// The baselines, in the order of tables.
+pub(crate) const BASELINES: [Baseline; 6] = [
+    Baseline {
+        id: "jpeg420prog",
+        name: "JPEG",
+        settings: &[
+            "1", "3", "5", "7", "10", "13", "16", "20", "25", "30", "36", "42", "50", "58", "66",
+            "74", "80", "85", "90",
+        ],
+    },
+    Baseline {
+        id: "jp2",
+        name: "JPEG 2000",
+        settings: &[
+            "0.08", "0.1", "0.125", "0.15", "0.2", "0.25", "0.3", "0.35", "0.42", "0.5", "0.6",
+            "0.75", "0.9", "1.0", "1.25", "1.5",
+        ],
+    },
+    Baseline {
+        id: "webp_m6",
+        name: "WebP",
+        settings: &[
+            "0", "3", "6", "10", "15", "20", "26", "32", "40", "48", "56", "64", "72", "78", "83",
+            "87", "90",
+        ],
+    },
+    Baseline {
+        id: "avif420_s6",
+        name: "AVIF",
+        settings: &[
+            "1", "5", "10", "15", "20", "25", "30", "35", "40", "45", "50", "55", "60", "65", "70",
+            "75", "80",
+        ],
+    },
+    Baseline {
+        id: "avif420_s6_psnr",
+        name: "AVIF tune=psnr",
+        settings: &[
+            "1", "5", "10", "15", "20", "25", "30", "35", "40", "45", "50", "55", "60", "65", "70",
+            "75",
+        ],
+    },
+    Baseline {
+        id: "jxl_e7",
+        name: "JPEG XL",
+        // From distance 20 on libjxl halves the resolution.
+        settings: &[
+            "17", "14", "12", "10", "8.5", "7", "6", "5", "4", "3.5", "3", "2.5", "2", "1.5",
+            "1.25",
+        ],
+    },
+];
+
+/// What the columns and names of the baselines mean.
+pub(crate) const DESCRIPTION: &str = "\
+JPEG is 4:2:0, progressive, with optimised Huffman tables; JPEG 2000 is OpenJPEG's 9/7 wavelet with \
+its colour transform, in a .jp2; WebP is libwebp's method 6; AVIF is aom at speed 6, 4:2:0, with \
+libavif's default tuning (for perceived quality) and with tune=psnr; JPEG XL is libjxl's effort 7 at \
+full resolution, and tuned for perceived quality.";
+
+/// One file of a baseline.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coded {
+    pub(crate) bytes: f64,
+    pub(crate) distortion: Distortion,
+    pub(crate) encode_seconds: f64,
+    pub(crate) decode_seconds: f64,
+}
+
+/// The running Python program.
+#[derive(Debug)]
+pub(crate) struct Worker {
+    child: Child,
+    requests: ChildStdin,
+    answers: BufReader<ChildStdout>,
+    /// Where it leaves decoded samples.
+    decoded: PathBuf,
+    pub(crate) versions: Vec<String>,
+}
+
+impl Worker {
+    /// Installs what is missing, and starts. `scratch` is a folder for passing files.
+    pub(crate) fn start(scratch: &Path) -> Result<Self> {
+        let python = environment()?;
+        let mut child = Command::new(python)
+            .arg(Path::new(FOLDER).join("baselines/worker.py"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .context("cannot start the baselines")?;
+        let requests = child.stdin.take().context("the worker has no input")?;
+        let answers = BufReader::new(child.stdout.take().context("the worker has no output")?);
+        let decoded = std::path::absolute(scratch.join("decoded.rgb"))?;
+        let mut worker = Self { child, requests, answers, decoded, versions: Vec::new() };
+        loop {
+            let line = worker.line()?;
+            if line.is_empty() {
+                return Ok(worker);
+            }
+            worker.versions.push(line);
+        }
+    }
+
+    /// Encodes and decodes a picture; `None` for all threads. Times are medians over `repeats`.
+    pub(crate) fn code(
+        &mut self,
+        codec: &str,
+        setting: &str,
+        picture: &Picture,
+        threads: Option<usize>,
+        repeats: u32,
+    ) -> Result<Coded> {
+        let (source, decoded) = (picture.path.display(), self.decoded.display());
+        let threads = threads.unwrap_or(0);
+        writeln!(self.requests, "{codec}\t{setting}\t{threads}\t{repeats}\t{source}\t{decoded}")?;
+        let answer = self.line()?;
+        let numbers: Vec<f64> =
+            answer.split('\t').map(str::parse).collect::<Result<_, _>>().context(answer.clone())?;
+        let [bytes, encode_seconds, decode_seconds] = numbers[..] else {
+            bail!("the worker answered `{answer}`");
+        };
+        let distortion = picture.distortion(&fs::read(&self.decoded)?)?;
+        Ok(Coded { bytes, distortion, encode_seconds, decode_seconds })
+    }
+
+    fn line(&mut self) -> Result<String> {
+        let mut line = String::new();
+        let length = self.answers.read_line(&mut line)?;
+        ensure!(length > 0, "the worker stopped; its last words are above");
+        Ok(line.trim_end().to_owned())
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // It may be in the middle of a picture; nobody waits for that.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = fs::remove_file(&self.decoded);
+    }
+}
+
+/// The Python of a virtual environment that has the codecs, which is made where it is missing.
+fn environment() -> Result<PathBuf> {
+    let folder = Path::new(FOLDER).join("target/baselines");
+    let requirements = Path::new(FOLDER).join("baselines/requirements.txt");
+    let wanted = fs::read_to_string(&requirements)?;
+    let installed = folder.join("installed.txt");
+    let python = folder.join("bin/python");
+    if fs::read_to_string(&installed).is_ok_and(|text| text == wanted) {
+        return Ok(python);
+    }
+    eprintln!("setting up the baselines in {}", folder.display());
+    run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"];
+    run(Command::new(&python).args(pip).arg(&requirements))?;
+    fs::write(installed, wanted)?;
+    Ok(python)
+}
+
+fn run(command: &mut Command) -> Result<()> {
+    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
+    ensure!(
+        status.success(),
+        "{command:?} failed; Python 3.11 or later and the network are needed"
+    );
+    Ok(())
+}

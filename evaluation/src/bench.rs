@@ -1,0 +1,157 @@
+//! What all sections share: pictures, stores, baselines, and the report.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, ensure};
+
+use crate::baselines::Worker;
+use crate::pictures::{self, Picture};
+use crate::sections::Section;
+use crate::store::Store;
+use crate::{gip, provenance};
+
+/// How many pictures a quick run takes.
+const QUICK_PICTURES: usize = 4;
+/// Iterations of the published methods, if no others are asked for.
+const ITERATIONS: u32 = 5_000;
+const QUICK_ITERATIONS: u32 = 2_000;
+
+#[derive(Debug)]
+pub(crate) struct Bench {
+    pub(crate) pictures: Vec<Picture>,
+    pub(crate) quick: bool,
+    /// Of the published methods.
+    pub(crate) iterations: u32,
+    /// CSV with measurements of the baselines from elsewhere.
+    pub(crate) reference: Option<PathBuf>,
+    /// The version of our codec.
+    pub(crate) product: String,
+    machine: String,
+    folder: PathBuf,
+    worker: Option<Worker>,
+}
+
+impl Bench {
+    pub(crate) fn new(
+        images: &Path,
+        folder: PathBuf,
+        quick: bool,
+        iterations: Option<u32>,
+        reference: Option<PathBuf>,
+    ) -> Result<Self> {
+        let bench = Self {
+            pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
+            quick,
+            iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
+            reference,
+            product: provenance::product(),
+            machine: provenance::machine(),
+            folder,
+            worker: None,
+        };
+        bench.check_pictures()?;
+        Ok(bench)
+    }
+
+    /// Makes sure that pictures of equal names are those that the folder's measurements are of.
+    fn check_pictures(&self) -> Result<()> {
+        let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
+        for picture in &self.pictures {
+            let crc = f64::from(crc32fast::hash(&picture.rgb));
+            let known = [picture.width.into(), picture.height.into(), crc];
+            ensure!(
+                store.get("all", [&picture.name], || Ok(known))? == known,
+                "{} has measurements of another picture called {}: choose another folder",
+                self.folder.display(),
+                picture.name
+            );
+        }
+        Ok(())
+    }
+
+    /// The path of a file of the report.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// The measurements of a kind.
+    pub(crate) fn store<const K: usize, const V: usize>(
+        &self,
+        name: &str,
+        keys: [&str; K],
+        values: [&str; V],
+    ) -> Result<Store<K, V>> {
+        Store::open(&self.path(name), &self.machine, keys, values)
+    }
+
+    /// The baselines, with their versions in one line.
+    pub(crate) fn baselines(&mut self) -> Result<(&mut Worker, String)> {
+        let worker = match self.worker.take() {
+            Some(worker) => worker,
+            None => Worker::start(&self.folder)?,
+        };
+        let versions = worker.versions.join(", ");
+        Ok((self.worker.insert(worker), versions))
+    }
+
+    /// Writes the text of a section, with where it comes from, for this and later reports.
+    pub(crate) fn keep(&self, section: Section, text: &str) -> Result<()> {
+        let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
+        let mut from = format!(
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures: {}\n",
+            self.machine,
+            self.product,
+            provenance::commit(),
+            provenance::compiler(),
+            gip::SEED,
+            names.len(),
+            names.join(", "),
+        );
+        if let Some(worker) = &self.worker {
+            from.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
+        }
+        if self.quick {
+            from.push_str("- A quick run: few pictures and settings\n");
+        }
+        fs::write(self.path(&section.file()), format!("## {}\n\n{from}\n{text}", section.title()))?;
+        Ok(())
+    }
+
+    /// Puts the report together from the sections that have been kept.
+    pub(crate) fn write_report(&self) -> Result<PathBuf> {
+        let mut report = String::from(
+            "# image-gip, measured\n\nWritten by `evaluation/`; every single measurement is in the \
+             CSV files beside. Sizes are those of whole files. PSNR is over all samples of the \
+             decoded 8-bit RGB picture.\n",
+        );
+        for section in Section::ALL {
+            if let Ok(text) = fs::read_to_string(self.path(&section.file())) {
+                report.push_str(&format!("\n{}\n", text.trim_end()));
+            }
+        }
+        let path = self.path("report.md");
+        fs::write(&path, report)?;
+        Ok(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_picture_of_the_same_name_is_refused() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        let open = |gray: u8| {
+            let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
+            picture.save(images.path().join("a.png")).expect("it is written");
+            Bench::new(images.path(), report.path().into(), false, None, None)
+        };
+        assert!(open(1).is_ok());
+        assert!(open(1).is_ok());
+        let refusal = open(2).expect_err("it is another picture").to_string();
+        assert!(refusal.contains("another picture called a"), "{refusal}");
+    }
+}

@@ -1,0 +1,83 @@
+//! Measures image-gip against the world and writes a report: see `README.md`.
+
+mod baselines;
+mod bench;
+mod curve;
+mod gip;
+mod pictures;
+mod plot;
+mod provenance;
+mod sections;
+mod store;
+mod table;
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+
+use bench::Bench;
+use sections::Section;
+
+/// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
+/// single measurement.
+///
+/// What was measured before, on the same machine and the same version of the codec, is not measured
+/// again: an interrupted run goes on where it was, and a finished one only writes the report.
+#[derive(Debug, Parser)]
+struct Args {
+    /// Folder with the pictures, as .png.
+    #[arg(long, value_name = "DIR")]
+    images: PathBuf,
+    /// Folder for the report; it is made if it is missing.
+    #[arg(long, value_name = "REPORT_DIR")]
+    out: PathBuf,
+    /// Four of the pictures and fewer settings: ten minutes on two cores.
+    #[arg(long)]
+    quick: bool,
+    /// Only these sections [default: all].
+    #[arg(long, value_enum, value_name = "SECTION")]
+    only: Vec<Section>,
+    /// Iterations of the published methods [default: 5000, quick: 2000; the paper: 50000].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    iterations: Option<u32>,
+    /// CSV with measurements of the same baselines from elsewhere, to compare ours with; columns
+    /// codec, quality, image, bytes, bpp, psnr, msssim, as in `rate.csv`.
+    #[arg(long, value_name = "CSV")]
+    reference: Option<PathBuf>,
+}
+
+fn main() -> Result<()> {
+    let start = Instant::now();
+    let args = Args::parse();
+    fs::create_dir_all(&args.out)
+        .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+    let mut bench =
+        Bench::new(&args.images, args.out, args.quick, args.iterations, args.reference)?;
+    let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
+    for section in sections {
+        eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
+        let text = section.measure(&mut bench)?;
+        bench.keep(section, &text)?;
+    }
+    let report = bench.write_report()?;
+    eprintln!("{} (after {:.0} s)", report.display(), start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+        let args = ["evaluation", "--images", "a", "--out", "b", "--only", "rate"];
+        let args = Args::try_parse_from(args).expect("it is as the README has it");
+        assert_eq!(args.only, [Section::Rate]);
+        assert!(Args::try_parse_from(["evaluation", "--images", "a"]).is_err());
+    }
+}

@@ -1,0 +1,120 @@
+//! The pictures to measure on.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use image_gip::metrics;
+
+/// An 8-bit RGB picture, from a file or made up.
+#[derive(Clone, Debug)]
+pub(crate) struct Picture {
+    pub(crate) name: String,
+    /// Where the file is, for other programs to read.
+    pub(crate) path: PathBuf,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    /// Interleaved samples.
+    pub(crate) rgb: Vec<u8>,
+}
+
+/// How far a decoded picture is from its source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Distortion {
+    /// In dB, over all samples.
+    pub(crate) psnr: f64,
+    pub(crate) ms_ssim: f64,
+}
+
+impl Picture {
+    pub(crate) fn pixels(&self) -> f64 {
+        f64::from(self.width) * f64::from(self.height)
+    }
+
+    /// Bits per pixel of a file of so many bytes.
+    pub(crate) fn rate(&self, bytes: f64) -> f64 {
+        8.0 * bytes / self.pixels()
+    }
+
+    pub(crate) fn distortion(&self, decoded: &[u8]) -> Result<Distortion> {
+        ensure!(
+            decoded.len() == self.rgb.len(),
+            "{} samples were decoded in place of {}",
+            decoded.len(),
+            self.rgb.len()
+        );
+        Ok(Distortion {
+            psnr: metrics::psnr(&self.rgb, decoded, 255.0),
+            ms_ssim: metrics::ms_ssim(&self.rgb, decoded, self.width as usize, 3, 255.0),
+        })
+    }
+
+    /// As much of the picture, repeated in mirror images, as fits a size.
+    pub(crate) fn mirrored(&self, width: u32, height: u32) -> Self {
+        let mut rgb = Vec::with_capacity(width as usize * height as usize * 3);
+        let mirror = |i: u32, side: u32| {
+            let back = i / side % 2 == 1;
+            if back { side - 1 - i % side } else { i % side }
+        };
+        for y in 0..height {
+            let row = mirror(y, self.height) * self.width;
+            for x in 0..width {
+                let index = (row + mirror(x, self.width)) as usize * 3;
+                rgb.extend_from_slice(&self.rgb[index..index + 3]);
+            }
+        }
+        Self { width, height, rgb, ..self.clone() }
+    }
+}
+
+/// All PNGs of a folder by name, or `at_most` of them, evenly spread.
+pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<Picture>> {
+    let unreadable = || format!("cannot read the folder {}", folder.display());
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).with_context(unreadable)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+            paths.push(path);
+        }
+    }
+    ensure!(!paths.is_empty(), "there is no .png in {}", folder.display());
+    paths.sort();
+    let count = at_most.map_or(paths.len(), |most| most.min(paths.len()));
+    (0..count).map(|index| open(&paths[index * paths.len() / count])).collect()
+}
+
+fn open(path: &Path) -> Result<Picture> {
+    let image = image::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let image = image.into_rgb8();
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (width, height) = image.dimensions();
+    // The worker has a working directory and lines of its own.
+    let path = fs::canonicalize(path)?;
+    Ok(Picture { name, path, width, height, rgb: image.into_raw() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mirrors_meet_without_an_edge() {
+        let rgb = (0..2 * 2 * 3).collect();
+        let picture =
+            Picture { name: String::new(), path: PathBuf::new(), width: 2, height: 2, rgb };
+        let mirrored = picture.mirrored(5, 3);
+        let reds: Vec<u8> = mirrored.rgb.iter().step_by(3).copied().collect();
+        assert_eq!(reds, [0, 3, 3, 0, 0, 6, 9, 9, 6, 6, 6, 9, 9, 6, 6]);
+        assert_eq!(picture.mirrored(2, 2).rgb, picture.rgb);
+        assert_eq!(picture.mirrored(1, 1).rgb, [0, 1, 2]);
+    }
+
+    #[test]
+    fn a_picture_of_another_size_is_no_copy() {
+        let rgb = vec![7; 3];
+        let picture =
+            Picture { name: String::new(), path: PathBuf::new(), width: 1, height: 1, rgb };
+        assert_eq!(picture.distortion(&[7; 3]).expect("it fits").psnr, f64::INFINITY);
+        assert!(picture.distortion(&[7; 4]).is_err());
+    }
+}

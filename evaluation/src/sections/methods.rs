@@ -1,0 +1,44 @@
+//! The published methods, from the parts of this crate's training.
+
+use image_gip::Chart;
+use image_gip::training::{Filter, Schedule, Training};
+
+/// Iterations of the paper.
+pub(crate) const PUBLISHED: u32 = 50_000;
+/// Where the paper halves its learning rates, as a share of all iterations.
+const HALVING: f64 = 0.4;
+/// What GaussianImage adds to every variance, in square pixels.
+const GAUSSIAN_IMAGE_FILTER: Filter = Filter::Constant(0.5);
+
+/// The parameterizations, as tables call them.
+pub(crate) const CHARTS: [(&str, Chart); 3] = [
+    ("direct covariance", Chart::Covariance),
+    ("Cholesky", Chart::Cholesky),
+    ("rotation and scale", Chart::RotationScale),
+];
+
+/// What iterations and schedules mean in the tables.
+pub(crate) fn description(iterations: u32) -> String {
+    format!(
+        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve their \
+         learning rates at the same share ({HALVING}) of them; all else is as published. With fewer \
+         iterations than the paper's they are worse than they can be. All run in this crate, with its \
+         renderer and optimizer, on this machine's processor."
+    )
+}
+
+/// GaussianImage++ in a shorter time, with or without its two components.
+pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Training {
+    let mut training = Training::paper();
+    training.iterations = iterations;
+    training.parameterization = chart;
+    let interval = (f64::from(iterations) * HALVING).round() as u32;
+    training.optimizer.schedule = Schedule::Halving(interval.max(1));
+    if !d3 {
+        training.densification.initial = 1.0;
+    }
+    if !caf {
+        training.filter = GAUSSIAN_IMAGE_FILTER;
+    }
+    training
+}

@@ -1,0 +1,395 @@
+//! Rate and distortion: curves, tables at equal rates, and mean differences in rate.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use image_gip::Target;
+
+use crate::baselines::{BASELINES, Baseline, DESCRIPTION, Worker};
+use crate::bench::Bench;
+use crate::curve::{Curve, bd_rate};
+use crate::gip;
+use crate::pictures::Picture;
+use crate::plot::{Corner, Plot, Scale, Series};
+use crate::store::Store;
+use crate::table::{Table, decibels, from_decibels, mean, percent};
+
+/// Rates in bits per pixel at which our codec is measured.
+const RATES: [f64; 9] = [0.1, 0.15, 0.2, 0.25, 0.35, 0.5, 0.75, 1.0, 1.25];
+const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.05];
+/// Of the baselines' settings a quick run takes one in so many, and the last.
+const QUICK_STEP: usize = 3;
+/// Rates of the tables.
+const COLUMNS: [f64; 6] = [0.15, 0.25, 0.35, 0.5, 0.75, 1.0];
+/// Rates over which mean differences are taken.
+const RANGE: (f64, f64) = (0.1, 1.25);
+
+/// One file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    bytes: f64,
+    /// In bits per pixel.
+    pub(super) rate: f64,
+    psnr: f64,
+    ms_ssim: f64,
+}
+
+/// All files that were measured.
+#[derive(Debug)]
+pub(super) struct Files(Store<3, 4>);
+
+impl Files {
+    pub(super) fn open(bench: &Bench) -> Result<Self> {
+        let keys = ["codec", "quality", "image"];
+        Ok(Self(bench.store("rate.csv", keys, ["bytes", "bpp", "psnr", "msssim"])?))
+    }
+
+    fn ours(
+        &mut self,
+        version: &str,
+        rate: f64,
+        setting: &str,
+        picture: &Picture,
+    ) -> Result<Point> {
+        self.point(version, [gip::NAME, setting, &picture.name], || {
+            let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
+            let coded = gip::code(encoder, picture, None)?;
+            let distortion = coded.distortion;
+            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+        })
+    }
+
+    pub(super) fn baseline(
+        &mut self,
+        worker: &mut Worker,
+        versions: &str,
+        baseline: &Baseline,
+        setting: &str,
+        picture: &Picture,
+    ) -> Result<Point> {
+        self.point(versions, [baseline.id, setting, &picture.name], || {
+            let coded = worker.code(baseline.id, setting, picture, Some(1), 1)?;
+            let distortion = coded.distortion;
+            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+        })
+    }
+
+    fn point(
+        &mut self,
+        version: &str,
+        key: [&str; 3],
+        measure: impl FnOnce() -> Result<[f64; 4]>,
+    ) -> Result<Point> {
+        let [bytes, rate, psnr, ms_ssim] = self.0.get(version, key, measure)?;
+        Ok(Point { bytes, rate, psnr, ms_ssim })
+    }
+}
+
+/// All files of a codec.
+#[derive(Debug)]
+struct Codec {
+    id: &'static str,
+    name: &'static str,
+    settings: Vec<String>,
+    /// Picture by picture, and in each setting by setting.
+    points: Vec<Vec<Point>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Metric {
+    Psnr,
+    MsSsim,
+}
+
+impl Metric {
+    const ALL: [Self; 2] = [Self::Psnr, Self::MsSsim];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Psnr => "PSNR",
+            Self::MsSsim => "MS-SSIM",
+        }
+    }
+
+    /// Of a file, in dB.
+    fn of(self, point: &Point) -> f64 {
+        match self {
+            Self::Psnr => point.psnr,
+            Self::MsSsim => decibels(point.ms_ssim),
+        }
+    }
+
+    /// The mean over pictures, of qualities in dB, as tables show it.
+    fn mean(self, qualities: &[f64]) -> Option<String> {
+        match self {
+            Self::Psnr => mean(qualities.iter().copied()).map(|psnr| format!("{psnr:.2}")),
+            Self::MsSsim => {
+                let ms_ssim = mean(qualities.iter().map(|&quality| from_decibels(quality)))?;
+                Some(format!("{ms_ssim:.4} ({:.2})", decibels(ms_ssim)))
+            }
+        }
+    }
+}
+
+impl Codec {
+    fn curve(&self, picture: usize, metric: Metric) -> Curve {
+        Curve::new(self.points[picture].iter().map(|point| (point.rate, metric.of(point))))
+    }
+
+    fn curves(&self, metric: Metric) -> Vec<Curve> {
+        (0..self.points.len()).map(|picture| self.curve(picture, metric)).collect()
+    }
+
+    /// Mean rate against mean quality at every setting.
+    fn mean_curve(&self, metric: Metric) -> Curve {
+        let average = |of: &dyn Fn(&Point) -> f64, setting: usize| {
+            mean(self.points.iter().map(|points| of(&points[setting]))).unwrap_or(f64::NAN)
+        };
+        Curve::new((0..self.settings.len()).map(|setting| {
+            let quality = match metric {
+                Metric::Psnr => average(&|point| point.psnr, setting),
+                Metric::MsSsim => decibels(average(&|point| point.ms_ssim, setting)),
+            };
+            (average(&|point| point.rate, setting), quality)
+        }))
+    }
+}
+
+pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let codecs = codecs(bench)?;
+    let mut text = format!(
+        "Compared with: {DESCRIPTION} Ours is at effort {}, asked for {} bits per pixel.\n",
+        gip::EFFORT,
+        rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
+    );
+    if let Some(path) = &bench.reference {
+        text.push_str(&reference(path, bench, &codecs)?);
+    }
+    for metric in Metric::ALL {
+        let plot = plot(bench, &codecs, metric)?;
+        text.push_str(&format!(
+            "\n### {}\n\n![{0} over rate]({plot})\n{}{}{}",
+            metric.name(),
+            at_equal_rates(&codecs, metric),
+            mean_curves(&codecs, metric),
+            differences(bench, &codecs, metric),
+        ));
+    }
+    Ok(text)
+}
+
+fn rates(quick: bool) -> &'static [f64] {
+    if quick { &QUICK_RATES } else { &RATES }
+}
+
+/// All codecs measured on all pictures, ours first.
+fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
+    let mut store = Files::open(bench)?;
+    let pictures = bench.pictures.clone();
+    let (quick, product) = (bench.quick, bench.product.clone());
+    let (worker, versions) = bench.baselines()?;
+
+    let mut ours = Codec { id: gip::NAME, name: gip::NAME, settings: vec![], points: vec![] };
+    ours.settings =
+        rates(quick).iter().map(|rate| format!("{rate} bpp, effort {}", gip::EFFORT)).collect();
+    for picture in &pictures {
+        let mut points = Vec::new();
+        for (rate, setting) in rates(quick).iter().zip(&ours.settings) {
+            points.push(store.ours(&product, *rate, setting, picture)?);
+        }
+        ours.points.push(points);
+    }
+
+    let mut codecs = vec![ours];
+    for baseline in &BASELINES {
+        let step = if quick { QUICK_STEP } else { 1 };
+        let last = baseline.settings.len() - 1;
+        let chosen = baseline.settings.iter().enumerate();
+        let settings: Vec<String> = chosen
+            .filter(|&(index, _)| index % step == 0 || index == last)
+            .map(|(_, setting)| (*setting).to_owned())
+            .collect();
+        let mut all = Vec::new();
+        for picture in &pictures {
+            let mut points = Vec::new();
+            for setting in &settings {
+                points.push(store.baseline(worker, &versions, baseline, setting, picture)?);
+            }
+            all.push(points);
+        }
+        codecs.push(Codec { id: baseline.id, name: baseline.name, settings, points: all });
+    }
+    Ok(codecs)
+}
+
+/// A table with one row per codec, one column per rate.
+fn by_rate(codecs: &[Codec], cell: impl Fn(&Codec, f64) -> String) -> String {
+    let mut columns = vec!["codec".to_owned()];
+    columns.extend(COLUMNS.map(|rate| format!("{rate} bpp")));
+    let mut table = Table::new(&columns);
+    for codec in codecs {
+        let mut cells = vec![codec.name.to_owned()];
+        cells.extend(COLUMNS.map(|rate| cell(codec, rate)));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
+fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
+    let table = by_rate(codecs, |codec, rate| {
+        let curves = codec.curves(metric);
+        let reached: Vec<f64> = curves.iter().filter_map(|curve| curve.quality(rate)).collect();
+        let shown = metric.mean(&reached).filter(|_| reached.len() == curves.len());
+        shown.unwrap_or_else(|| format!("({}/{} reach)", reached.len(), curves.len()))
+    });
+    format!(
+        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the mean. \
+         Where some pictures have no files on both sides of the rate, there is no mean.\n{table}"
+    )
+}
+
+fn mean_curves(codecs: &[Codec], metric: Metric) -> String {
+    let table = by_rate(codecs, |codec, rate| {
+        let quality = codec.mean_curve(metric).quality(rate);
+        quality.map_or_else(
+            || "-".into(),
+            |quality| metric.mean(&[quality]).expect("one number has a mean"),
+        )
+    });
+    format!(
+        "\nThe mean curve, as papers plot it: mean rate and mean quality at each setting, \
+         interpolated. Settings of equal quality give more bits to difficult pictures; ours are \
+         settings of equal rate.\n{table}"
+    )
+}
+
+/// Mean differences in rate, picture by picture and on average.
+fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
+    let [ours, others @ ..] = codecs else { return String::new() };
+    let mut columns = vec!["picture"];
+    columns.extend(others.iter().map(|codec| codec.name));
+    let mut table = Table::new(&columns);
+    let mut all = vec![Vec::new(); others.len()];
+    for (index, picture) in bench.pictures.iter().enumerate() {
+        let mut cells = vec![picture.name.clone()];
+        for (codec, all) in others.iter().zip(&mut all) {
+            let difference =
+                bd_rate(&codec.curve(index, metric), &ours.curve(index, metric), RANGE);
+            all.extend(difference);
+            cells.push(percent(difference));
+        }
+        table.row(&cells);
+    }
+    let means: Vec<Option<f64>> = all.iter().map(|all| mean(all.iter().copied())).collect();
+    let mut cells = vec!["**mean**".to_owned()];
+    cells.extend(means.iter().map(|&mean| percent(mean)));
+    table.row(&cells);
+    let curves = others
+        .iter()
+        .map(|codec| percent(bd_rate(&codec.mean_curve(metric), &ours.mean_curve(metric), RANGE)));
+    let mut cells = vec!["**of the mean curves**".to_owned()];
+    cells.extend(curves);
+    table.row(&cells);
+
+    let list = |worse: bool| {
+        let named: Vec<&str> = others
+            .iter()
+            .zip(&means)
+            .filter(|(_, mean)| mean.is_some_and(|mean| (mean > 0.0) == worse))
+            .map(|(codec, _)| codec.name)
+            .collect();
+        if named.is_empty() { "none of these".to_owned() } else { named.join(", ") }
+    };
+    format!(
+        "\nBD-rate of our codec against each other one, from {} to {} bits per pixel: how much \
+         larger (+) or smaller (-) our files are at equal {}.\n{}\nOurs is worse than: {}. It is \
+         better than: {}.\n",
+        RANGE.0,
+        RANGE.1,
+        metric.name(),
+        table.finish(),
+        list(true),
+        list(false),
+    )
+}
+
+fn plot(bench: &Bench, codecs: &[Codec], metric: Metric) -> Result<String> {
+    let name = format!("rate-{}.svg", metric.name().to_lowercase());
+    let series: Vec<Series> = codecs
+        .iter()
+        .map(|codec| Series {
+            name: codec.name.to_owned(),
+            points: codec
+                .mean_curve(metric)
+                .points()
+                .filter(|(rate, _)| (RANGE.0 * 0.8..=RANGE.1 * 1.2).contains(rate))
+                .collect(),
+        })
+        .collect();
+    let plot = Plot {
+        title: &format!("{}, mean over {} pictures", metric.name(), bench.pictures.len()),
+        x: ("bits per pixel", Scale::Linear),
+        y: (&format!("{} in dB", metric.name()), Scale::Linear),
+        legend: Corner::LowerRight,
+    };
+    plot.write(&bench.path(&name), &series)?;
+    Ok(name)
+}
+
+/// Compares the baselines' files with the same ones of another source.
+fn reference(path: &Path, bench: &Bench, codecs: &[Codec]) -> Result<String> {
+    let columns = ["codec", "quality", "image", "bytes", "psnr", "msssim"];
+    let mut reader =
+        csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let header = reader.headers()?.clone();
+    let column = |name: &str| {
+        let index = header.iter().position(|column| column == name);
+        index.with_context(|| format!("{} has no column `{name}`", path.display()))
+    };
+    let columns = columns.into_iter().map(column).collect::<Result<Vec<_>>>()?;
+    let mut known = HashMap::new();
+    for row in reader.records() {
+        let row = row?;
+        let cell = |index: usize| row.get(columns[index]).unwrap_or_default();
+        let number = |index: usize| {
+            cell(index).parse::<f64>().with_context(|| format!("{}: {row:?}", path.display()))
+        };
+        let image = cell(2).trim_end_matches(".png").to_owned();
+        // Bits: equal settings are written alike as numbers, not as text.
+        let key = (cell(0).to_owned(), number(1)?.to_bits(), image);
+        known.insert(key, [number(3)?, number(4)?, number(5)?]);
+    }
+
+    let columns = ["codec", "files", "of equal size", "largest difference in PSNR", "in MS-SSIM"];
+    let mut table = Table::new(&columns);
+    let mut compared = 0;
+    for codec in &codecs[1..] {
+        let (mut files, mut equal, mut psnr, mut ms_ssim) = (0, 0, 0.0_f64, 0.0_f64);
+        for (picture, points) in bench.pictures.iter().zip(&codec.points) {
+            for (setting, point) in codec.settings.iter().zip(points) {
+                let key =
+                    (codec.id.to_owned(), setting.parse::<f64>()?.to_bits(), picture.name.clone());
+                let Some(other) = known.get(&key) else { continue };
+                files += 1;
+                equal += i32::from(other[0] == point.bytes);
+                psnr = psnr.max((other[1] - point.psnr).abs());
+                ms_ssim = ms_ssim.max((other[2] - point.ms_ssim).abs());
+            }
+        }
+        compared += files;
+        table.row(&[
+            codec.name.to_owned(),
+            files.to_string(),
+            equal.to_string(),
+            format!("{psnr:.4} dB"),
+            format!("{ms_ssim:.6}"),
+        ]);
+    }
+    ensure!(compared > 0, "{} has none of these files", path.display());
+    Ok(format!(
+        "\nThe baselines against {}, which other programs measured:\n{}",
+        path.file_name().unwrap_or_default().to_string_lossy(),
+        table.finish()
+    ))
+}

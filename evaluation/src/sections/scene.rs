@@ -1,0 +1,235 @@
+//! How many Gaussians and bytes the encoder spends on simple and on difficult pictures.
+
+use anyhow::Result;
+use image_gip::{ColorModel, Source, Target};
+
+use crate::bench::Bench;
+use crate::gip;
+use crate::pictures::Picture;
+use crate::table::{Table, mean};
+
+/// Side of all pictures of this section.
+const SIDE: u32 = 256;
+/// From how many pictures parts are taken as photographs.
+const PHOTOS: usize = 8;
+/// Standard deviations, in steps of 8 bits, of the noise on a photograph and on plain gray.
+const GRAIN: f64 = 8.0;
+const NOISE: f64 = 20.0;
+/// The quality that all pictures are asked for, in dB: noise of [`NOISE`] lies at 22 dB.
+const PSNR: f64 = 26.0;
+/// Gaussians for comparing colour models.
+const GAUSSIANS: u32 = 1000;
+
+pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let photos: Vec<Picture> = bench.pictures.iter().take(PHOTOS).map(middle).collect();
+    let mut text = format!(
+        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of the \
+         first {} photographs (means). Effort {}. Noise costs most and is what the format is worst \
+         at.\n",
+        photos.len(),
+        gip::EFFORT,
+    );
+    text.push_str(&kinds(bench, &photos)?);
+    text.push_str(&colors(bench, &photos)?);
+    Ok(text)
+}
+
+/// Makes the samples of a colour model from a photograph.
+type Samples = fn(&Picture) -> Vec<u8>;
+
+/// What is asked of the encoder.
+fn targets() -> [(String, Target); 2] {
+    [("auto".into(), Target::Auto), (format!("{PSNR} dB"), Target::Psnr(PSNR))]
+}
+
+fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
+    let mut store = bench.store(
+        "scene.csv",
+        ["picture", "target", "effort"],
+        ["gaussians", "bytes", "psnr", "encode_seconds"],
+    )?;
+    let grainy: Vec<Picture> = photos.iter().map(|photo| noisy(photo, GRAIN)).collect();
+    let scenes = [
+        ("flat", vec![made("flat", |_, _| [96, 128, 160])]),
+        ("ramp", vec![made("ramp", |x, y| [x as u8, y as u8, ((x + y) / 2) as u8])]),
+        ("six discs", vec![made("discs", discs)]),
+        ("photograph", photos.to_vec()),
+        ("photograph with noise", grainy),
+        ("noise", vec![noisy(&made("noise", |_, _| [128; 3]), NOISE)]),
+    ];
+    let mut text = String::new();
+    for (name, target) in targets() {
+        let mut table =
+            Table::new(&["picture", "Gaussians", "bytes", "bpp", "PSNR in dB", "encode s"]);
+        for (scene, pictures) in &scenes {
+            let mut all = Vec::new();
+            for picture in pictures {
+                let key = [picture.name.as_str(), &name, &gip::EFFORT.to_string()];
+                all.push(store.get(&bench.product, key, || {
+                    let coded =
+                        gip::code(gip::encoder(gip::EFFORT).with_target(target), picture, None)?;
+                    let report = coded.report;
+                    let psnr = coded.distortion.psnr;
+                    Ok([report.gaussians.into(), coded.bytes, psnr, report.seconds])
+                })?);
+            }
+            let [gaussians, bytes, psnr, seconds] = means(&all);
+            table.row(&[
+                (*scene).to_owned(),
+                format!("{gaussians:.0}"),
+                format!("{bytes:.0}"),
+                format!("{:.3}", 8.0 * bytes / f64::from(SIDE * SIDE)),
+                format!("{psnr:.2}"),
+                format!("{seconds:.2}"),
+            ]);
+        }
+        text.push_str(&format!("\nTarget: {name}.\n{}", table.finish()));
+    }
+    Ok(text)
+}
+
+/// What gray saves and alpha costs.
+fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
+    let mut store = bench.store(
+        "scene-colors.csv",
+        ["picture", "colors", "gaussians", "effort"],
+        ["bytes", "psnr"],
+    )?;
+    let models: [(_, _, Samples); 5] = [
+        ("gray", ColorModel::Gray, |photo| gray(photo).collect()),
+        ("gray, soft alpha", ColorModel::GrayAlpha, |photo| {
+            gray(photo).zip(alpha()).flat_map(|(gray, alpha)| [gray, alpha]).collect()
+        }),
+        ("RGB", ColorModel::Rgb, |photo| photo.rgb.clone()),
+        ("RGB, opaque alpha", ColorModel::Rgba, |photo| {
+            photo.rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect()
+        }),
+        ("RGB, soft alpha", ColorModel::Rgba, |photo| {
+            let pixels = photo.rgb.chunks_exact(3).zip(alpha());
+            pixels.flat_map(|(p, alpha)| [p[0], p[1], p[2], alpha]).collect()
+        }),
+    ];
+    let mut table = Table::new(&["colours", "bytes", "bits per Gaussian", "PSNR in dB"]);
+    for (name, model, samples) in models {
+        let mut all = Vec::new();
+        for photo in photos {
+            let key = [photo.name.as_str(), name, &GAUSSIANS.to_string(), &gip::EFFORT.to_string()];
+            all.push(store.get(&bench.product, key, || {
+                let samples = samples(photo);
+                let source = Source::new_u8(SIDE, SIDE, model, &samples)?;
+                let encoder = gip::encoder(gip::EFFORT).with_target(Target::Gaussians(GAUSSIANS));
+                let encoded = encoder.encode(&source)?;
+                Ok([encoded.bytes.len() as f64, encoded.report.psnr])
+            })?);
+        }
+        let [bytes, psnr] = means(&all);
+        table.row(&[
+            name.to_owned(),
+            format!("{bytes:.0}"),
+            format!("{:.1}", 8.0 * bytes / f64::from(GAUSSIANS)),
+            format!("{psnr:.2}"),
+        ]);
+    }
+    Ok(format!(
+        "\nThe photographs with at most {GAUSSIANS} Gaussians in different colour models; PSNR is \
+         over all samples of the model, alpha included.\n{}",
+        table.finish()
+    ))
+}
+
+fn means<const N: usize>(all: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|column| mean(all.iter().map(|row| row[column])).unwrap_or(f64::NAN))
+}
+
+/// The middle of a photograph; of a smaller one, what there is and its mirror images.
+fn middle(photo: &Picture) -> Picture {
+    let (left, top) = (photo.width.saturating_sub(SIDE) / 2, photo.height.saturating_sub(SIDE) / 2);
+    let mut part = photo.mirrored(photo.width.max(SIDE), photo.height.max(SIDE));
+    let row = part.width as usize * 3;
+    part.rgb = part
+        .rgb
+        .chunks_exact(row)
+        .skip(top as usize)
+        .take(SIDE as usize)
+        .flat_map(|row| &row[left as usize * 3..][..SIDE as usize * 3])
+        .copied()
+        .collect();
+    Picture { width: SIDE, height: SIDE, ..part }
+}
+
+fn made(name: &str, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
+    let rgb = (0..SIDE * SIDE).flat_map(|i| pixel(i % SIDE, i / SIDE)).collect();
+    Picture { name: name.into(), path: "".into(), width: SIDE, height: SIDE, rgb }
+}
+
+/// Discs of several sizes and colours on a plain ground.
+fn discs(x: u32, y: u32) -> [u8; 3] {
+    let discs = [
+        (60, 70, 45, [220, 60, 40]),
+        (180, 60, 30, [40, 90, 200]),
+        (130, 140, 20, [250, 220, 90]),
+        (60, 190, 35, [60, 160, 80]),
+        (200, 190, 40, [120, 60, 140]),
+        (130, 225, 12, [20, 20, 20]),
+    ];
+    let inside = |&&(cx, cy, r, _): &&(u32, u32, u32, [u8; 3])| {
+        x.abs_diff(cx).pow(2) + y.abs_diff(cy).pow(2) <= r * r
+    };
+    discs.iter().find(inside).map_or([235, 230, 220], |disc| disc.3)
+}
+
+/// The picture with Gaussian noise of a standard deviation on every sample.
+fn noisy(picture: &Picture, deviation: f64) -> Picture {
+    let mut random = fastrand::Rng::with_seed(gip::SEED);
+    let rgb = picture.rgb.iter().map(|&sample| {
+        let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
+        let normal = radius * (std::f64::consts::TAU * random.f64()).cos();
+        (f64::from(sample) + deviation * normal).round().clamp(0.0, 255.0) as u8
+    });
+    Picture { rgb: rgb.collect(), name: format!("{} with noise", picture.name), ..picture.clone() }
+}
+
+/// The luma of every pixel.
+fn gray(picture: &Picture) -> impl Iterator<Item = u8> {
+    picture.rgb.chunks_exact(3).map(|pixel| {
+        let [r, g, b] = [0, 1, 2].map(|channel| f64::from(pixel[channel]));
+        (0.299 * r + 0.587 * g + 0.114 * b).round() as u8
+    })
+}
+
+/// Opaque in the middle, and from there on less and less.
+fn alpha() -> impl Iterator<Item = u8> {
+    (0..SIDE * SIDE).map(|i| {
+        let (x, y) = ((i % SIDE).abs_diff(SIDE / 2), (i / SIDE).abs_diff(SIDE / 2));
+        let distance = f64::from(x * x + y * y).sqrt() / f64::from(SIDE / 2);
+        (255.0 * (1.5 - distance).clamp(0.0, 1.0)).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_has_the_side_whatever_the_photograph() {
+        for (width, height) in [(100, 300), (256, 256), (400, 100)] {
+            let rgb = (0..width * height).flat_map(|i| [(i % width) as u8, (i / width) as u8, 0]);
+            let rgb = rgb.collect();
+            let photo = Picture { name: String::new(), path: "".into(), width, height, rgb };
+            let part = middle(&photo);
+            assert_eq!((part.width, part.height), (SIDE, SIDE));
+            assert_eq!(part.rgb.len(), (SIDE * SIDE * 3) as usize);
+            assert_eq!(u32::from(part.rgb[0]), width.saturating_sub(SIDE) / 2);
+            assert_eq!(u32::from(part.rgb[1]), height.saturating_sub(SIDE) / 2);
+        }
+    }
+
+    #[test]
+    fn noise_is_the_same_every_time_and_as_strong_as_stated() {
+        let gray = made("gray", |_, _| [128; 3]);
+        let a = noisy(&gray, NOISE);
+        assert_eq!(a.rgb, noisy(&gray, NOISE).rgb);
+        let psnr = gray.distortion(&a.rgb).expect("equal sizes").psnr;
+        assert!((psnr - 20.0 * (255.0 / NOISE).log10()).abs() < 0.1, "{psnr}");
+    }
+}

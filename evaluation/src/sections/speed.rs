@@ -1,0 +1,387 @@
+//! Time against error, next to the baselines, and how time and memory grow.
+
+use anyhow::Result;
+use image_gip::Target;
+
+use super::rate::Files;
+use crate::baselines::{BASELINES, DESCRIPTION};
+use crate::bench::Bench;
+use crate::gip;
+use crate::pictures::Picture;
+use crate::plot::{Corner, Plot, Scale, Series};
+use crate::provenance::cores;
+use crate::table::Table;
+
+/// The rate that all files have, about.
+const RATE: f64 = 0.5;
+/// On how many pictures.
+const PICTURES: usize = 8;
+const QUICK_PICTURES: usize = 2;
+const EFFORTS: [u8; 9] = [1, 2, 3, 4, 5, 6, 7, 8, 9];
+const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
+/// The baselines' times are medians over so many runs.
+const REPEATS: u32 = 5;
+
+/// Sizes in megapixels, and how many Gaussians each megapixel gets.
+const MEGAPIXELS: [f64; 7] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
+const QUICK_MEGAPIXELS: [f64; 3] = [0.1, 0.5, 2.0];
+const DENSITY: f64 = 12_500.0;
+/// Numbers of Gaussians on one megapixel.
+const GAUSSIANS: [u32; 8] = [1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000];
+const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
+/// The effort with which growth is measured: it only scales the number of iterations.
+const GROWTH_EFFORT: u8 = 1;
+
+pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let rows = against_error(bench)?;
+    let mut text = format!(
+        "Compared with: {DESCRIPTION} Each is at the setting that comes nearest to {RATE} bits per \
+         pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from samples in memory to a file in \
+         memory and back, means; pictures: {}; all threads are {}. JPEG, JPEG 2000 and WebP have \
+         one thread here in any case. Other programs on the machine make times longer.\n",
+        pictures(bench).len(),
+        cores(),
+    );
+    text.push_str(&table(&rows));
+    text.push_str(&verdict(&rows));
+    for (name, title, seconds, unit) in [
+        ("speed-encode.svg", "Encoding, all threads", Row::encoding as fn(&Row) -> f64, "seconds"),
+        ("speed-decode.svg", "Decoding, all threads", Row::decoding, "milliseconds"),
+    ] {
+        let factor = if unit == "milliseconds" { 1000.0 } else { 1.0 };
+        plot_scatter(bench, name, title, &rows, &|row| factor * seconds(row), unit)?;
+        text.push_str(&format!("\n![{title}]({name})\n"));
+    }
+    text.push_str(&growth(bench)?);
+    Ok(text)
+}
+
+/// A codec at a setting, on average over the pictures.
+#[derive(Clone, Debug)]
+struct Row {
+    codec: &'static str,
+    setting: String,
+    rate: f64,
+    psnr: f64,
+    /// Seconds with one thread and with all.
+    encode: [f64; 2],
+    decode: [f64; 2],
+}
+
+impl Row {
+    fn encoding(&self) -> f64 {
+        self.encode[1]
+    }
+
+    fn decoding(&self) -> f64 {
+        self.decode[1]
+    }
+}
+
+fn pictures(bench: &Bench) -> Vec<Picture> {
+    let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(bench.pictures.len());
+    let all = bench.pictures.len();
+    (0..count).map(|index| bench.pictures[index * all / count].clone()).collect()
+}
+
+fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
+    let mut store = bench.store(
+        "speed.csv",
+        ["codec", "quality", "threads", "image"],
+        ["bytes", "bpp", "psnr", "encode_seconds", "decode_seconds"],
+    )?;
+    let mut files = Files::open(bench)?;
+    let pictures = pictures(bench);
+    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &EFFORTS };
+    let product = bench.product.clone();
+    let (worker, versions) = bench.baselines()?;
+    let mut rows = Vec::new();
+    for &effort in efforts {
+        let setting = format!("{RATE} bpp, effort {effort}");
+        rows.push(row(gip::NAME, &format!("effort {effort}"), &pictures, |index, threads| {
+            let picture = &pictures[index];
+            let key = [gip::NAME, &setting, called(threads), &picture.name];
+            store.get(&product, key, || {
+                let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
+                let coded = gip::code(encoder, picture, threads)?;
+                let decode = coded.decode_seconds(threads != Some(1))?;
+                let times = [coded.report.seconds, decode];
+                Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
+            })
+        })?);
+    }
+    for baseline in &BASELINES {
+        let mut settings = Vec::new();
+        for picture in &pictures {
+            let rate = |setting: &str| {
+                let point = files.baseline(worker, &versions, baseline, setting, picture)?;
+                Ok(point.rate)
+            };
+            settings.push(nearest(baseline.settings, rate)?);
+        }
+        rows.push(row(baseline.name, &settings.join(", "), &pictures, |index, threads| {
+            let (setting, picture) = (settings[index], &pictures[index]);
+            let key = [baseline.id, setting, called(threads), &picture.name];
+            store.get(&versions, key, || {
+                let coded = worker.code(baseline.id, setting, picture, threads, REPEATS)?;
+                let times = [coded.encode_seconds, coded.decode_seconds];
+                Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
+            })
+        })?);
+    }
+    Ok(rows)
+}
+
+/// Of settings from small files to large ones, that whose rate is nearest to [`RATE`].
+fn nearest<'a>(settings: &[&'a str], mut rate: impl FnMut(&str) -> Result<f64>) -> Result<&'a str> {
+    let (mut low, mut high) = (0, settings.len() - 1);
+    while high - low > 1 {
+        let middle = usize::midpoint(low, high);
+        if rate(settings[middle])? < RATE { low = middle } else { high = middle }
+    }
+    let below = RATE / rate(settings[low])?;
+    let above = rate(settings[high])? / RATE;
+    Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
+}
+
+fn called(threads: Option<usize>) -> &'static str {
+    if threads == Some(1) { "one" } else { "all" }
+}
+
+fn values(picture: &Picture, bytes: f64, psnr: f64, [encode, decode]: [f64; 2]) -> [f64; 5] {
+    [bytes, picture.rate(bytes), psnr, encode, decode]
+}
+
+fn row(
+    codec: &'static str,
+    setting: &str,
+    pictures: &[Picture],
+    mut get: impl FnMut(usize, Option<usize>) -> Result<[f64; 5]>,
+) -> Result<Row> {
+    let mut means = Vec::new();
+    for threads in [Some(1), None] {
+        let mut sums = [0.0; 5];
+        for index in 0..pictures.len() {
+            for (sum, value) in sums.iter_mut().zip(get(index, threads)?) {
+                *sum += value / pictures.len() as f64;
+            }
+        }
+        means.push(sums);
+    }
+    let [_, rate, psnr, ..] = means[0];
+    Ok(Row {
+        codec,
+        setting: setting.to_owned(),
+        rate,
+        psnr,
+        encode: [means[0][3], means[1][3]],
+        decode: [means[0][4], means[1][4]],
+    })
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut table = Table::new(&[
+        "codec",
+        "setting",
+        "bpp",
+        "PSNR in dB",
+        "encode s, one thread",
+        "all",
+        "decode ms, one thread",
+        "all",
+    ]);
+    for row in rows {
+        let mut cells = vec![row.codec.to_owned(), row.setting.clone()];
+        cells.push(format!("{:.3}", row.rate));
+        cells.push(format!("{:.2}", row.psnr));
+        cells.extend(row.encode.map(|seconds| format!("{seconds:.3}")));
+        cells.extend(row.decode.map(|seconds| format!("{:.1}", 1000.0 * seconds)));
+        table.row(&cells);
+    }
+    table.finish()
+}
+
+/// What our codec at its default effort is worse at than which others.
+fn verdict(rows: &[Row]) -> String {
+    let default = format!("effort {}", gip::EFFORT);
+    let Some(ours) = rows.iter().find(|row| row.setting == default) else {
+        return String::new();
+    };
+    let worse = |than: &dyn Fn(&Row) -> bool| {
+        let named: Vec<&str> = rows
+            .iter()
+            .filter(|row| row.codec != gip::NAME && than(row))
+            .map(|row| row.codec)
+            .collect();
+        if named.is_empty() { "none of these".to_owned() } else { named.join(", ") }
+    };
+    format!(
+        "\nAt its default effort ours encodes more slowly than: {}. It decodes more slowly, with all \
+         threads, than: {}; with one thread, than: {}.\n",
+        worse(&|row| row.encode[1] < ours.encode[1]),
+        worse(&|row| row.decode[1] < ours.decode[1]),
+        worse(&|row| row.decode[0] < ours.decode[0]),
+    )
+}
+
+fn plot_scatter(
+    bench: &Bench,
+    name: &str,
+    title: &str,
+    rows: &[Row],
+    time: &dyn Fn(&Row) -> f64,
+    unit: &str,
+) -> Result<()> {
+    let mut series: Vec<Series> = Vec::new();
+    for row in rows {
+        let point = (time(row), row.psnr);
+        match series.iter_mut().find(|series| series.name == row.codec) {
+            Some(series) => series.points.push(point),
+            None => series.push(Series { name: row.codec.to_owned(), points: vec![point] }),
+        }
+    }
+    let plot = Plot {
+        title: &format!("{title}: about {RATE} bits per pixel"),
+        x: (unit, Scale::Logarithmic),
+        y: ("PSNR in dB", Scale::Linear),
+        legend: Corner::UpperLeft,
+    };
+    plot.write(&bench.path(name), &series)
+}
+
+/// What a size and a number of Gaussians cost.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    megapixels: f64,
+    gaussians: f64,
+    psnr: f64,
+    encode: f64,
+    memory: f64,
+    decode: [f64; 2],
+}
+
+fn growth(bench: &Bench) -> Result<String> {
+    let megapixels: &[f64] = if bench.quick { &QUICK_MEGAPIXELS } else { &MEGAPIXELS };
+    let gaussians: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
+    let mut store = bench.store(
+        "growth.csv",
+        ["image", "megapixels", "gaussians", "effort"],
+        ["psnr", "encode_seconds", "peak_memory", "decode_seconds_one", "decode_seconds_all"],
+    )?;
+    let picture = &bench.pictures[0];
+    let mut cost = |megapixels: f64, gaussians: u32| -> Result<Cost> {
+        let key = [megapixels.to_string(), gaussians.to_string(), GROWTH_EFFORT.to_string()];
+        let key = [&picture.name, &key[0], &key[1], &key[2]];
+        let values = store.get(&bench.product, key.map(String::as_str), || {
+            let width = (1.5e6 * megapixels).sqrt().round();
+            let height = (1e6 * megapixels / width).round();
+            let large = picture.mirrored(width as u32, height as u32);
+            let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
+            let coded = gip::code(encoder, &large, None)?;
+            let [one, all] = [coded.decode_seconds(false)?, coded.decode_seconds(true)?];
+            let report = &coded.report;
+            Ok([coded.distortion.psnr, report.seconds, report.peak_memory as f64, one, all])
+        })?;
+        let [psnr, encode, memory, one, all] = values;
+        let gaussians = f64::from(gaussians);
+        Ok(Cost { megapixels, gaussians, psnr, encode, memory, decode: [one, all] })
+    };
+    let by_size = megapixels
+        .iter()
+        .map(|&size| cost(size, (DENSITY * size).round() as u32))
+        .collect::<Result<Vec<_>>>()?;
+    let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
+
+    let mut text = format!(
+        "\n### Growth\n\nOur codec alone, at effort {GROWTH_EFFORT}, on {}, cut or continued in \
+         mirror images. Other efforts multiply the encoding time by their iterations. Memory is what \
+         the encoder holds beside the source, at most.\n",
+        picture.name
+    );
+    for (name, title, costs, x) in [
+        (
+            "growth-pixels.svg",
+            format!("{DENSITY} Gaussians per megapixel"),
+            by_size,
+            ("megapixels", (|cost: &Cost| cost.megapixels) as fn(&Cost) -> f64),
+        ),
+        (
+            "growth-gaussians.svg",
+            "One megapixel".into(),
+            by_count,
+            ("Gaussians", |cost: &Cost| cost.gaussians),
+        ),
+    ] {
+        plot_growth(bench, name, &title, &costs, x)?;
+        text.push_str(&format!("\n{title}:\n{}\n![{title}]({name})\n", growth_table(&costs)));
+    }
+    Ok(text)
+}
+
+fn growth_table(costs: &[Cost]) -> String {
+    let mut table = Table::new(&[
+        "megapixels",
+        "Gaussians",
+        "PSNR in dB",
+        "encode s",
+        "memory MiB",
+        "decode ms, one thread",
+        "all",
+    ]);
+    for cost in costs {
+        table.row(&[
+            cost.megapixels.to_string(),
+            cost.gaussians.to_string(),
+            format!("{:.2}", cost.psnr),
+            format!("{:.2}", cost.encode),
+            format!("{:.1}", cost.memory / f64::from(1 << 20)),
+            format!("{:.1}", 1000.0 * cost.decode[0]),
+            format!("{:.1}", 1000.0 * cost.decode[1]),
+        ]);
+    }
+    table.finish()
+}
+
+fn plot_growth(
+    bench: &Bench,
+    name: &str,
+    title: &str,
+    costs: &[Cost],
+    (label, x): (&str, fn(&Cost) -> f64),
+) -> Result<()> {
+    let series = |name: &str, y: fn(&Cost) -> f64| Series {
+        name: name.to_owned(),
+        points: costs.iter().map(|cost| (x(cost), y(cost))).collect(),
+    };
+    let series = [
+        series("encode", |cost| cost.encode),
+        series("decode, one thread", |cost| cost.decode[0]),
+        series("decode, all threads", |cost| cost.decode[1]),
+    ];
+    let plot = Plot {
+        title,
+        x: (label, Scale::Logarithmic),
+        y: ("seconds", Scale::Logarithmic),
+        legend: Corner::UpperLeft,
+    };
+    plot.write(&bench.path(name), &series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_setting_is_found() {
+        let find = |rates: &[f64]| {
+            let names: Vec<String> = rates.iter().map(f64::to_string).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            nearest(&names, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
+        };
+        assert_eq!(find(&[0.1, 0.2, 0.45, 0.6, 0.9]), "0.45");
+        assert_eq!(find(&[0.1, 0.2, 0.3, 0.52, 0.9]), "0.52");
+        assert_eq!(find(&[0.1, 0.2]), "0.2");
+        assert_eq!(find(&[0.7, 0.8, 0.9]), "0.7");
+        assert_eq!(find(&[0.4]), "0.4");
+    }
+}

@@ -1,0 +1,57 @@
+//! Markdown tables, and how numbers look in them.
+
+use std::fmt::Write;
+
+/// A table whose first column is text and whose others are numbers.
+#[derive(Debug)]
+pub(crate) struct Table {
+    text: String,
+}
+
+impl Table {
+    pub(crate) fn new<T: AsRef<str>>(columns: &[T]) -> Self {
+        let mut table = Self { text: String::new() };
+        table.row(columns);
+        let rules: Vec<&str> =
+            columns.iter().enumerate().map(|(i, _)| if i == 0 { "---" } else { "---:" }).collect();
+        table.row(&rules);
+        table
+    }
+
+    pub(crate) fn row<T: AsRef<str>>(&mut self, cells: &[T]) {
+        for cell in cells {
+            let _ = write!(self.text, "| {} ", cell.as_ref());
+        }
+        self.text.push_str("|\n");
+    }
+
+    /// The table behind a blank line.
+    pub(crate) fn finish(&self) -> String {
+        format!("\n{}", self.text)
+    }
+}
+
+/// A share as a signed percentage.
+pub(crate) fn percent(share: Option<f64>) -> String {
+    share.map_or_else(|| "-".into(), |share| format!("{:+.1} %", 100.0 * share))
+}
+
+/// The mean, if there is anything.
+pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for value in values {
+        sum += value;
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sum / count)
+}
+
+/// MS-SSIM in decibels, where equal steps look alike.
+pub(crate) fn decibels(ms_ssim: f64) -> f64 {
+    -10.0 * (1.0 - ms_ssim).log10()
+}
+
+/// The reverse of [`decibels`].
+pub(crate) fn from_decibels(decibels: f64) -> f64 {
+    1.0 - 10_f64.powf(-decibels / 10.0)
+}
