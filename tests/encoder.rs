@@ -9,7 +9,7 @@ use image_gip::training::{
 };
 use image_gip::{
     Chart, ColorModel, EncodeError, Encoded, Encoder, Gaussian, Kernel, Limits, Metadata,
-    Precision, RenderOptions, SampleDepth, Source, StreamDecoder, Target, Text,
+    Precision, RenderOptions, SampleDepth, Source, StreamDecoder, Target, Text, metrics,
 };
 
 const COLORS: [ColorModel; 4] =
@@ -65,9 +65,7 @@ fn pixels_u8(stream: &StreamDecoder) -> Vec<u8> {
 }
 
 fn psnr_u8(a: &[u8], b: &[u8]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let squares: u64 = a.iter().zip(b).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
-    10.0 * (255.0 * 255.0 / (squares as f64 / a.len() as f64)).log10()
+    metrics::psnr(a, b, 255.0)
 }
 
 /// Checks what every file must hold, and returns the decoder.
@@ -118,9 +116,7 @@ fn sixteen_bits_are_kept() {
     let mut out = vec![0; samples.len()];
     let picture = stream.picture().expect("read");
     picture.render_u16(&RenderOptions::new(), &mut out).expect("within limits");
-    let squares: u64 =
-        out.iter().zip(&samples).map(|(a, b)| u64::from(a.abs_diff(*b)).pow(2)).sum();
-    let psnr = 10.0 * (65535.0 * 65535.0 / (squares as f64 / out.len() as f64)).log10();
+    let psnr = metrics::psnr(&out, &samples, 65535.0);
     assert_eq!(psnr, encoded.report.psnr);
     assert!(psnr > 40.0, "{psnr} dB");
     // A smooth ramp must not come back in steps of eight bits.

@@ -79,7 +79,7 @@ pub(crate) struct Encode {
     pub(crate) json: bool,
 }
 
-/// What the file shall meet. Without any of them: a sensible quality, the same as --quality 75.
+/// What the file shall meet. Without any of them: a sensible quality, the same as --quality 50.
 #[derive(Debug, clap::Args)]
 #[group(multiple = false)]
 pub(crate) struct TargetArgs {
@@ -95,7 +95,7 @@ pub(crate) struct TargetArgs {
     /// A PSNR of the decoded file of DB decibels, from 1 to 120.
     #[arg(long, help_heading = "Targets", value_name = "DB", value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
-    /// A quality from 0 (smallest) to 100 (best) [default: 75].
+    /// A quality from 0 (smallest) to 100 (best) [default: 50].
     #[arg(long, help_heading = "Targets", value_name = "Q", value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,
 }
