@@ -486,6 +486,7 @@ fn wrong_usage_exits_with_2() {
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
         assert!(error.starts_with("error: ") && error.contains(allowed), "{args:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{args:?}: {error}");
         assert!(output.stdout.is_empty(), "{args:?}");
     }
     assert_eq!(room.names(), ["a.png"], "nothing was written");

@@ -21,7 +21,16 @@ use args::{Args, Command};
 fn main() -> ExitCode {
     // Lets `image` read .gip wherever the tool takes a picture.
     image_gip::register();
-    let outcome = match Args::parse().command {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        // Help and version are no errors.
+        Err(error) if !error.use_stderr() => error.exit(),
+        Err(error) => {
+            eprintln!("{}", first_paragraph(&error.render().to_string()));
+            return ExitCode::from(2);
+        }
+    };
+    let outcome = match args.command {
         Command::Encode(args) => encode::run(&args),
         Command::Decode(args) => decode::run(&args),
         Command::Info(args) => info::run(&args),
@@ -35,6 +44,12 @@ fn main() -> ExitCode {
             ExitCode::from(if wrong_usage { 2 } else { 1 })
         }
     }
+}
+
+/// What is wrong with the arguments, on one line: `clap` goes on with tips and usage.
+fn first_paragraph(text: &str) -> String {
+    let paragraph = text.split("\n\n").next().unwrap_or_default();
+    paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// An error and its causes on one line. Many libraries repeat a cause in their own text; it is
