@@ -1,5 +1,7 @@
 //! The command line, from outside: files, streams, JSON, exit status.
 
+mod pictures;
+
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -108,25 +110,9 @@ fn open(path: &Path) -> DynamicImage {
     reader.with_guessed_format().expect("readable").decode().expect("a sound picture")
 }
 
-/// A ramp with a bright spot, in any colour type; alpha is a ramp, too.
+/// The shared picture at the size of these tests.
 fn picture(color: ColorType) -> DynamicImage {
-    let rgba = image::Rgba32FImage::from_fn(WIDTH, HEIGHT, |x, y| {
-        let ramp = x as f32 / WIDTH as f32;
-        let spot = if (x / 6, y / 6) == (2, 3) { 0.9 } else { 0.2 };
-        image::Rgba([ramp, spot, 1.0 - ramp, y as f32 / HEIGHT as f32])
-    });
-    let picture = DynamicImage::ImageRgba32F(rgba);
-    match color {
-        ColorType::L8 => picture.to_luma8().into(),
-        ColorType::La8 => picture.to_luma_alpha8().into(),
-        ColorType::Rgb8 => picture.to_rgb8().into(),
-        ColorType::Rgba8 => picture.to_rgba8().into(),
-        ColorType::L16 => picture.to_luma16().into(),
-        ColorType::La16 => picture.to_luma_alpha16().into(),
-        ColorType::Rgb16 => picture.to_rgb16().into(),
-        ColorType::Rgba16 => picture.to_rgba16().into(),
-        _ => picture,
-    }
+    pictures::picture((WIDTH, HEIGHT), color)
 }
 
 #[test]

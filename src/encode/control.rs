@@ -2,7 +2,7 @@
 
 use super::budget::Budget;
 use super::fit::{Fit, Fitted, Observer};
-use super::layout::Layout;
+use super::layout::{Layout, layers_length};
 use super::raster::Raster;
 use super::source::Source;
 use super::training::Training;
@@ -88,13 +88,13 @@ fn budget(
     let target = encoder.target;
     if let Some(bytes) = target.bytes(raster.pixels()) {
         let quantizers = quantizers(encoder.precision, training, raster.channels);
-        let least = layout.length(&quantizers, 0);
+        let least = layout.least_length(&quantizers);
         if bytes < least {
             return Err(EncodeError::Option(format!(
                 "a size of {bytes} bytes; this picture takes at least {least} without any Gaussian"
             )));
         }
-        let fits = |count: usize| layout.length(&quantizers, count) <= bytes;
+        let fits = |count: usize| least + layers_length(&quantizers, count) <= bytes;
         let (mut low, mut high) = (0, raster.pixels() + 1);
         while high - low > 1 {
             let middle = usize::midpoint(low, high);
@@ -140,7 +140,7 @@ fn missing(
     match (target, budget) {
         (Target::Psnr(target), _) => {
             let psnr = Verified::new(file, source).psnr(u32::MAX);
-            // A decibel takes about a quarter more Gaussians.
+            // A decibel takes somewhat less than 0.3 times as many Gaussians again.
             if psnr >= target {
                 0
             } else {
@@ -169,15 +169,17 @@ fn trimmed(
 ) -> Vec<u8> {
     fitted.codes.truncate(least_prefix(&Verified::new(&file, source), target) as usize);
     file = layout.write(&fitted);
+    let mut psnr = Verified::new(&file, source).psnr(u32::MAX);
     for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
-        if Verified::new(&file, source).psnr(u32::MAX) <= target + PSNR_TOLERANCE {
+        if psnr <= target + PSNR_TOLERANCE {
             break;
         }
         let mut fewer = fitted.clone();
         fewer.codes.remove(index);
         let trial = layout.write(&fewer);
-        if Verified::new(&trial, source).psnr(u32::MAX) >= target {
-            (fitted, file) = (fewer, trial);
+        let reached = Verified::new(&trial, source).psnr(u32::MAX);
+        if reached >= target {
+            (fitted, file, psnr) = (fewer, trial, reached);
         }
     }
     file

@@ -76,13 +76,10 @@ impl<'a> Layout<'a> {
         file
     }
 
-    /// The bytes of a file with `count` Gaussians stored by `quantizers`.
-    pub(crate) fn length(&self, quantizers: &[Quantizer], count: usize) -> u64 {
+    /// The bytes of a file without any Gaussian.
+    pub(crate) fn least_length(&self, quantizers: &[Quantizer]) -> u64 {
         let empty = Fitted { quantizers: quantizers.to_vec(), codes: Vec::new() };
-        let layers = layers(count)
-            .into_iter()
-            .map(|count| 12 + fixed::LAYER_PREFIX + fixed::packed_length(quantizers, count as u32));
-        self.write(&empty).len() as u64 + layers.sum::<u64>()
+        self.write(&empty).len() as u64
     }
 
     /// The Gaussian that adds most to the picture first, so that every prefix of the file is a
@@ -109,6 +106,12 @@ impl<'a> Layout<'a> {
         let codes = order.into_iter().map(|(_, codes)| *codes).collect();
         Fitted { quantizers: fitted.quantizers.clone(), codes }
     }
+}
+
+/// The bytes that the layers of `count` Gaussians add to a file.
+pub(crate) fn layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
+    let layer = |count| 12 + fixed::LAYER_PREFIX + fixed::packed_length(quantizers, count as u32);
+    layers(count).into_iter().map(layer).sum()
 }
 
 /// The sizes of the layers of a file with `count` Gaussians.
