@@ -14,7 +14,7 @@ use crate::{gip, provenance};
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
 /// Iterations of the published methods, if no others are asked for.
-const ITERATIONS: u32 = 5_000;
+const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
 #[derive(Debug)]
@@ -70,6 +70,17 @@ impl Bench {
         Ok(())
     }
 
+    /// At most so many of the pictures, evenly spread.
+    pub(crate) fn some(&self, at_most: usize) -> Vec<Picture> {
+        let (all, count) = (self.pictures.len(), at_most.min(self.pictures.len()));
+        (0..count).map(|index| self.pictures[index * all / count].clone()).collect()
+    }
+
+    /// Which pictures a measurement took: `taken` of all.
+    pub(crate) fn share(&self, taken: usize) -> String {
+        format!("pictures: {taken} of {}", self.pictures.len())
+    }
+
     /// The path of a file of the report.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
@@ -121,9 +132,10 @@ impl Bench {
     /// Puts the report together from the sections that have been kept.
     pub(crate) fn write_report(&self) -> Result<PathBuf> {
         let mut report = String::from(
-            "# image-gip, measured\n\nWritten by `evaluation/`; every single measurement is in the \
-             CSV files beside. Sizes are those of whole files. PSNR is over all samples of the \
-             decoded 8-bit RGB picture.\n",
+            "# image-gip, measured\n\nWritten by `evaluation/`, whose README has the command. The run \
+             leaves every single measurement as CSV beside this file. Sizes are those of whole \
+             files. PSNR is over all samples of the decoded 8-bit RGB picture, unless stated \
+             otherwise.\n",
         );
         for section in Section::ALL {
             if let Ok(text) = fs::read_to_string(self.path(&section.file())) {

@@ -42,3 +42,12 @@ pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Train
     }
     training
 }
+
+/// Ours, with bit depths of position, shape and colour.
+pub(crate) fn ours(iterations: u32, [position, shape, color]: [u8; 3]) -> Training {
+    let mut training = Training::fast(iterations);
+    training.quantization.position_bits = position;
+    training.quantization.shape_bits = shape;
+    training.quantization.color_bits = color;
+    training
+}

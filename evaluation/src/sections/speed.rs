@@ -11,6 +11,7 @@ use crate::pictures::Picture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::Table;
+use crate::verdict::{Better, Named, list, worse};
 
 /// The rate that all files have, about.
 const RATE: f64 = 0.5;
@@ -32,14 +33,23 @@ const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
 /// The effort with which growth is measured: it only scales the number of iterations.
 const GROWTH_EFFORT: u8 = 1;
 
+/// What the codecs are judged by.
+const FIGURES: [(&str, Better); 5] = [
+    ("PSNR at about this rate", Better::Higher),
+    ("encoding time with one thread", Better::Lower),
+    ("encoding time with all", Better::Lower),
+    ("decoding time with one thread", Better::Lower),
+    ("decoding time with all", Better::Lower),
+];
+
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let rows = against_error(bench)?;
     let mut text = format!(
         "Compared with: {DESCRIPTION} Each is at the setting that comes nearest to {RATE} bits per \
          pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from samples in memory to a file in \
-         memory and back, means; pictures: {}; all threads are {}. JPEG, JPEG 2000 and WebP have \
+         memory and back, means; {}; all threads are {}. JPEG, JPEG 2000 and WebP have \
          one thread here in any case. Other programs on the machine make times longer.\n",
-        pictures(bench).len(),
+        bench.share(pictures(bench).len()),
         cores(),
     );
     text.push_str(&table(&rows));
@@ -79,9 +89,7 @@ impl Row {
 }
 
 fn pictures(bench: &Bench) -> Vec<Picture> {
-    let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(bench.pictures.len());
-    let all = bench.pictures.len();
-    (0..count).map(|index| bench.pictures[index * all / count].clone()).collect()
+    bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES })
 }
 
 fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
@@ -104,7 +112,7 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
             store.get(&product, key, || {
                 let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
                 let coded = gip::code(encoder, picture, threads)?;
-                let decode = coded.decode_seconds(threads != Some(1))?;
+                let decode = gip::decode_seconds(&coded.file, threads != Some(1))?;
                 let times = [coded.report.seconds, decode];
                 Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
             })
@@ -207,21 +215,13 @@ fn verdict(rows: &[Row]) -> String {
     let Some(ours) = rows.iter().find(|row| row.setting == default) else {
         return String::new();
     };
-    let worse = |than: &dyn Fn(&Row) -> bool| {
-        let named: Vec<&str> = rows
-            .iter()
-            .filter(|row| row.codec != gip::NAME && than(row))
-            .map(|row| row.codec)
-            .collect();
-        if named.is_empty() { "none of these".to_owned() } else { named.join(", ") }
+    let named = |row: &Row| {
+        let [encode, decode] = [row.encode, row.decode];
+        (row.codec.to_owned(), vec![row.psnr, encode[0], encode[1], decode[0], decode[1]])
     };
-    format!(
-        "\nAt its default effort ours encodes more slowly than: {}. It decodes more slowly, with all \
-         threads, than: {}; with one thread, than: {}.\n",
-        worse(&|row| row.encode[1] < ours.encode[1]),
-        worse(&|row| row.decode[1] < ours.decode[1]),
-        worse(&|row| row.decode[0] < ours.decode[0]),
-    )
+    let others: Vec<Named> = rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
+    let (name, figures) = named(ours);
+    worse(&FIGURES, &(format!("{name} at its default effort ({})", gip::EFFORT), figures), &others)
 }
 
 fn plot_scatter(
@@ -256,9 +256,24 @@ struct Cost {
     gaussians: f64,
     psnr: f64,
     encode: f64,
-    memory: f64,
+    encode_memory: f64,
     decode: [f64; 2],
+    decode_memory: f64,
 }
+
+/// A figure of a cost with its name.
+type Figure = (&'static str, fn(&Cost) -> f64);
+
+const MEBIBYTE: f64 = (1 << 20) as f64;
+
+/// Times in seconds, then memory in MiB.
+const COSTS: [Figure; 5] = [
+    ("encoding time", |cost| cost.encode),
+    ("decoding time, one thread", |cost| cost.decode[0]),
+    ("decoding time, all threads", |cost| cost.decode[1]),
+    ("encoder's memory", |cost| cost.encode_memory / MEBIBYTE),
+    ("decoder's memory", |cost| cost.decode_memory / MEBIBYTE),
+];
 
 fn growth(bench: &Bench) -> Result<String> {
     let megapixels: &[f64] = if bench.quick { &QUICK_MEGAPIXELS } else { &MEGAPIXELS };
@@ -266,7 +281,14 @@ fn growth(bench: &Bench) -> Result<String> {
     let mut store = bench.store(
         "growth.csv",
         ["image", "megapixels", "gaussians", "effort"],
-        ["psnr", "encode_seconds", "peak_memory", "decode_seconds_one", "decode_seconds_all"],
+        [
+            "psnr",
+            "encode_seconds",
+            "encode_peak_memory",
+            "decode_seconds_one",
+            "decode_seconds_all",
+            "decode_peak_memory",
+        ],
     )?;
     let picture = &bench.pictures[0];
     let mut cost = |megapixels: f64, gaussians: u32| -> Result<Cost> {
@@ -278,13 +300,19 @@ fn growth(bench: &Bench) -> Result<String> {
             let large = picture.mirrored(width as u32, height as u32);
             let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
             let coded = gip::code(encoder, &large, None)?;
-            let [one, all] = [coded.decode_seconds(false)?, coded.decode_seconds(true)?];
-            let report = &coded.report;
-            Ok([coded.distortion.psnr, report.seconds, report.peak_memory as f64, one, all])
+            let file = &coded.file;
+            Ok([
+                coded.distortion.psnr,
+                coded.report.seconds,
+                coded.memory,
+                gip::decode_seconds(file, false)?,
+                gip::decode_seconds(file, true)?,
+                gip::decode_memory(file)?,
+            ])
         })?;
-        let [psnr, encode, memory, one, all] = values;
-        let gaussians = f64::from(gaussians);
-        Ok(Cost { megapixels, gaussians, psnr, encode, memory, decode: [one, all] })
+        let [psnr, encode, encode_memory, one, all, decode_memory] = values;
+        let (gaussians, decode) = (f64::from(gaussians), [one, all]);
+        Ok(Cost { megapixels, gaussians, psnr, encode, encode_memory, decode, decode_memory })
     };
     let by_size = megapixels
         .iter()
@@ -293,27 +321,34 @@ fn growth(bench: &Bench) -> Result<String> {
     let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
 
     let mut text = format!(
-        "\n### Growth\n\nOur codec alone, at effort {GROWTH_EFFORT}, on {}, cut or continued in \
-         mirror images. Other efforts multiply the encoding time by their iterations. Memory is what \
-         the encoder holds beside the source, at most.\n",
+        "\n### Growth\n\nCompared with itself: our codec alone, at effort {GROWTH_EFFORT}, on {}, cut \
+         or continued in mirror images. Other efforts multiply the encoding time by their iterations. \
+         Memory is what the program's allocator gave out at a time, at most: to the encoder beside the \
+         source, to the decoder (with all threads) beside the file, its samples included.\n",
         picture.name
     );
     for (name, title, costs, x) in [
         (
-            "growth-pixels.svg",
+            "growth-pixels",
             format!("{DENSITY} Gaussians per megapixel"),
             by_size,
             ("megapixels", (|cost: &Cost| cost.megapixels) as fn(&Cost) -> f64),
         ),
         (
-            "growth-gaussians.svg",
+            "growth-gaussians",
             "One megapixel".into(),
             by_count,
             ("Gaussians", |cost: &Cost| cost.gaussians),
         ),
     ] {
-        plot_growth(bench, name, &title, &costs, x)?;
-        text.push_str(&format!("\n{title}:\n{}\n![{title}]({name})\n", growth_table(&costs)));
+        text.push_str(&format!("\n{title}:\n{}{}", growth_table(&costs), steeper(&costs, x)));
+        for (suffix, unit, curves) in
+            [("", "seconds", &COSTS[..3]), ("-memory", "MiB", &COSTS[3..])]
+        {
+            let name = format!("{name}{suffix}.svg");
+            plot_growth(bench, &name, &title, &costs, x, unit, curves)?;
+            text.push_str(&format!("\n![{title}, {unit}]({name})\n"));
+        }
     }
     Ok(text)
 }
@@ -327,6 +362,7 @@ fn growth_table(costs: &[Cost]) -> String {
         "memory MiB",
         "decode ms, one thread",
         "all",
+        "memory MiB",
     ]);
     for cost in costs {
         table.row(&[
@@ -334,12 +370,27 @@ fn growth_table(costs: &[Cost]) -> String {
             cost.gaussians.to_string(),
             format!("{:.2}", cost.psnr),
             format!("{:.2}", cost.encode),
-            format!("{:.1}", cost.memory / f64::from(1 << 20)),
+            format!("{:.1}", cost.encode_memory / MEBIBYTE),
             format!("{:.1}", 1000.0 * cost.decode[0]),
             format!("{:.1}", 1000.0 * cost.decode[1]),
+            format!("{:.1}", cost.decode_memory / MEBIBYTE),
         ]);
     }
     table.finish()
+}
+
+/// Says which costs grow faster than what makes them grow, from the first to the last.
+fn steeper(costs: &[Cost], (label, x): Figure) -> String {
+    let [first, .., last] = costs else { return String::new() };
+    let grown = |of: fn(&Cost) -> f64| of(last) / of(first);
+    let base = grown(x);
+    let factors = COSTS.iter().map(|(name, of)| format!("{name} {:.1}", grown(*of)));
+    let steep = COSTS.iter().filter(|(_, of)| grown(*of) > base).map(|(name, _)| *name);
+    format!(
+        "\nFor {base:.1} times the {label}, times more of: {}. Worse than in proportion: {}.\n",
+        factors.collect::<Vec<_>>().join(", "),
+        list(steep),
+    )
 }
 
 fn plot_growth(
@@ -347,21 +398,21 @@ fn plot_growth(
     name: &str,
     title: &str,
     costs: &[Cost],
-    (label, x): (&str, fn(&Cost) -> f64),
+    (label, x): Figure,
+    unit: &str,
+    curves: &[Figure],
 ) -> Result<()> {
-    let series = |name: &str, y: fn(&Cost) -> f64| Series {
-        name: name.to_owned(),
-        points: costs.iter().map(|cost| (x(cost), y(cost))).collect(),
-    };
-    let series = [
-        series("encode", |cost| cost.encode),
-        series("decode, one thread", |cost| cost.decode[0]),
-        series("decode, all threads", |cost| cost.decode[1]),
-    ];
+    let series: Vec<Series> = curves
+        .iter()
+        .map(|(name, y)| Series {
+            name: (*name).to_owned(),
+            points: costs.iter().map(|cost| (x(cost), y(cost))).collect(),
+        })
+        .collect();
     let plot = Plot {
         title,
         x: (label, Scale::Logarithmic),
-        y: ("seconds", Scale::Logarithmic),
+        y: (unit, Scale::Logarithmic),
         legend: Corner::UpperLeft,
     };
     plot.write(&bench.path(name), &series)
