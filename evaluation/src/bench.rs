@@ -14,7 +14,7 @@ use crate::{gip, provenance};
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
 /// Iterations of the published methods, if no others are asked for.
-const ITERATIONS: u32 = 3_000;
+const ITERATIONS: u32 = 5_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
 #[derive(Debug)]
@@ -110,7 +110,8 @@ impl Bench {
     pub(crate) fn keep(&self, section: Section, text: &str) -> Result<()> {
         let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
         let mut from = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures: {}\n",
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, of which some tables take \
+             fewer and say so: {}\n",
             self.machine,
             self.product,
             provenance::commit(),

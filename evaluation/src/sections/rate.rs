@@ -167,7 +167,7 @@ impl Codec {
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let codecs = codecs(bench)?;
     let mut text = format!(
-        "Compared with: {DESCRIPTION} {}. Ours is at effort {}, asked for {} bits per pixel.\n",
+        "Compared with: {DESCRIPTION} Means; {}. Ours is at effort {}, asked for {} bits per pixel.\n",
         bench.share(bench.pictures.len()),
         gip::EFFORT,
         rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
@@ -236,6 +236,7 @@ fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
 /// than ours; `quality` is in dB, `None` where there is none to compare.
 fn by_rate(
     codecs: &[Codec],
+    metric: Metric,
     quality: impl Fn(&Codec, f64) -> Option<f64>,
     cell: impl Fn(&Codec, f64) -> String,
 ) -> String {
@@ -251,7 +252,8 @@ fn by_rate(
         let qualities = COLUMNS.map(|rate| quality(codec, rate).unwrap_or(f64::NAN));
         compared.push((codec.name.to_owned(), qualities.to_vec()));
     }
-    let figures = names.each_ref().map(|name| (name.as_str(), Better::Higher));
+    let figures = names.map(|name| format!("{} at {name}", metric.name()));
+    let figures = figures.each_ref().map(|figure| (figure.as_str(), Better::Higher));
     format!("{}{}", table.finish(), worse(&figures, &compared[0], &compared[1..]))
 }
 
@@ -264,6 +266,7 @@ fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
     };
     let table = by_rate(
         codecs,
+        metric,
         |codec, rate| metric.average(&all(codec, rate)?),
         |codec, rate| {
             let shown = all(codec, rate).and_then(|all| metric.mean(&all));
@@ -280,7 +283,7 @@ fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
 
 fn mean_curves(codecs: &[Codec], metric: Metric) -> String {
     let quality = |codec: &Codec, rate: f64| codec.mean_curve(metric).quality(rate);
-    let table = by_rate(codecs, quality, |codec, rate| {
+    let table = by_rate(codecs, metric, quality, |codec, rate| {
         let shown = quality(codec, rate).and_then(|quality| metric.mean(&[quality]));
         shown.unwrap_or_else(|| "-".into())
     });
