@@ -110,8 +110,8 @@ impl Bench {
     pub(crate) fn keep(&self, section: Section, text: &str) -> Result<()> {
         let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
         let mut from = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, of which some tables take \
-             fewer and say so: {}\n",
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
+             of which some tables take fewer and say so: {}\n",
             self.machine,
             self.product,
             provenance::commit(),
@@ -133,8 +133,8 @@ impl Bench {
     /// Puts the report together from the sections that have been kept.
     pub(crate) fn write_report(&self) -> Result<PathBuf> {
         let mut report = String::from(
-            "# image-gip, measured\n\nWritten by `evaluation/`, whose README has the command. The run \
-             leaves every single measurement as CSV beside this file. Sizes are those of whole \
+            "# image-gip, measured\n\nWritten by `evaluation/`, whose README has the command. The \
+             run leaves every single measurement as CSV beside this file. Sizes are those of whole \
              files. PSNR is over all samples of the decoded 8-bit RGB picture, unless stated \
              otherwise.\n",
         );

@@ -86,8 +86,8 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let counts: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (positions, bit depths, seeds). {} All figures are means over the pictures that each table \
-         names; PSNR is that of the float rendering.\n",
+         (positions, bit depths, seeds). {} All figures are means over the pictures that each \
+         table names; PSNR is that of the float rendering.\n",
         methods::description(ablation.iterations),
     );
     text.push_str(&ablation.components()?);
@@ -146,7 +146,7 @@ impl Ablation<'_> {
                 let mut training = methods::paper(self.iterations, Chart::Covariance, true, true);
                 training.densification.prune_interval = interval;
                 training.densification.steps = growths;
-                let variant = format!("pruned every {interval}, grown {growths} times");
+                let variant = format!("pruned every {interval} and grown {growths} times");
                 let outcome = self.float(&variant, training)?;
                 table.row(&[
                     format!("{interval} iterations"),
@@ -160,9 +160,9 @@ impl Ablation<'_> {
         }
         // The paper's choice comes first.
         Ok(format!(
-            "\n### Intervals of pruning and growing\n\nCompared with each other: GaussianImage++ with \
-             {} Gaussians as floats, grown as often as with the paper's intervals of 5,000 and 10,000 \
-             of 50,000 iterations; {}.\n{}{}",
+            "\n### Intervals of pruning and growing\n\nCompared with each other: GaussianImage++ \
+             with {} Gaussians as floats, grown as often as with the paper's intervals of 5,000 \
+             and 10,000 of 50,000 iterations; {}.\n{}{}",
             self.gaussians,
             self.bench.share(self.pictures.len()),
             table.finish(),
@@ -203,8 +203,9 @@ impl Ablation<'_> {
             }
         }
         Ok(format!(
-            "\n### Bit depths\n\nCompared with: the paper's choice, the first row. Our encoder at {} \
-             iterations, quantized; {}.\n{}\nThe paper's choice is worse, by BD-rate, than: {}.\n",
+            "\n### Bit depths\n\nCompared with: the paper's choice, the first row. Our encoder at \
+             {} iterations, quantized; {}.\n{}\nThe paper's choice is worse, by BD-rate, than: \
+             {}.\n",
             self.own_iterations,
             self.bench.share(self.pictures.len()),
             table.finish(),
@@ -234,10 +235,10 @@ impl Ablation<'_> {
         let least = psnrs.iter().copied().min_by(order).unwrap_or(f64::NAN);
         let most = psnrs.iter().copied().max_by(order).unwrap_or(f64::NAN);
         Ok(format!(
-            "\n### Seeds\n\nCompared with each other: {SEEDS} seeds of our encoder at {} iterations, \
-             quantized, {} Gaussians; {}. Of the means over the pictures, the mean and the standard \
-             deviation.\n{}\nThe worst seed is worse than the mean by {:.3} dB, the best is better by \
-             {:.3} dB.\n",
+            "\n### Seeds\n\nCompared with each other: {SEEDS} seeds of our encoder at {} \
+             iterations, quantized, {} Gaussians; {}. Of the means over the pictures, the mean and \
+             the standard deviation.\n{}\nThe worst seed is worse than the mean by {:.3} dB, the \
+             best is better by {:.3} dB.\n",
             self.own_iterations,
             self.gaussians,
             self.bench.share(self.pictures.len()),

@@ -73,13 +73,13 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
     Ok(format!(
         "\n### Gradients\n\nCompared with: central differences of the loss in f64, straight from \
          the formulas, for every parameter of twelve Gaussians (round ones, slanted ones, needles) \
-         per cell. The largest error in f32, relative to the gradient's magnitude plus 0.1, from the \
-         product's own tests.\n{}\nWorst: {worst:.1e} ({at}).\n\n### SIMD levels\n\nCompared with: \
-         scalar code, at every level that this machine has; `best` is what the codec takes here, \
-         `baseline` what it may take without asking the processor, `fallback` no SIMD at all. \
-         Samples are those of random Gaussians of every size, gradients those of the encoder's pass. \
-         All counts of differing values must be zero, from the product's own tests.\n{}\nLevels \
-         that differ: {}.\n",
+         per cell. The largest error in f32, relative to the gradient's magnitude plus 0.1, from \
+         the product's own tests.\n{}\nWorst: {worst:.1e} ({at}).\n\n### SIMD levels\n\nCompared \
+         with: scalar code, at every level that this machine has; `best` is what the codec takes \
+         here, `baseline` what it may take without asking the processor, `fallback` no SIMD at \
+         all. Samples are those of random Gaussians of every size, gradients those of the \
+         encoder's pass. All counts of differing values must be zero, from the product's own \
+         tests.\n{}\nLevels that differ: {}.\n",
         gradients.finish(),
         levels.finish(),
         list(unequal.into_iter()),

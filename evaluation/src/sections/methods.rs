@@ -20,10 +20,10 @@ pub(crate) const CHARTS: [(&str, Chart); 3] = [
 /// What iterations and schedules mean in the tables.
 pub(crate) fn description(iterations: u32) -> String {
     format!(
-        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve their \
-         learning rates at the same share ({HALVING}) of them; all else is as published. With fewer \
-         iterations than the paper's they are worse than they can be. All run in this crate, with its \
-         renderer and optimizer, on this machine's processor."
+        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve \
+         their learning rates at the same share ({HALVING}) of them; all else is as published. \
+         With fewer iterations than the paper's they are worse than they can be. All run in this \
+         crate, with its renderer and optimizer, on this machine's processor."
     )
 }
 

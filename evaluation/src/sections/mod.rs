@@ -2,6 +2,7 @@
 
 mod ablation;
 mod checks;
+mod growth;
 mod handmade;
 mod levels;
 mod methods;

@@ -32,9 +32,9 @@ enum Storage {
 }
 
 const STORAGES: [(&str, Storage); 5] = [
-    ("LSQ+, 12 bits", Storage::Trained(PAPER)),
-    ("LSQ+, 16 bits", Storage::Trained(FINE)),
-    ("12 bits, rounded afterwards", Storage::Rounded(PAPER, uniform)),
+    ("LSQ+ of 12 bits", Storage::Trained(PAPER)),
+    ("LSQ+ of 16 bits", Storage::Trained(FINE)),
+    ("12 bits by rounding afterwards", Storage::Rounded(PAPER, uniform)),
     ("half floats of pixels", Storage::Rounded(16, half_pixels)),
     ("half floats before tanh", Storage::Rounded(16, half_before_tanh)),
 ];
@@ -79,15 +79,16 @@ pub(super) fn measure(
     }
     Ok(format!(
         "\n### Positions as half floats\n\nCompared with: LSQ+ positions, in our own encoder at \
-         {iterations} iterations, with equal numbers of Gaussians, shapes of {SHAPE} and colours of \
-         {COLOR} bits by LSQ+ in all rows. The first two rows are trained with their quantizers. The \
-         others are the fit of the second row whose positions were rounded after training: to a \
-         uniform grid of {PAPER} bits between the least and the largest; to IEEE half floats of pixels, \
-         the coordinates of GaussianImage++; and to half floats of atanh(2 x / width - 1), as \
-         GaussianImage stores them, but for centres outside of the picture, which that cannot tell \
-         and which stay as they are. So half floats get no training that adapts to them, and LSQ+ in \
-         the third row neither. Sizes are whole files; those of \
-         rounded rows are the second row's less the bits saved. Means; {}. The printed row is the paper's, over its own rates.\n{}",
+         {iterations} iterations, with equal numbers of Gaussians, shapes of {SHAPE} and colours \
+         of {COLOR} bits by LSQ+ in all rows. The first two rows are trained with their \
+         quantizers. The others are the fit of the second row whose positions were rounded after \
+         training: to a uniform grid of {PAPER} bits between the least and the largest; to IEEE \
+         half floats of pixels, the coordinates of GaussianImage++; and to half floats of atanh(2 \
+         x / width - 1), as GaussianImage stores them, but for centres outside of the picture, \
+         which that cannot tell and which stay as they are. So half floats get no training that \
+         adapts to them, and LSQ+ in the third row neither. Sizes are whole files; those of \
+         rounded rows are the second row's less the bits saved. Means; {}. The printed row is the \
+         paper's, over its own rates.\n{}",
         bench.share(pictures.len()),
         text(counts, &rows),
     ))

@@ -167,7 +167,8 @@ impl Codec {
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let codecs = codecs(bench)?;
     let mut text = format!(
-        "Compared with: {DESCRIPTION} Means; {}. Ours is at effort {}, asked for {} bits per pixel.\n",
+        "Compared with: {DESCRIPTION} Means; {}. Ours is at effort {}, asked for {} bits per \
+         pixel.\n",
         bench.share(bench.pictures.len()),
         gip::EFFORT,
         rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
@@ -276,8 +277,9 @@ fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
         },
     );
     format!(
-        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the mean. \
-         Where some pictures have no files on both sides of the rate, there is no mean.\n{table}"
+        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the \
+         mean. Where some pictures have no files on both sides of the rate, there is no \
+         mean.\n{table}"
     )
 }
 

@@ -68,11 +68,11 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut text = format!(
         "Compared with: GaussianImage, GaussianImage++, the direct covariance without its two \
          components, and two levels of that: a fifth of the Gaussians for a picture of half the \
-         size, the others for what is then missing at full size, each for all iterations; LIG's own \
-         constants are not used. {} Ours is the encoder at effort {}. Attributes are 32-bit floats; \
-         PSNR is that of the float rendering, as papers have it. Memory is what the encoder holds \
-         beside the source, at most. Means; {}; all threads. Rows marked as printed are the paper's \
-         own figures for all of Kodak on an NVIDIA A30, with GPU memory.\n",
+         size, the others for what is then missing at full size, each for all iterations; LIG's \
+         own constants are not used. {} Ours is the encoder at effort {}. Attributes are 32-bit \
+         floats; PSNR is that of the float rendering, as papers have it. Memory is what the \
+         encoder holds beside the source, at most. Means; {}; all threads. Rows marked as printed \
+         are the paper's own figures for all of Kodak on an NVIDIA A30, with GPU memory.\n",
         methods::description(iterations),
         gip::EFFORT,
         bench.share(pictures.len()),

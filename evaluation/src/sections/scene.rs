@@ -28,8 +28,8 @@ const GAUSSIANS: u32 = 1000;
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let photos: Vec<Picture> = bench.some(PHOTOS).iter().map(middle).collect();
     let mut text = format!(
-        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of the \
-         photographs (means; {}). Effort {}.\n",
+        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of \
+         the photographs (means; {}). Effort {}.\n",
         bench.share(photos.len()),
         gip::EFFORT,
     );

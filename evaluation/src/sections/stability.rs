@@ -129,10 +129,10 @@ fn decoder(bench: &Bench) -> Result<String> {
         .map(|(difference, name)| format!("{name}: {:.2} steps of 8 bits", 255.0 * difference));
     Ok(format!(
         "### Decoder\n\nCompared with: the formula of the specification in f64, on files of chosen \
-         Gaussians, {} x {} pixels; 1 is a full sample, and an 8-bit step is 3.9e-3. The exponential \
-         kernel ends with a step of 1/255 of the amplitude, on whose two sides f32 and f64 may lie; \
-         the quartic one has none. The last three columns must be zero; SIMD is the widest that this \
-         machine has.\n{}\nWorst: {}. Not zero where it must be: {}.\n",
+         Gaussians, {} x {} pixels; 1 is a full sample, and an 8-bit step is 3.9e-3. The \
+         exponential kernel ends with a step of 1/255 of the amplitude, on whose two sides f32 and \
+         f64 may lie; the quartic one has none. The last three columns must be zero; SIMD is the \
+         widest that this machine has.\n{}\nWorst: {}. Not zero where it must be: {}.\n",
         SIZE.0,
         SIZE.1,
         table.finish(),
@@ -245,9 +245,10 @@ fn encoder(bench: &Bench) -> Result<String> {
     }
     Ok(format!(
         "\n### Encoder\n\nCompared with each other: pictures that are hard to fit, with at most \
-         {GAUSSIANS} Gaussians at effort {EFFORT}. Values are all those of the file's Gaussians and of \
-         its samples as floats. The file must not depend on the number of threads.\n{}\nWorst: {} \
-         ({:.2} dB). With values that are not finite, or files that depend on threads: {}.\n",
+         {GAUSSIANS} Gaussians at effort {EFFORT}. Values are all those of the file's Gaussians \
+         and of its samples as floats. The file must not depend on the number of \
+         threads.\n{}\nWorst: {} ({:.2} dB). With values that are not finite, or files that depend \
+         on threads: {}.\n",
         table.finish(),
         worst.1,
         worst.0,
