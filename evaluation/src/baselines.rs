@@ -74,11 +74,10 @@ pub(crate) const BASELINES: [Baseline; 6] = [
 ];
 
 /// What the columns and names of the baselines mean.
-pub(crate) const DESCRIPTION: &str = "\
-JPEG is 4:2:0, progressive, with optimised Huffman tables; JPEG 2000 is OpenJPEG's 9/7 wavelet with \
-its colour transform, in a .jp2; WebP is libwebp's method 6; AVIF is aom at speed 6, 4:2:0, with \
-libavif's default tuning (for perceived quality) and with tune=psnr; JPEG XL is libjxl's effort 7 at \
-full resolution, and tuned for perceived quality.";
+pub(crate) const DESCRIPTION: &str = "JPEG is 4:2:0, progressive, with optimised Huffman tables; \
+JPEG 2000 is OpenJPEG's 9/7 wavelet with its colour transform, in a .jp2; WebP is libwebp's method \
+6; AVIF is aom at speed 6, 4:2:0, with libavif's default tuning (for perceived quality) and with \
+tune=psnr; JPEG XL is libjxl's effort 7 at full resolution, and tuned for perceived quality.";
 
 /// One file of a baseline.
 #[derive(Clone, Copy, Debug)]

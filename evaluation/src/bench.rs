@@ -70,6 +70,17 @@ impl Bench {
         Ok(())
     }
 
+    /// At most so many of the pictures, evenly spread.
+    pub(crate) fn some(&self, at_most: usize) -> Vec<Picture> {
+        let (all, count) = (self.pictures.len(), at_most.min(self.pictures.len()));
+        (0..count).map(|index| self.pictures[index * all / count].clone()).collect()
+    }
+
+    /// Which pictures a measurement took: `taken` of all.
+    pub(crate) fn share(&self, taken: usize) -> String {
+        format!("pictures: {taken} of {}", self.pictures.len())
+    }
+
     /// The path of a file of the report.
     pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
@@ -99,7 +110,8 @@ impl Bench {
     pub(crate) fn keep(&self, section: Section, text: &str) -> Result<()> {
         let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
         let mut from = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures: {}\n",
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
+             of which some tables take fewer and say so: {}\n",
             self.machine,
             self.product,
             provenance::commit(),
@@ -121,9 +133,10 @@ impl Bench {
     /// Puts the report together from the sections that have been kept.
     pub(crate) fn write_report(&self) -> Result<PathBuf> {
         let mut report = String::from(
-            "# image-gip, measured\n\nWritten by `evaluation/`; every single measurement is in the \
-             CSV files beside. Sizes are those of whole files. PSNR is over all samples of the \
-             decoded 8-bit RGB picture.\n",
+            "# image-gip, measured\n\nWritten by `evaluation/`, whose README has the command. The \
+             run leaves every single measurement as CSV beside this file. Sizes are those of whole \
+             files. PSNR is over all samples of the decoded 8-bit RGB picture, unless stated \
+             otherwise.\n",
         );
         for section in Section::ALL {
             if let Ok(text) = fs::read_to_string(self.path(&section.file())) {

@@ -5,6 +5,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image_gip::{ColorModel, Encoder, RenderOptions, Report, Source, StreamDecoder};
 
+use crate::memory;
 use crate::pictures::{Distortion, Picture};
 
 /// How the codec is called in tables and files.
@@ -15,33 +16,97 @@ pub(crate) const EFFORT: u8 = 5;
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.
 const REPEATS: usize = 5;
-/// What is wrong with a file that ends too early.
-const NO_PICTURE: &str = "the file has no picture";
 
 /// One `.gip` file.
 #[derive(Clone, Debug)]
 pub(crate) struct Coded {
-    file: Vec<u8>,
+    pub(crate) file: Vec<u8>,
     pub(crate) bytes: f64,
     pub(crate) report: Report,
     pub(crate) distortion: Distortion,
+    /// Most bytes that the encoder held, beside the source.
+    pub(crate) memory: f64,
 }
 
-impl Coded {
-    /// How long decoding takes, from the file to samples, with all threads or with one.
-    pub(crate) fn decode_seconds(&self, parallel: bool) -> Result<f64> {
-        median_seconds(|| decode(&self.file, parallel).map(|_| ()))
-    }
+/// The encoder at an effort, with the seed of all measurements.
+pub(crate) fn encoder(effort: u8) -> Encoder {
+    Encoder::new().with_effort(effort).with_seed(SEED)
+}
 
-    /// How long rendering takes, from the Gaussians to samples, with all threads.
-    pub(crate) fn render_seconds(&self) -> Result<f64> {
+/// Encodes and decodes a picture; `None` for all threads.
+pub(crate) fn code(encoder: Encoder, picture: &Picture, threads: Option<usize>) -> Result<Coded> {
+    let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
+    let encoder = encoder.with_threads(threads);
+    let (encoded, memory) = memory::peak(|| encoder.encode(&source));
+    let encoded = encoded?;
+    let file = encoded.bytes;
+    let (bytes, distortion) = (file.len() as f64, distortion(&file, picture)?);
+    Ok(Coded { file, bytes, report: encoded.report, distortion, memory })
+}
+
+/// Decodes a file and hands over what it has.
+pub(crate) fn open<T>(
+    file: &[u8],
+    work: impl FnOnce(image_gip::Picture<'_>) -> Result<T>,
+) -> Result<T> {
+    let mut decoder = StreamDecoder::new();
+    decoder.feed(file)?;
+    work(decoder.picture().context("the file has no picture")?)
+}
+
+/// How far a file is from its source.
+pub(crate) fn distortion(file: &[u8], picture: &Picture) -> Result<Distortion> {
+    picture.distortion(&decode(file, true)?)
+}
+
+/// PSNR in dB of the rendering as floats, not rounded but clamped, as papers have it.
+pub(crate) fn psnr_float(file: &[u8], picture: &Picture) -> Result<f64> {
+    let (planes, pixels) = (planes(file)?, picture.rgb.len() / 3);
+    let squared = planes.iter().enumerate().map(|(index, sample)| {
+        let source = picture.rgb[index % pixels * 3 + index / pixels];
+        (f64::from(sample.clamp(0.0, 1.0)) - f64::from(source) / 255.0).powi(2)
+    });
+    Ok(-10.0 * (squared.sum::<f64>() / planes.len() as f64).log10())
+}
+
+/// The rendering as floats, plane after plane.
+pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
+    open(file, |picture| {
         let options = RenderOptions::new();
-        let mut decoder = StreamDecoder::new();
-        decoder.feed(&self.file)?;
-        let picture = decoder.picture().context(NO_PICTURE)?;
+        let mut planes = vec![0.0; picture.output_len(&options)?];
+        picture.render_planes(&options, &mut planes)?;
+        Ok(planes)
+    })
+}
+
+/// The samples of a file.
+fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
+    let options = RenderOptions::new().parallel(parallel);
+    open(file, |picture| {
+        let mut samples = vec![0; picture.output_len(&options)?];
+        picture.render_u8(&options, &mut samples)?;
+        Ok(samples)
+    })
+}
+
+/// Most bytes that decoding holds beside the file, the samples included.
+pub(crate) fn decode_memory(file: &[u8]) -> Result<f64> {
+    let (samples, bytes) = memory::peak(|| decode(file, true));
+    samples.map(|_| bytes)
+}
+
+/// How long decoding takes, from the file to samples, with all threads or with one.
+pub(crate) fn decode_seconds(file: &[u8], parallel: bool) -> Result<f64> {
+    median_seconds(|| decode(file, parallel).map(|_| ()))
+}
+
+/// How long rendering takes, from the Gaussians to samples, with all threads.
+pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
+    let options = RenderOptions::new();
+    open(file, |picture| {
         let mut samples = vec![0; picture.output_len(&options)?];
         median_seconds(|| Ok(picture.render_u8(&options, &mut samples)?))
-    }
+    })
 }
 
 /// How long something takes: the median of several times.
@@ -56,28 +121,20 @@ fn median_seconds(mut work: impl FnMut() -> Result<()>) -> Result<f64> {
     Ok(seconds[REPEATS / 2])
 }
 
-/// The encoder at an effort, with the seed of all measurements.
-pub(crate) fn encoder(effort: u8) -> Encoder {
-    Encoder::new().with_effort(effort).with_seed(SEED)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Encodes and decodes a picture; `None` for all threads.
-pub(crate) fn code(encoder: Encoder, picture: &Picture, threads: Option<usize>) -> Result<Coded> {
-    let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
-    let encoded = encoder.with_threads(threads).encode(&source)?;
-    let file = encoded.bytes;
-    let decoded = decode(&file, true)?;
-    let (bytes, distortion) = (file.len() as f64, picture.distortion(&decoded)?);
-    Ok(Coded { file, bytes, report: encoded.report, distortion })
-}
-
-/// The samples of a file.
-fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
-    let options = RenderOptions::new().parallel(parallel);
-    let mut decoder = StreamDecoder::new();
-    decoder.feed(file)?;
-    let picture = decoder.picture().context(NO_PICTURE)?;
-    let mut samples = vec![0; picture.output_len(&options)?];
-    picture.render_u8(&options, &mut samples)?;
-    Ok(samples)
+    #[test]
+    fn the_rendering_as_floats_is_as_far_as_the_encoder_says() {
+        let (width, height) = (24, 16);
+        let rgb = (0..width * height).flat_map(|i| [(i % 24 * 10) as u8, (i / 24 * 9) as u8, 77]);
+        let picture =
+            Picture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
+        let encoder = encoder(1).with_target(image_gip::Target::Gaussians(20));
+        let coded = code(encoder, &picture, None).expect("a small picture");
+        let psnr = psnr_float(&coded.file, &picture).expect("it decodes");
+        assert!((psnr - coded.report.psnr_float).abs() < 1e-3, "{psnr}");
+        assert_eq!(coded.distortion.psnr, coded.report.psnr);
+    }
 }

@@ -4,12 +4,14 @@ mod baselines;
 mod bench;
 mod curve;
 mod gip;
+mod memory;
 mod pictures;
 mod plot;
 mod provenance;
 mod sections;
 mod store;
 mod table;
+mod verdict;
 
 use std::fs;
 use std::path::PathBuf;

@@ -5,12 +5,14 @@ use image_gip::training::Training;
 use image_gip::{Chart, Encoder, Precision, Target};
 
 use super::methods::{self, CHARTS};
+use super::positions;
 use crate::bench::Bench;
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::pictures::Picture;
 use crate::store::Store;
 use crate::table::{Table, mean, percent};
+use crate::verdict::{Better, Named, list, worse};
 
 /// Gaussians where the table names no others.
 const GAUSSIANS: u32 = 5_000;
@@ -21,7 +23,9 @@ const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
 /// Iterations of ours for bit depths and seeds.
 const OWN_ITERATIONS: u32 = 600;
 const QUICK_OWN_ITERATIONS: u32 = 150;
+/// How many pictures: for components and seeds, and for what takes more settings.
 const PICTURES: usize = 8;
+const FEWER_PICTURES: usize = 4;
 const QUICK_PICTURES: usize = 1;
 /// Bits of position, shape and colour; the first are the paper's choice.
 const DEPTHS: [[u8; 3]; 8] = [
@@ -40,12 +44,15 @@ const PRUNING: [u32; 3] = [100, 500, 1_000];
 const GROWTHS: [u32; 2] = [9, 4];
 const SEEDS: u64 = 5;
 
+/// What components and intervals are judged by.
+const FIGURES: [(&str, Better); 2] = [("PSNR", Better::Higher), ("MS-SSIM", Better::Higher)];
+
 /// Everything that the measurements share.
 #[derive(Debug)]
 struct Ablation<'a> {
     store: Store<4, 4>,
-    product: &'a str,
-    pictures: &'a [Picture],
+    bench: &'a Bench,
+    pictures: Vec<Picture>,
     gaussians: u32,
     iterations: u32,
     own_iterations: u32,
@@ -61,31 +68,35 @@ struct Outcome {
 }
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let bench: &Bench = bench;
     let choose = |quick: u32, full: u32| if bench.quick { quick } else { full };
-    let pictures = if bench.quick { QUICK_PICTURES } else { PICTURES };
+    let pictures = |full: usize| bench.some(if bench.quick { QUICK_PICTURES } else { full });
     let mut ablation = Ablation {
         store: bench.store(
             "ablation.csv",
             ["variant", "iterations", "gaussians", "image"],
             ["bpp", "psnr", "msssim", "seconds"],
         )?,
-        product: &bench.product,
-        pictures: &bench.pictures[..pictures.min(bench.pictures.len())],
+        bench,
+        pictures: pictures(PICTURES),
         gaussians: choose(QUICK_GAUSSIANS, GAUSSIANS),
         iterations: bench.iterations,
         own_iterations: choose(QUICK_OWN_ITERATIONS, OWN_ITERATIONS),
     };
-    let curve: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
+    let counts: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (bit depths, seeds). {} Means; pictures: {}.\n",
+         (positions, bit depths, seeds). {} All figures are means over the pictures that each \
+         table names; PSNR is that of the float rendering.\n",
         methods::description(ablation.iterations),
-        ablation.pictures.len(),
     );
     text.push_str(&ablation.components()?);
-    text.push_str(&ablation.intervals()?);
-    text.push_str(&ablation.depths(curve)?);
     text.push_str(&ablation.seeds()?);
+    ablation.pictures = pictures(FEWER_PICTURES);
+    text.push_str(&ablation.intervals()?);
+    text.push_str(&ablation.depths(counts)?);
+    let iterations = ablation.own_iterations;
+    text.push_str(&positions::measure(bench, &ablation.pictures, counts, iterations)?);
     Ok(text)
 }
 
@@ -94,19 +105,33 @@ impl Ablation<'_> {
     fn components(&mut self) -> Result<String> {
         let mut table =
             Table::new(&["parameterization", "neither", "CAF alone", "D3 alone", "D3 and CAF"]);
+        let mut verdicts = String::new();
         for (name, chart) in CHARTS {
             let mut cells = vec![name.to_owned()];
-            for (d3, caf) in [(false, false), (false, true), (true, false), (true, true)] {
+            let mut compared: Vec<Named> = Vec::new();
+            for (part, d3, caf) in [
+                ("neither", false, false),
+                ("CAF alone", false, true),
+                ("D3 alone", true, false),
+                ("both", true, true),
+            ] {
                 let training = methods::paper(self.iterations, chart, d3, caf);
                 let variant = format!("{name}, D3 {d3}, CAF {caf}");
                 let outcome = self.float(&variant, training)?;
                 cells.push(format!("{:.2} dB, {:.4}", outcome.psnr, outcome.ms_ssim));
+                compared.push((part.to_owned(), vec![outcome.psnr, outcome.ms_ssim]));
             }
             table.row(&cells);
+            if let Some((_, both)) = compared.pop() {
+                let subject = (format!("{name} with both"), both);
+                verdicts.push_str(&worse(&FIGURES, &subject, &compared));
+            }
         }
         Ok(format!(
-            "\n### Components\n\nPSNR and MS-SSIM of {} Gaussians as floats.\n{}",
+            "\n### Components\n\nCompared with each other: {} Gaussians as floats with and without \
+             D3 and CAF; {}.\n{}{verdicts}",
             self.gaussians,
+            self.bench.share(self.pictures.len()),
             table.finish()
         ))
     }
@@ -115,12 +140,13 @@ impl Ablation<'_> {
     fn intervals(&mut self) -> Result<String> {
         let mut table =
             Table::new(&["pruned every", "grown", "PSNR in dB", "MS-SSIM", "training s"]);
+        let mut compared: Vec<Named> = Vec::new();
         for growths in GROWTHS {
             for interval in PRUNING {
                 let mut training = methods::paper(self.iterations, Chart::Covariance, true, true);
                 training.densification.prune_interval = interval;
                 training.densification.steps = growths;
-                let variant = format!("pruned every {interval}, grown {growths} times");
+                let variant = format!("pruned every {interval} and grown {growths} times");
                 let outcome = self.float(&variant, training)?;
                 table.row(&[
                     format!("{interval} iterations"),
@@ -129,14 +155,18 @@ impl Ablation<'_> {
                     format!("{:.4}", outcome.ms_ssim),
                     format!("{:.1}", outcome.seconds),
                 ]);
+                compared.push((variant, vec![outcome.psnr, outcome.ms_ssim]));
             }
         }
+        // The paper's choice comes first.
         Ok(format!(
-            "\n### Intervals of pruning and growing\n\nGaussianImage++ with {} Gaussians as floats, \
-             grown as often as with the paper's intervals of 5,000 and 10,000 of 50,000 \
-             iterations.\n{}",
+            "\n### Intervals of pruning and growing\n\nCompared with each other: GaussianImage++ \
+             with {} Gaussians as floats, grown as often as with the paper's intervals of 5,000 \
+             and 10,000 of 50,000 iterations; {}.\n{}{}",
             self.gaussians,
-            table.finish()
+            self.bench.share(self.pictures.len()),
+            table.finish(),
+            worse(&FIGURES, &compared[0], &compared[1..]),
         ))
     }
 
@@ -145,10 +175,7 @@ impl Ablation<'_> {
         let mut rows = Vec::new();
         for depths in DEPTHS {
             let [position, shape, color] = depths;
-            let mut training = Training::fast(self.own_iterations);
-            training.quantization.position_bits = position;
-            training.quantization.shape_bits = shape;
-            training.quantization.color_bits = color;
+            let training = methods::ours(self.own_iterations, depths);
             let variant = format!("{position}/{shape}/{color} bits");
             let mut outcomes = Vec::new();
             for &count in counts {
@@ -163,17 +190,26 @@ impl Ablation<'_> {
         columns.extend(counts.iter().map(|count| format!("{count} Gaussians")));
         columns.push(format!("BD-rate against {}", rows[0].0));
         let mut table = Table::new(&columns);
-        for (variant, outcomes) in rows {
-            let mut cells = vec![variant];
+        let mut better = Vec::new();
+        for (variant, outcomes) in &rows {
+            let mut cells = vec![variant.clone()];
             let figures = outcomes.iter().map(|o| format!("{:.2} dB, {:.3} bpp", o.psnr, o.rate));
             cells.extend(figures);
-            cells.push(percent(bd_rate(&anchor, &curve(&outcomes), (1e-3, 1e3))));
+            let difference = bd_rate(&anchor, &curve(outcomes), (1e-3, 1e3));
+            cells.push(percent(difference));
             table.row(&cells);
+            if difference.is_some_and(|difference| difference < 0.0) {
+                better.push(variant.as_str());
+            }
         }
         Ok(format!(
-            "\n### Bit depths\n\nOur encoder at {} iterations, quantized.\n{}",
+            "\n### Bit depths\n\nCompared with: the paper's choice, the first row. Our encoder at \
+             {} iterations, quantized; {}.\n{}\nThe paper's choice is worse, by BD-rate, than: \
+             {}.\n",
             self.own_iterations,
-            table.finish()
+            self.bench.share(self.pictures.len()),
+            table.finish(),
+            list(better.into_iter()),
         ))
     }
 
@@ -194,12 +230,21 @@ impl Ablation<'_> {
             cells.extend(columns.iter().map(|column| format!("{:.5}", figure(column))));
             table.row(&cells);
         }
+        let order = |a: &f64, b: &f64| a.total_cmp(b);
+        let [_, psnrs, _] = &columns;
+        let least = psnrs.iter().copied().min_by(order).unwrap_or(f64::NAN);
+        let most = psnrs.iter().copied().max_by(order).unwrap_or(f64::NAN);
         Ok(format!(
-            "\n### Seeds\n\nOur encoder at {} iterations, quantized, {} Gaussians, {SEEDS} seeds: of \
-             the means over the pictures, the mean and the standard deviation.\n{}",
+            "\n### Seeds\n\nCompared with each other: {SEEDS} seeds of our encoder at {} \
+             iterations, quantized, {} Gaussians; {}. Of the means over the pictures, the mean and \
+             the standard deviation.\n{}\nThe worst seed is worse than the mean by {:.3} dB, the \
+             best is better by {:.3} dB.\n",
             self.own_iterations,
             self.gaussians,
-            table.finish()
+            self.bench.share(self.pictures.len()),
+            table.finish(),
+            average(psnrs) - least,
+            most - average(psnrs),
         ))
     }
 
@@ -219,10 +264,10 @@ impl Ablation<'_> {
         encoder: &Encoder,
     ) -> Result<Outcome> {
         let mut rows = Vec::new();
-        for picture in self.pictures {
+        for picture in &self.pictures {
             let (rounds, count) = (iterations.to_string(), gaussians.to_string());
             let key = [variant, &rounds, &count, &picture.name];
-            rows.push(self.store.get(self.product, key, || {
+            rows.push(self.store.get(&self.bench.product, key, || {
                 let encoder = encoder.clone().with_target(Target::Gaussians(gaussians));
                 let coded = gip::code(encoder, picture, None)?;
                 let (report, ms_ssim) = (&coded.report, coded.distortion.ms_ssim);

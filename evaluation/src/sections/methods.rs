@@ -20,10 +20,10 @@ pub(crate) const CHARTS: [(&str, Chart); 3] = [
 /// What iterations and schedules mean in the tables.
 pub(crate) fn description(iterations: u32) -> String {
     format!(
-        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve their \
-         learning rates at the same share ({HALVING}) of them; all else is as published. With fewer \
-         iterations than the paper's they are worse than they can be. All run in this crate, with its \
-         renderer and optimizer, on this machine's processor."
+        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve \
+         their learning rates at the same share ({HALVING}) of them; all else is as published. \
+         With fewer iterations than the paper's they are worse than they can be. All run in this \
+         crate, with its renderer and optimizer, on this machine's processor."
     )
 }
 
@@ -40,5 +40,14 @@ pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Train
     if !caf {
         training.filter = GAUSSIAN_IMAGE_FILTER;
     }
+    training
+}
+
+/// Ours, with bit depths of position, shape and colour.
+pub(crate) fn ours(iterations: u32, [position, shape, color]: [u8; 3]) -> Training {
+    let mut training = Training::fast(iterations);
+    training.quantization.position_bits = position;
+    training.quantization.shape_bits = shape;
+    training.quantization.color_bits = color;
     training
 }

@@ -1,8 +1,12 @@
 //! The report's sections. Each measures what it lacks and returns its text.
 
 mod ablation;
+mod checks;
+mod growth;
 mod handmade;
+mod levels;
 mod methods;
+mod positions;
 mod rate;
 mod representation;
 mod scene;

@@ -14,6 +14,7 @@ use crate::pictures::Picture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::store::Store;
 use crate::table::{Table, decibels, from_decibels, mean, percent};
+use crate::verdict::{Better, Named, list, worse};
 
 /// Rates in bits per pixel at which our codec is measured.
 const RATES: [f64; 9] = [0.1, 0.15, 0.2, 0.25, 0.35, 0.5, 0.75, 1.0, 1.25];
@@ -120,15 +121,22 @@ impl Metric {
         }
     }
 
-    /// The mean over pictures, of qualities in dB, as tables show it.
-    fn mean(self, qualities: &[f64]) -> Option<String> {
+    /// The mean over pictures, of qualities in dB.
+    fn average(self, qualities: &[f64]) -> Option<f64> {
         match self {
-            Self::Psnr => mean(qualities.iter().copied()).map(|psnr| format!("{psnr:.2}")),
+            Self::Psnr => mean(qualities.iter().copied()),
             Self::MsSsim => {
-                let ms_ssim = mean(qualities.iter().map(|&quality| from_decibels(quality)))?;
-                Some(format!("{ms_ssim:.4} ({:.2})", decibels(ms_ssim)))
+                mean(qualities.iter().map(|&quality| from_decibels(quality))).map(decibels)
             }
         }
+    }
+
+    /// That mean as tables show it.
+    fn mean(self, qualities: &[f64]) -> Option<String> {
+        self.average(qualities).map(|quality| match self {
+            Self::Psnr => format!("{quality:.2}"),
+            Self::MsSsim => format!("{:.4} ({quality:.2})", from_decibels(quality)),
+        })
     }
 }
 
@@ -159,7 +167,9 @@ impl Codec {
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let codecs = codecs(bench)?;
     let mut text = format!(
-        "Compared with: {DESCRIPTION} Ours is at effort {}, asked for {} bits per pixel.\n",
+        "Compared with: {DESCRIPTION} Means; {}. Ours is at effort {}, asked for {} bits per \
+         pixel.\n",
+        bench.share(bench.pictures.len()),
         gip::EFFORT,
         rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
     );
@@ -223,39 +233,61 @@ fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
     Ok(codecs)
 }
 
-/// A table with one row per codec, one column per rate.
-fn by_rate(codecs: &[Codec], cell: impl Fn(&Codec, f64) -> String) -> String {
+/// A table with one row per codec, one column per rate, and at which rates which codecs are better
+/// than ours; `quality` is in dB, `None` where there is none to compare.
+fn by_rate(
+    codecs: &[Codec],
+    metric: Metric,
+    quality: impl Fn(&Codec, f64) -> Option<f64>,
+    cell: impl Fn(&Codec, f64) -> String,
+) -> String {
+    let names = COLUMNS.map(|rate| format!("{rate} bpp"));
     let mut columns = vec!["codec".to_owned()];
-    columns.extend(COLUMNS.map(|rate| format!("{rate} bpp")));
+    columns.extend(names.clone());
     let mut table = Table::new(&columns);
+    let mut compared: Vec<Named> = Vec::new();
     for codec in codecs {
         let mut cells = vec![codec.name.to_owned()];
         cells.extend(COLUMNS.map(|rate| cell(codec, rate)));
         table.row(&cells);
+        let qualities = COLUMNS.map(|rate| quality(codec, rate).unwrap_or(f64::NAN));
+        compared.push((codec.name.to_owned(), qualities.to_vec()));
     }
-    table.finish()
+    let figures = names.map(|name| format!("{} at {name}", metric.name()));
+    let figures = figures.each_ref().map(|figure| (figure.as_str(), Better::Higher));
+    format!("{}{}", table.finish(), worse(&figures, &compared[0], &compared[1..]))
 }
 
 fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
-    let table = by_rate(codecs, |codec, rate| {
-        let curves = codec.curves(metric);
-        let reached: Vec<f64> = curves.iter().filter_map(|curve| curve.quality(rate)).collect();
-        let shown = metric.mean(&reached).filter(|_| reached.len() == curves.len());
-        shown.unwrap_or_else(|| format!("({}/{} reach)", reached.len(), curves.len()))
-    });
+    let reached = |codec: &Codec, rate: f64| -> Vec<f64> {
+        codec.curves(metric).iter().filter_map(|curve| curve.quality(rate)).collect()
+    };
+    let all = |codec: &Codec, rate: f64| {
+        Some(reached(codec, rate)).filter(|reached| reached.len() == codec.points.len())
+    };
+    let table = by_rate(
+        codecs,
+        metric,
+        |codec, rate| metric.average(&all(codec, rate)?),
+        |codec, rate| {
+            let shown = all(codec, rate).and_then(|all| metric.mean(&all));
+            shown.unwrap_or_else(|| {
+                format!("({}/{} reach)", reached(codec, rate).len(), codec.points.len())
+            })
+        },
+    );
     format!(
-        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the mean. \
-         Where some pictures have no files on both sides of the rate, there is no mean.\n{table}"
+        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the \
+         mean. Where some pictures have no files on both sides of the rate, there is no \
+         mean.\n{table}"
     )
 }
 
 fn mean_curves(codecs: &[Codec], metric: Metric) -> String {
-    let table = by_rate(codecs, |codec, rate| {
-        let quality = codec.mean_curve(metric).quality(rate);
-        quality.map_or_else(
-            || "-".into(),
-            |quality| metric.mean(&[quality]).expect("one number has a mean"),
-        )
+    let quality = |codec: &Codec, rate: f64| codec.mean_curve(metric).quality(rate);
+    let table = by_rate(codecs, metric, quality, |codec, rate| {
+        let shown = quality(codec, rate).and_then(|quality| metric.mean(&[quality]));
+        shown.unwrap_or_else(|| "-".into())
     });
     format!(
         "\nThe mean curve, as papers plot it: mean rate and mean quality at each setting, \
@@ -292,14 +324,10 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
     cells.extend(curves);
     table.row(&cells);
 
-    let list = |worse: bool| {
-        let named: Vec<&str> = others
-            .iter()
-            .zip(&means)
-            .filter(|(_, mean)| mean.is_some_and(|mean| (mean > 0.0) == worse))
-            .map(|(codec, _)| codec.name)
-            .collect();
-        if named.is_empty() { "none of these".to_owned() } else { named.join(", ") }
+    let named = |worse: bool| {
+        let means = others.iter().zip(&means);
+        let of_kind = means.filter(move |(_, mean)| mean.is_some_and(|m| (m > 0.0) == worse));
+        list(of_kind.map(|(codec, _)| codec.name))
     };
     format!(
         "\nBD-rate of our codec against each other one, from {} to {} bits per pixel: how much \
@@ -309,8 +337,8 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
         RANGE.1,
         metric.name(),
         table.finish(),
-        list(true),
-        list(false),
+        named(true),
+        named(false),
     )
 }
 

@@ -6,7 +6,8 @@ use image_gip::{ColorModel, Source, Target};
 use crate::bench::Bench;
 use crate::gip;
 use crate::pictures::Picture;
-use crate::table::{Table, mean};
+use crate::table::{Table, mean, percent};
+use crate::verdict::list;
 
 /// Side of all pictures of this section.
 const SIDE: u32 = 256;
@@ -17,16 +18,19 @@ const GRAIN: f64 = 8.0;
 const NOISE: f64 = 20.0;
 /// The quality that all pictures are asked for, in dB: noise of [`NOISE`] lies at 22 dB.
 const PSNR: f64 = 26.0;
+/// What the other colour models are compared with.
+const RGB: &str = "RGB";
+/// What the other pictures are compared with.
+const PHOTOGRAPH: &str = "photograph";
 /// Gaussians for comparing colour models.
 const GAUSSIANS: u32 = 1000;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let photos: Vec<Picture> = bench.pictures.iter().take(PHOTOS).map(middle).collect();
+    let photos: Vec<Picture> = bench.some(PHOTOS).iter().map(middle).collect();
     let mut text = format!(
-        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of the \
-         first {} photographs (means). Effort {}. Noise costs most and is what the format is worst \
-         at.\n",
-        photos.len(),
+        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of \
+         the photographs (means; {}). Effort {}.\n",
+        bench.share(photos.len()),
         gip::EFFORT,
     );
     text.push_str(&kinds(bench, &photos)?);
@@ -53,7 +57,7 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
         ("flat", vec![made("flat", |_, _| [96, 128, 160])]),
         ("ramp", vec![made("ramp", |x, y| [x as u8, y as u8, ((x + y) / 2) as u8])]),
         ("six discs", vec![made("discs", discs)]),
-        ("photograph", photos.to_vec()),
+        (PHOTOGRAPH, photos.to_vec()),
         ("photograph with noise", grainy),
         ("noise", vec![noisy(&made("noise", |_, _| [128; 3]), NOISE)]),
     ];
@@ -61,6 +65,7 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
     for (name, target) in targets() {
         let mut table =
             Table::new(&["picture", "Gaussians", "bytes", "bpp", "PSNR in dB", "encode s"]);
+        let (mut dearest, mut photograph) = ((0.0, ""), 0.0);
         for (scene, pictures) in &scenes {
             let mut all = Vec::new();
             for picture in pictures {
@@ -74,6 +79,12 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
                 })?);
             }
             let [gaussians, bytes, psnr, seconds] = means(&all);
+            if bytes > dearest.0 {
+                dearest = (bytes, *scene);
+            }
+            if *scene == PHOTOGRAPH {
+                photograph = bytes;
+            }
             table.row(&[
                 (*scene).to_owned(),
                 format!("{gaussians:.0}"),
@@ -83,7 +94,12 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
                 format!("{seconds:.2}"),
             ]);
         }
-        text.push_str(&format!("\nTarget: {name}.\n{}", table.finish()));
+        text.push_str(&format!(
+            "\nTarget: {name}.\n{}\nWorst: {}, with {:.1} times the bytes of a photograph.\n",
+            table.finish(),
+            dearest.1,
+            dearest.0 / photograph,
+        ));
     }
     Ok(text)
 }
@@ -100,7 +116,7 @@ fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
         ("gray, soft alpha", ColorModel::GrayAlpha, |photo| {
             gray(photo).zip(alpha()).flat_map(|(gray, alpha)| [gray, alpha]).collect()
         }),
-        ("RGB", ColorModel::Rgb, |photo| photo.rgb.clone()),
+        (RGB, ColorModel::Rgb, |photo| photo.rgb.clone()),
         ("RGB, opaque alpha", ColorModel::Rgba, |photo| {
             photo.rgb.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect()
         }),
@@ -109,7 +125,9 @@ fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
             pixels.flat_map(|(p, alpha)| [p[0], p[1], p[2], alpha]).collect()
         }),
     ];
-    let mut table = Table::new(&["colours", "bytes", "bits per Gaussian", "PSNR in dB"]);
+    let mut table =
+        Table::new(&["colours", "bytes", "against RGB", "bits per Gaussian", "PSNR in dB"]);
+    let mut rows = Vec::new();
     for (name, model, samples) in models {
         let mut all = Vec::new();
         for photo in photos {
@@ -122,18 +140,29 @@ fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
                 Ok([encoded.bytes.len() as f64, encoded.report.psnr])
             })?);
         }
-        let [bytes, psnr] = means(&all);
+        rows.push((name, means(&all)));
+    }
+    let rgb = rows.iter().find(|(name, _)| *name == RGB).map(|(_, [bytes, _])| *bytes);
+    let mut larger = Vec::new();
+    for (name, [bytes, psnr]) in &rows {
+        let share = rgb.map(|rgb| bytes / rgb - 1.0);
+        if share.is_some_and(|share| share > 0.0) {
+            larger.push(*name);
+        }
         table.row(&[
-            name.to_owned(),
+            (*name).to_owned(),
             format!("{bytes:.0}"),
+            percent(share),
             format!("{:.1}", 8.0 * bytes / f64::from(GAUSSIANS)),
             format!("{psnr:.2}"),
         ]);
     }
     Ok(format!(
-        "\nThe photographs with at most {GAUSSIANS} Gaussians in different colour models; PSNR is \
-         over all samples of the model, alpha included.\n{}",
-        table.finish()
+        "\nCompared with {RGB}: the photographs with at most {GAUSSIANS} Gaussians in other colour \
+         models; PSNR is over all samples of the model, alpha included.\n{}\nWorse than {RGB} in \
+         bytes: {}.\n",
+        table.finish(),
+        list(larger.into_iter()),
     ))
 }
 

@@ -1,8 +1,9 @@
-//! Time against error, next to the baselines, and how time and memory grow.
+//! Time against error, next to the baselines.
 
 use anyhow::Result;
 use image_gip::Target;
 
+use super::growth;
 use super::rate::Files;
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::Bench;
@@ -11,6 +12,7 @@ use crate::pictures::Picture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::Table;
+use crate::verdict::{Better, Named, worse};
 
 /// The rate that all files have, about.
 const RATE: f64 = 0.5;
@@ -22,24 +24,24 @@ const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
 
-/// Sizes in megapixels, and how many Gaussians each megapixel gets.
-const MEGAPIXELS: [f64; 7] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
-const QUICK_MEGAPIXELS: [f64; 3] = [0.1, 0.5, 2.0];
-const DENSITY: f64 = 12_500.0;
-/// Numbers of Gaussians on one megapixel.
-const GAUSSIANS: [u32; 8] = [1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000];
-const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
-/// The effort with which growth is measured: it only scales the number of iterations.
-const GROWTH_EFFORT: u8 = 1;
+/// What the codecs are judged by.
+const FIGURES: [(&str, Better); 5] = [
+    ("PSNR at about this rate", Better::Higher),
+    ("encoding time with one thread", Better::Lower),
+    ("encoding time with all", Better::Lower),
+    ("decoding time with one thread", Better::Lower),
+    ("decoding time with all", Better::Lower),
+];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let rows = against_error(bench)?;
     let mut text = format!(
         "Compared with: {DESCRIPTION} Each is at the setting that comes nearest to {RATE} bits per \
-         pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from samples in memory to a file in \
-         memory and back, means; pictures: {}; all threads are {}. JPEG, JPEG 2000 and WebP have \
-         one thread here in any case. Other programs on the machine make times longer.\n",
-        pictures(bench).len(),
+         pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from \
+         samples in memory to a file in memory and back, means; {}; all threads are {}. JPEG, JPEG \
+         2000 and WebP have one thread here in any case. Other programs on the machine make times \
+         longer.\n",
+        bench.share(pictures(bench).len()),
         cores(),
     );
     text.push_str(&table(&rows));
@@ -52,7 +54,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         plot_scatter(bench, name, title, &rows, &|row| factor * seconds(row), unit)?;
         text.push_str(&format!("\n![{title}]({name})\n"));
     }
-    text.push_str(&growth(bench)?);
+    text.push_str(&growth::measure(bench)?);
     Ok(text)
 }
 
@@ -79,9 +81,7 @@ impl Row {
 }
 
 fn pictures(bench: &Bench) -> Vec<Picture> {
-    let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(bench.pictures.len());
-    let all = bench.pictures.len();
-    (0..count).map(|index| bench.pictures[index * all / count].clone()).collect()
+    bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES })
 }
 
 fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
@@ -104,7 +104,7 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
             store.get(&product, key, || {
                 let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
                 let coded = gip::code(encoder, picture, threads)?;
-                let decode = coded.decode_seconds(threads != Some(1))?;
+                let decode = gip::decode_seconds(&coded.file, threads != Some(1))?;
                 let times = [coded.report.seconds, decode];
                 Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
             })
@@ -207,21 +207,13 @@ fn verdict(rows: &[Row]) -> String {
     let Some(ours) = rows.iter().find(|row| row.setting == default) else {
         return String::new();
     };
-    let worse = |than: &dyn Fn(&Row) -> bool| {
-        let named: Vec<&str> = rows
-            .iter()
-            .filter(|row| row.codec != gip::NAME && than(row))
-            .map(|row| row.codec)
-            .collect();
-        if named.is_empty() { "none of these".to_owned() } else { named.join(", ") }
+    let named = |row: &Row| {
+        let [encode, decode] = [row.encode, row.decode];
+        (row.codec.to_owned(), vec![row.psnr, encode[0], encode[1], decode[0], decode[1]])
     };
-    format!(
-        "\nAt its default effort ours encodes more slowly than: {}. It decodes more slowly, with all \
-         threads, than: {}; with one thread, than: {}.\n",
-        worse(&|row| row.encode[1] < ours.encode[1]),
-        worse(&|row| row.decode[1] < ours.decode[1]),
-        worse(&|row| row.decode[0] < ours.decode[0]),
-    )
+    let others: Vec<Named> = rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
+    let (name, figures) = named(ours);
+    worse(&FIGURES, &(format!("{name} at its default effort ({})", gip::EFFORT), figures), &others)
 }
 
 fn plot_scatter(
@@ -244,124 +236,6 @@ fn plot_scatter(
         title: &format!("{title}: about {RATE} bits per pixel"),
         x: (unit, Scale::Logarithmic),
         y: ("PSNR in dB", Scale::Linear),
-        legend: Corner::UpperLeft,
-    };
-    plot.write(&bench.path(name), &series)
-}
-
-/// What a size and a number of Gaussians cost.
-#[derive(Clone, Copy, Debug)]
-struct Cost {
-    megapixels: f64,
-    gaussians: f64,
-    psnr: f64,
-    encode: f64,
-    memory: f64,
-    decode: [f64; 2],
-}
-
-fn growth(bench: &Bench) -> Result<String> {
-    let megapixels: &[f64] = if bench.quick { &QUICK_MEGAPIXELS } else { &MEGAPIXELS };
-    let gaussians: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
-    let mut store = bench.store(
-        "growth.csv",
-        ["image", "megapixels", "gaussians", "effort"],
-        ["psnr", "encode_seconds", "peak_memory", "decode_seconds_one", "decode_seconds_all"],
-    )?;
-    let picture = &bench.pictures[0];
-    let mut cost = |megapixels: f64, gaussians: u32| -> Result<Cost> {
-        let key = [megapixels.to_string(), gaussians.to_string(), GROWTH_EFFORT.to_string()];
-        let key = [&picture.name, &key[0], &key[1], &key[2]];
-        let values = store.get(&bench.product, key.map(String::as_str), || {
-            let width = (1.5e6 * megapixels).sqrt().round();
-            let height = (1e6 * megapixels / width).round();
-            let large = picture.mirrored(width as u32, height as u32);
-            let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
-            let coded = gip::code(encoder, &large, None)?;
-            let [one, all] = [coded.decode_seconds(false)?, coded.decode_seconds(true)?];
-            let report = &coded.report;
-            Ok([coded.distortion.psnr, report.seconds, report.peak_memory as f64, one, all])
-        })?;
-        let [psnr, encode, memory, one, all] = values;
-        let gaussians = f64::from(gaussians);
-        Ok(Cost { megapixels, gaussians, psnr, encode, memory, decode: [one, all] })
-    };
-    let by_size = megapixels
-        .iter()
-        .map(|&size| cost(size, (DENSITY * size).round() as u32))
-        .collect::<Result<Vec<_>>>()?;
-    let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
-
-    let mut text = format!(
-        "\n### Growth\n\nOur codec alone, at effort {GROWTH_EFFORT}, on {}, cut or continued in \
-         mirror images. Other efforts multiply the encoding time by their iterations. Memory is what \
-         the encoder holds beside the source, at most.\n",
-        picture.name
-    );
-    for (name, title, costs, x) in [
-        (
-            "growth-pixels.svg",
-            format!("{DENSITY} Gaussians per megapixel"),
-            by_size,
-            ("megapixels", (|cost: &Cost| cost.megapixels) as fn(&Cost) -> f64),
-        ),
-        (
-            "growth-gaussians.svg",
-            "One megapixel".into(),
-            by_count,
-            ("Gaussians", |cost: &Cost| cost.gaussians),
-        ),
-    ] {
-        plot_growth(bench, name, &title, &costs, x)?;
-        text.push_str(&format!("\n{title}:\n{}\n![{title}]({name})\n", growth_table(&costs)));
-    }
-    Ok(text)
-}
-
-fn growth_table(costs: &[Cost]) -> String {
-    let mut table = Table::new(&[
-        "megapixels",
-        "Gaussians",
-        "PSNR in dB",
-        "encode s",
-        "memory MiB",
-        "decode ms, one thread",
-        "all",
-    ]);
-    for cost in costs {
-        table.row(&[
-            cost.megapixels.to_string(),
-            cost.gaussians.to_string(),
-            format!("{:.2}", cost.psnr),
-            format!("{:.2}", cost.encode),
-            format!("{:.1}", cost.memory / f64::from(1 << 20)),
-            format!("{:.1}", 1000.0 * cost.decode[0]),
-            format!("{:.1}", 1000.0 * cost.decode[1]),
-        ]);
-    }
-    table.finish()
-}
-
-fn plot_growth(
-    bench: &Bench,
-    name: &str,
-    title: &str,
-    costs: &[Cost],
-    (label, x): (&str, fn(&Cost) -> f64),
-) -> Result<()> {
-    let series = |name: &str, y: fn(&Cost) -> f64| Series {
-        name: name.to_owned(),
-        points: costs.iter().map(|cost| (x(cost), y(cost))).collect(),
-    };
-    let series = [
-        series("encode", |cost| cost.encode),
-        series("decode, one thread", |cost| cost.decode[0]),
-        series("decode, all threads", |cost| cost.decode[1]),
-    ];
-    let plot = Plot {
-        title,
-        x: (label, Scale::Logarithmic),
-        y: ("seconds", Scale::Logarithmic),
         legend: Corner::UpperLeft,
     };
     plot.write(&bench.path(name), &series)

@@ -6,10 +6,12 @@ use image_gip::{
     ColorModel, Kernel, Picture, RenderOptions, SampleDepth, Source, StreamDecoder, Target,
 };
 
-use super::handmade::{self, COMPONENTS};
+use super::checks;
+use super::handmade::{self, COMPONENTS, Handmade};
 use crate::bench::Bench;
 use crate::gip;
 use crate::table::Table;
+use crate::verdict::list;
 
 /// Size of the pictures made of chosen Gaussians.
 const SIZE: (u32, u32) = (96, 64);
@@ -18,7 +20,7 @@ const GAUSSIANS: u32 = 500;
 const EFFORT: u8 = 3;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    Ok(format!("{}{}", decoder(bench)?, encoder(bench)?))
+    Ok(format!("{}{}{}", decoder(bench)?, checks::measure(bench)?, encoder(bench)?))
 }
 
 /// Gaussians that strain the arithmetic.
@@ -82,13 +84,15 @@ fn decoder(bench: &Bench) -> Result<String> {
         "one thread from all",
         "samples that are not finite",
     ]);
+    let mut worst: Vec<(f64, String)> = Vec::new();
+    let mut violated = Vec::new();
     for (name, gaussians) in cases() {
         for (kernel_name, kernel) in [("exponential", Kernel::PAPER), ("quartic", Kernel::Quartic)]
         {
             let [_, from_f64, simd, threads, not_finite] =
                 store.get(&bench.product, [name, kernel_name], || {
                     let mut decoder = StreamDecoder::new();
-                    decoder.feed(&handmade::file(SIZE, kernel, &gaussians))?;
+                    decoder.feed(&Handmade::new(SIZE, kernel, gaussians.clone()).file())?;
                     let picture = decoder.picture().context("the file has no picture")?;
                     ensure!(decoder.is_complete(), "the file is not complete");
                     let all = planes(&picture, &RenderOptions::new())?;
@@ -110,17 +114,30 @@ fn decoder(bench: &Bench) -> Result<String> {
                 format!("{threads:e}"),
                 format!("{not_finite}"),
             ]);
+            let name = format!("{name} ({kernel_name})");
+            if simd != 0.0 || threads != 0.0 || not_finite != 0.0 {
+                violated.push(name.clone());
+            }
+            worst.push((from_f64, name));
         }
     }
+    // What is not a number comes first.
+    worst.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let worst = worst
+        .iter()
+        .take(3)
+        .map(|(difference, name)| format!("{name}: {:.2} steps of 8 bits", 255.0 * difference));
     Ok(format!(
         "### Decoder\n\nCompared with: the formula of the specification in f64, on files of chosen \
-         Gaussians, {} x {} pixels; 1 is a full sample, and an 8-bit step is 3.9e-3. The exponential \
-         kernel ends with a step of 1/255 of the amplitude, on whose two sides f32 and f64 may lie: it \
-         is worse there than the quartic one, which has none. The last three columns must be zero; \
-         SIMD is the widest that this machine has.\n{}",
+         Gaussians, {} x {} pixels; 1 is a full sample, and an 8-bit step is 3.9e-3. The \
+         exponential kernel ends with a step of 1/255 of the amplitude, on whose two sides f32 and \
+         f64 may lie; the quartic one has none. The last three columns must be zero; SIMD is the \
+         widest that this machine has.\n{}\nWorst: {}. Not zero where it must be: {}.\n",
         SIZE.0,
         SIZE.1,
-        table.finish()
+        table.finish(),
+        worst.collect::<Vec<_>>().join(", "),
+        list(violated.iter().map(String::as_str)),
     ))
 }
 
@@ -205,6 +222,7 @@ fn encoder(bench: &Bench) -> Result<String> {
         "differs by threads",
         "encode s",
     ]);
+    let (mut worst, mut violated) = ((f64::INFINITY, "none"), Vec::new());
     for hard in hard_pictures() {
         let key = [hard.name, &GAUSSIANS.to_string(), &EFFORT.to_string()];
         let [used, bytes, psnr, not_finite, differs, seconds] =
@@ -218,13 +236,23 @@ fn encoder(bench: &Bench) -> Result<String> {
             if differs == 0.0 { "no" } else { "**yes**" }.to_owned(),
             format!("{seconds:.2}"),
         ]);
+        if psnr < worst.0 {
+            worst = (psnr, hard.name);
+        }
+        if not_finite != 0.0 || differs != 0.0 {
+            violated.push(hard.name);
+        }
     }
     Ok(format!(
         "\n### Encoder\n\nCompared with each other: pictures that are hard to fit, with at most \
-         {GAUSSIANS} Gaussians at effort {EFFORT}. The format is worst at noise and at checkers of one \
-         pixel. Values are all those of the file's Gaussians and of its samples as floats. The file \
-         must not depend on the number of threads.\n{}",
-        table.finish()
+         {GAUSSIANS} Gaussians at effort {EFFORT}. Values are all those of the file's Gaussians \
+         and of its samples as floats. The file must not depend on the number of \
+         threads.\n{}\nWorst: {} ({:.2} dB). With values that are not finite, or files that depend \
+         on threads: {}.\n",
+        table.finish(),
+        worst.1,
+        worst.0,
+        list(violated.into_iter()),
     ))
 }
 

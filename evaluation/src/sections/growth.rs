@@ -1,0 +1,214 @@
+//! How time and memory grow with pixels and with Gaussians.
+
+use anyhow::Result;
+use image_gip::Target;
+
+use crate::bench::Bench;
+use crate::gip;
+use crate::plot::{Corner, Plot, Scale, Series};
+use crate::table::Table;
+use crate::verdict::list;
+
+/// Sizes in megapixels, and how many Gaussians each megapixel gets.
+const MEGAPIXELS: [f64; 7] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
+const QUICK_MEGAPIXELS: [f64; 3] = [0.1, 0.5, 2.0];
+const DENSITY: f64 = 12_500.0;
+/// Numbers of Gaussians on one megapixel.
+const GAUSSIANS: [u32; 8] = [1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000];
+const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
+/// The effort with which growth is measured: it only scales the number of iterations.
+const GROWTH_EFFORT: u8 = 1;
+
+/// What a size and a number of Gaussians cost.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    megapixels: f64,
+    gaussians: f64,
+    psnr: f64,
+    encode: f64,
+    encode_memory: f64,
+    decode: [f64; 2],
+    decode_memory: f64,
+}
+
+/// A figure of a cost with its name.
+type Figure = (&'static str, fn(&Cost) -> f64);
+
+const MEBIBYTE: f64 = (1 << 20) as f64;
+
+/// Times in seconds, then memory in MiB.
+const COSTS: [Figure; 5] = [
+    ("encoding time", |cost| cost.encode),
+    ("decoding time, one thread", |cost| cost.decode[0]),
+    ("decoding time, all threads", |cost| cost.decode[1]),
+    ("encoder's memory", |cost| cost.encode_memory / MEBIBYTE),
+    ("decoder's memory", |cost| cost.decode_memory / MEBIBYTE),
+];
+
+pub(super) fn measure(bench: &Bench) -> Result<String> {
+    let megapixels: &[f64] = if bench.quick { &QUICK_MEGAPIXELS } else { &MEGAPIXELS };
+    let gaussians: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
+    let mut store = bench.store(
+        "growth.csv",
+        ["image", "megapixels", "gaussians", "effort"],
+        [
+            "psnr",
+            "encode_seconds",
+            "encode_peak_memory",
+            "decode_seconds_one",
+            "decode_seconds_all",
+            "decode_peak_memory",
+        ],
+    )?;
+    let picture = &bench.pictures[0];
+    let mut cost = |megapixels: f64, gaussians: u32| -> Result<Cost> {
+        let key = [megapixels.to_string(), gaussians.to_string(), GROWTH_EFFORT.to_string()];
+        let key = [&picture.name, &key[0], &key[1], &key[2]];
+        let values = store.get(&bench.product, key.map(String::as_str), || {
+            let width = (1.5e6 * megapixels).sqrt().round();
+            let height = (1e6 * megapixels / width).round();
+            let large = picture.mirrored(width as u32, height as u32);
+            let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
+            let coded = gip::code(encoder, &large, None)?;
+            let file = &coded.file;
+            Ok([
+                coded.distortion.psnr,
+                coded.report.seconds,
+                coded.memory,
+                gip::decode_seconds(file, false)?,
+                gip::decode_seconds(file, true)?,
+                gip::decode_memory(file)?,
+            ])
+        })?;
+        let [psnr, encode, encode_memory, one, all, decode_memory] = values;
+        let (gaussians, decode) = (f64::from(gaussians), [one, all]);
+        Ok(Cost { megapixels, gaussians, psnr, encode, encode_memory, decode, decode_memory })
+    };
+    let by_size = megapixels
+        .iter()
+        .map(|&size| cost(size, (DENSITY * size).round() as u32))
+        .collect::<Result<Vec<_>>>()?;
+    let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
+
+    let mut text = format!(
+        "\n### Growth\n\nCompared with itself: our codec alone, at effort {GROWTH_EFFORT}, on {}, \
+         cut or continued in mirror images. Other efforts multiply the encoding time by their \
+         iterations. Memory is what the program's allocator gave out at a time, at most: to the \
+         encoder beside the source, to the decoder (with all threads) beside the file, its samples \
+         included.\n",
+        picture.name
+    );
+    for (name, title, costs, x) in [
+        (
+            "growth-pixels",
+            format!("{DENSITY} Gaussians per megapixel"),
+            by_size,
+            ("megapixels", (|cost: &Cost| cost.megapixels) as fn(&Cost) -> f64),
+        ),
+        (
+            "growth-gaussians",
+            "One megapixel".into(),
+            by_count,
+            ("Gaussians", |cost: &Cost| cost.gaussians),
+        ),
+    ] {
+        text.push_str(&format!("\n{title}:\n{}{}", growth_table(&costs), steeper(&costs, x)));
+        for (suffix, unit, curves) in
+            [("", "seconds", &COSTS[..3]), ("-memory", "MiB", &COSTS[3..])]
+        {
+            let name = format!("{name}{suffix}.svg");
+            plot_growth(bench, &name, &title, &costs, x, unit, curves)?;
+            text.push_str(&format!("\n![{title}, {unit}]({name})\n"));
+        }
+    }
+    Ok(text)
+}
+
+fn growth_table(costs: &[Cost]) -> String {
+    let mut table = Table::new(&[
+        "megapixels",
+        "Gaussians",
+        "PSNR in dB",
+        "encode s",
+        "memory MiB",
+        "decode ms, one thread",
+        "all",
+        "memory MiB",
+    ]);
+    for cost in costs {
+        table.row(&[
+            cost.megapixels.to_string(),
+            cost.gaussians.to_string(),
+            format!("{:.2}", cost.psnr),
+            format!("{:.2}", cost.encode),
+            format!("{:.1}", cost.encode_memory / MEBIBYTE),
+            format!("{:.1}", 1000.0 * cost.decode[0]),
+            format!("{:.1}", 1000.0 * cost.decode[1]),
+            format!("{:.1}", cost.decode_memory / MEBIBYTE),
+        ]);
+    }
+    table.finish()
+}
+
+/// Says which costs grow faster than what makes them grow, from the first to the last.
+fn steeper(costs: &[Cost], (label, x): Figure) -> String {
+    let [first, .., last] = costs else { return String::new() };
+    let grown = |of: fn(&Cost) -> f64| of(last) / of(first);
+    let base = grown(x);
+    let factors = COSTS.iter().map(|(name, of)| format!("{name} {:.1}", grown(*of)));
+    let steep = COSTS.iter().filter(|(_, of)| grown(*of) > base).map(|(name, _)| *name);
+    format!(
+        "\nFor {base:.1} times the {label}, times more of: {}. Worse than in proportion: {}.\n",
+        factors.collect::<Vec<_>>().join(", "),
+        list(steep),
+    )
+}
+
+fn plot_growth(
+    bench: &Bench,
+    name: &str,
+    title: &str,
+    costs: &[Cost],
+    (label, x): Figure,
+    unit: &str,
+    curves: &[Figure],
+) -> Result<()> {
+    let series: Vec<Series> = curves
+        .iter()
+        .map(|(name, y)| Series {
+            name: (*name).to_owned(),
+            points: costs.iter().map(|cost| (x(cost), y(cost))).collect(),
+        })
+        .collect();
+    let plot = Plot {
+        title,
+        x: (label, Scale::Logarithmic),
+        y: (unit, Scale::Logarithmic),
+        legend: Corner::UpperLeft,
+    };
+    plot.write(&bench.path(name), &series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_faster_than_its_cause_is_named() {
+        let cost = |megapixels: f64, encode: f64| Cost {
+            megapixels,
+            gaussians: 1.0,
+            psnr: 30.0,
+            encode,
+            encode_memory: megapixels * MEBIBYTE,
+            decode: [megapixels, 0.5 * megapixels],
+            decode_memory: 7.0,
+        };
+        let costs = [cost(0.5, 1.0), cost(1.0, 2.0), cost(2.0, 5.0)];
+        let text = steeper(&costs, ("megapixels", |cost| cost.megapixels));
+        assert!(text.contains("For 4.0 times the megapixels"), "{text}");
+        assert!(text.contains("encoding time 5.0") && text.contains("decoder's memory 1.0"));
+        assert!(text.ends_with("Worse than in proportion: encoding time.\n"), "{text}");
+        assert_eq!(steeper(&costs[..1], ("megapixels", |cost| cost.megapixels)), "");
+    }
+}

@@ -1,0 +1,246 @@
+//! Positions as half floats against LSQ+: the paper's table of quantizers.
+
+use anyhow::Result;
+use half::f16;
+use image_gip::Target;
+
+use super::handmade::Handmade;
+use super::methods;
+use crate::bench::Bench;
+use crate::curve::{Curve, bd_rate};
+use crate::gip::{self, Coded};
+use crate::pictures::Picture;
+use crate::table::{Table, decibels, mean, percent};
+use crate::verdict::{Better, Named, worse};
+
+/// Bits of a coordinate: the paper's, and so many that they are as good as exact.
+const PAPER: u8 = 12;
+const FINE: u8 = 16;
+/// Bits of shape and colour: the paper's.
+const SHAPE: u8 = 10;
+const COLOR: u8 = 6;
+/// BD-rates that the paper prints for half floats: of PSNR and of MS-SSIM.
+const PRINTED: [f64; 2] = [0.2511, 0.1777];
+
+/// How positions are stored.
+#[derive(Clone, Copy, Debug)]
+enum Storage {
+    /// Trained with LSQ+ of so many bits: [`PAPER`] or [`FINE`].
+    Trained(u8),
+    /// From the fit with [`FINE`] bits, changed afterwards, with so many bits of a coordinate.
+    Rounded(u8, fn(&mut Handmade)),
+}
+
+const STORAGES: [(&str, Storage); 5] = [
+    ("LSQ+ of 12 bits", Storage::Trained(PAPER)),
+    ("LSQ+ of 16 bits", Storage::Trained(FINE)),
+    ("12 bits by rounding afterwards", Storage::Rounded(PAPER, uniform)),
+    ("half floats of pixels", Storage::Rounded(16, half_pixels)),
+    ("half floats before tanh", Storage::Rounded(16, half_before_tanh)),
+];
+
+/// Of one picture, or on average.
+#[derive(Clone, Copy, Debug)]
+struct Outcome {
+    rate: f64,
+    bits: f64,
+    psnr: f64,
+    ms_ssim: f64,
+}
+
+pub(super) fn measure(
+    bench: &Bench,
+    pictures: &[Picture],
+    counts: &[u32],
+    iterations: u32,
+) -> Result<String> {
+    let mut store = bench.store(
+        "ablation-positions.csv",
+        ["positions", "iterations", "gaussians", "image"],
+        ["bpp", "bits_per_gaussian", "psnr", "msssim"],
+    )?;
+    let mut rows = vec![Vec::new(); STORAGES.len()];
+    for &count in counts {
+        let mut all = vec![Vec::new(); STORAGES.len()];
+        for picture in pictures {
+            // All that is rounded afterwards comes from one fit.
+            let mut fine = None;
+            for ((name, storage), all) in STORAGES.iter().zip(&mut all) {
+                let key = [*name, &iterations.to_string(), &count.to_string(), &picture.name];
+                all.push(store.get(&bench.product, key, || {
+                    stored(*storage, count, iterations, picture, &mut fine)
+                })?);
+            }
+        }
+        for (row, all) in rows.iter_mut().zip(all) {
+            let of = |column: usize| mean(all.iter().map(|one| one[column])).unwrap_or(f64::NAN);
+            row.push(Outcome { rate: of(0), bits: of(1), psnr: of(2), ms_ssim: of(3) });
+        }
+    }
+    Ok(format!(
+        "\n### Positions as half floats\n\nCompared with: LSQ+ positions, in our own encoder at \
+         {iterations} iterations, with equal numbers of Gaussians, shapes of {SHAPE} and colours \
+         of {COLOR} bits by LSQ+ in all rows. The first two rows are trained with their \
+         quantizers. The others are the fit of the second row whose positions were rounded after \
+         training: to a uniform grid of {PAPER} bits between the least and the largest; to IEEE \
+         half floats of pixels, the coordinates of GaussianImage++; and to half floats of atanh(2 \
+         x / width - 1), as GaussianImage stores them, but for centres outside of the picture, \
+         which that cannot tell and which stay as they are. So half floats get no training that \
+         adapts to them, and LSQ+ in the third row neither. Sizes are whole files; those of \
+         rounded rows are the second row's less the bits saved. Means; {}. The printed row is the \
+         paper's, over its own rates.\n{}",
+        bench.share(pictures.len()),
+        text(counts, &rows),
+    ))
+}
+
+fn text(counts: &[u32], rows: &[Vec<Outcome>]) -> String {
+    let mut columns = vec!["positions".to_owned(), "bits per Gaussian".to_owned()];
+    columns.extend(counts.iter().map(|count| format!("{count} Gaussians")));
+    columns.extend(["BD-rate, PSNR", "BD-rate, MS-SSIM"].map(str::to_owned));
+    let mut table = Table::new(&columns);
+    let qualities: [fn(&Outcome) -> f64; 2] = [|one| one.psnr, |one| decibels(one.ms_ssim)];
+    let mut named: Vec<Named> = Vec::new();
+    for ((name, _), row) in STORAGES.iter().zip(rows) {
+        let average = |of: fn(&Outcome) -> f64| mean(row.iter().map(of)).unwrap_or(f64::NAN);
+        let bits = average(|one| one.bits);
+        let mut cells = vec![(*name).to_owned(), format!("{bits:.1}")];
+        cells.extend(
+            row.iter()
+                .map(|one| format!("{:.2} dB, {:.4}, {:.3} bpp", one.psnr, one.ms_ssim, one.rate)),
+        );
+        cells.extend(qualities.map(|quality| {
+            let curve =
+                |row: &[Outcome]| Curve::new(row.iter().map(|one| (one.rate, quality(one))));
+            percent(bd_rate(&curve(&rows[0]), &curve(row), (1e-3, 1e3)))
+        }));
+        table.row(&cells);
+        let figures = vec![average(|one| one.psnr), average(|one| one.ms_ssim), bits];
+        named.push(((*name).to_owned(), figures));
+    }
+    let mut cells = vec!["*FP16, printed*".to_owned()];
+    cells.resize(2 + counts.len(), "-".to_owned());
+    cells.extend(PRINTED.map(|share| percent(Some(share))));
+    table.row(&cells);
+    let figures = [
+        ("PSNR", Better::Higher),
+        ("MS-SSIM", Better::Higher),
+        ("bits per Gaussian", Better::Lower),
+    ];
+    format!("{}{}", table.finish(), worse(&figures, &named[0], &named[1..]))
+}
+
+/// Bits per pixel, bits per Gaussian, PSNR as floats, MS-SSIM. `fine` is the fit with [`FINE`]
+/// bits, made when it is first needed.
+fn stored(
+    storage: Storage,
+    count: u32,
+    iterations: u32,
+    picture: &Picture,
+    fine: &mut Option<Coded>,
+) -> Result<[f64; 4]> {
+    let fit = |bits: u8| {
+        let training = methods::ours(iterations, [bits, SHAPE, COLOR]);
+        let encoder = gip::encoder(gip::EFFORT).with_target(Target::Gaussians(count));
+        gip::code(encoder.with_training(training), picture, None)
+    };
+    let paper;
+    let coded = match storage {
+        Storage::Trained(PAPER) => {
+            paper = fit(PAPER)?;
+            &paper
+        }
+        _ => match fine {
+            Some(coded) => coded,
+            None => fine.insert(fit(FINE)?),
+        },
+    };
+    let Coded { file, bytes, report, distortion, .. } = coded;
+    let gaussians = f64::from(report.gaussians);
+    let (psnr, ms_ssim, bytes) = match storage {
+        Storage::Trained(_) => (report.psnr_float, distortion.ms_ssim, *bytes),
+        Storage::Rounded(bits, round) => {
+            let mut handmade = Handmade::from_file(file)?;
+            round(&mut handmade);
+            let file = handmade.file();
+            let saved = gaussians * 2.0 * f64::from(FINE - bits) / 8.0;
+            let ms_ssim = gip::distortion(&file, picture)?.ms_ssim;
+            (gip::psnr_float(&file, picture)?, ms_ssim, bytes - saved)
+        }
+    };
+    Ok([picture.rate(bytes), 8.0 * bytes / gaussians, psnr, ms_ssim])
+}
+
+/// The nearest of as many steps as the paper's bits give, per axis.
+fn uniform(handmade: &mut Handmade) {
+    for axis in 0..2 {
+        let values = || handmade.gaussians.iter().map(|row| row[axis]);
+        let low = values().fold(f32::INFINITY, f32::min);
+        let high = values().fold(f32::NEG_INFINITY, f32::max);
+        let step = ((high - low) / f32::from((1_u16 << PAPER) - 1)).max(f32::MIN_POSITIVE);
+        for row in &mut handmade.gaussians {
+            row[axis] = low + ((row[axis] - low) / step).round() * step;
+        }
+    }
+}
+
+fn half_pixels(handmade: &mut Handmade) {
+    for row in &mut handmade.gaussians {
+        row[..2].iter_mut().for_each(|value| *value = half(*value));
+    }
+}
+
+fn half_before_tanh(handmade: &mut Handmade) {
+    let (width, height) = handmade.size;
+    for row in &mut handmade.gaussians {
+        for (value, side) in row.iter_mut().zip([width as f32, height as f32]) {
+            let relative = 2.0 * *value / side - 1.0;
+            if relative.abs() < 1.0 {
+                *value = 0.5 * side * (half(relative.atanh()).tanh() + 1.0);
+            }
+        }
+    }
+}
+
+fn half(value: f32) -> f32 {
+    f16::from_f32(value).to_f32()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image_gip::Kernel;
+
+    /// How far each rounding moves centres all over a picture of 768 x 512, at most, along x.
+    fn largest_move(round: fn(&mut Handmade)) -> f32 {
+        let xs = (0..7680).map(|i| 0.05 + 0.1 * i as f32);
+        let rows = xs.map(|x| [x, 100.0, 1.0, 0.0, 1.0, 0.1, 0.1, 0.1]).collect();
+        let mut handmade = Handmade::new((768, 512), Kernel::Quartic, rows);
+        let before = handmade.gaussians.clone();
+        round(&mut handmade);
+        let pairs = handmade.gaussians.iter().zip(&before);
+        let moves = pairs.map(|(after, before)| {
+            assert_eq!(after[2..], before[2..]);
+            (after[0] - before[0]).abs()
+        });
+        moves.fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn positions_move_by_half_a_step_at_most() {
+        // A half float has steps of 1/2 from 512 on.
+        assert!((0.2..=0.25).contains(&largest_move(half_pixels)));
+        // 768 / 4095 / 2.
+        assert!((0.08..=0.095).contains(&largest_move(uniform)));
+        // Steps of 2^-11 before tanh up to 1/2 and of 2^-10 from 1 on, times 384 and the slope.
+        assert!((0.05..=0.1).contains(&largest_move(half_before_tanh)));
+    }
+
+    #[test]
+    fn centres_outside_stay() {
+        let row = [-3.3, 777.7, 1.0, 0.0, 1.0, 0.1, 0.1, 0.1];
+        let mut handmade = Handmade::new((768, 512), Kernel::Quartic, vec![row]);
+        half_before_tanh(&mut handmade);
+        assert_eq!(handmade.gaussians, [row]);
+    }
+}
