@@ -35,7 +35,7 @@ impl Site<'_> {
         let map = self.distortions();
         let pixels = match self.options.placement {
             Placement::Top => top(count, &map),
-            Placement::Sampled => sampled(count, &map, rng),
+            Placement::Spread => spread(count, &map, self.raster.width, rng.f64()),
         };
         let total = self.present + pixels.len();
         let variance = self
@@ -81,7 +81,10 @@ impl Site<'_> {
                 *value = match self.options.distortion {
                     _ if exact => 0.0,
                     Distortion::L1 => residual.iter().map(|value| value.abs()).sum(),
-                    Distortion::L2 => residual.iter().map(|value| value * value).sum(),
+                    Distortion::L3 => {
+                        let squared = residual.iter().map(|value| value * value).sum::<f32>();
+                        squared * squared.sqrt()
+                    }
                 };
             }
         });
@@ -102,28 +105,44 @@ fn top(count: usize, map: &[f32]) -> Vec<u32> {
     order
 }
 
-/// Pixels drawn in proportion to their distortion, each at most once.
-fn sampled(count: usize, map: &[f32], rng: &mut fastrand::Rng) -> Vec<u32> {
-    let mut total = 0.0;
-    let sums: Vec<f64> = map
-        .iter()
-        .map(|&value| {
-            total += f64::from(value);
-            total
-        })
-        .collect();
-    if total <= 0.0 {
-        return Vec::new();
+/// Up to `count` pixels, in every part of the picture as many as it has of the distortion: at equal
+/// steps of the distortion summed up along a Z curve. `phase` in [0, 1) shifts them all.
+fn spread(count: usize, map: &[f32], width: usize, phase: f64) -> Vec<u32> {
+    let total = map.iter().map(|&value| f64::from(value)).sum::<f64>();
+    let step = total / count as f64;
+    let (mut sum, mut next) = (0.0, phase * step);
+    let mut pixels = Vec::new();
+    if total > 0.0 {
+        along_z([0, 0], [width, map.len() / width], &mut |x, y| {
+            sum += f64::from(map[y * width + x]);
+            if sum > next {
+                pixels.push((y * width + x) as u32);
+                // A pixel of more than one step gets one Gaussian.
+                next += step * ((sum - next) / step).ceil();
+            }
+        });
     }
-    let mut pixels: Vec<u32> = (0..count)
-        .map(|_| {
-            let at = rng.f64() * total;
-            sums.partition_point(|&sum| sum <= at).min(map.len() - 1) as u32
-        })
-        .collect();
-    pixels.sort_unstable();
-    pixels.dedup();
     pixels
+}
+
+/// Visits the pixels of a rectangle along a Z curve: neighbours follow each other closely.
+fn along_z([x, y]: [usize; 2], [width, height]: [usize; 2], visit: &mut impl FnMut(usize, usize)) {
+    const LEAF: usize = 4;
+    if width.max(height) <= LEAF {
+        for y in y..y + height {
+            for x in x..x + width {
+                visit(x, y);
+            }
+        }
+    } else if width > height {
+        let half = width / 2;
+        along_z([x, y], [half, height], visit);
+        along_z([x + half, y], [width - half, height], visit);
+    } else {
+        let half = height / 2;
+        along_z([x, y], [width, half], visit);
+        along_z([x, y + half], [width, height - half], visit);
+    }
 }
 
 /// The paper's random covariance plus the filter's variance. Three random numbers need not be a
@@ -158,18 +177,47 @@ mod tests {
     }
 
     #[test]
-    fn samples_follow_the_distortion() {
-        let mut rng = fastrand::Rng::with_seed(5);
-        // One large block of small distortion, one small block of large distortion.
-        let mut map = vec![0.0; 1000];
-        map[100..900].fill(1.0);
-        map[900..950].fill(16.0);
-        let pixels = sampled(400, &map, &mut rng);
-        assert!(pixels.is_sorted_by(|a, b| a < b), "each at most once");
-        assert!(pixels.iter().all(|&pixel| map[pixel as usize] > 0.0));
-        // Half of the distortion lies in each, but the small one is soon full.
-        let (large, small) = pixels.split_at(pixels.partition_point(|&pixel| pixel < 900));
-        assert!(small.len() >= 45 && (120..240).contains(&large.len()), "{}", large.len());
-        assert!(sampled(10, &[0.0; 50], &mut rng).is_empty());
+    fn spread_pixels_follow_the_distortion() {
+        // Left half: weak; right half: three times as much.
+        let (width, height) = (50, 40);
+        let map: Vec<f32> =
+            (0..width * height).map(|at| if at % width < 25 { 1.0 } else { 3.0 }).collect();
+        let pixels = spread(400, &map, width, 0.5);
+        assert!((399..=400).contains(&pixels.len()));
+        let mut sorted = pixels.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        assert_eq!(sorted.len(), pixels.len(), "each at most once");
+        let right = pixels.iter().filter(|&&at| at as usize % width >= 25).count();
+        assert!((295..=305).contains(&right), "{right}");
+        // Evenly: every 10 x 10 block of the right half has about its 30.
+        for block in 0..8 {
+            let (x, y) = (30 + block % 2 * 10, block / 2 * 10);
+            let inside = |at: &&u32| {
+                let (px, py) = (**at as usize % width, **at as usize / width);
+                (x..x + 10).contains(&px) && (y..y + 10).contains(&py)
+            };
+            let count = pixels.iter().filter(inside).count();
+            assert!((26..=34).contains(&count), "{count}");
+        }
+    }
+
+    #[test]
+    fn spread_leaves_out_what_is_exact() {
+        let mut map = vec![0.0; 35];
+        assert!(spread(10, &map, 7, 0.0).is_empty());
+        map[17] = 2.0;
+        map[18] = 1e-3;
+        let pixels = spread(10, &map, 7, 0.9);
+        assert!(pixels == [17] || pixels == [17, 18], "{pixels:?}");
+    }
+
+    #[test]
+    fn the_curve_visits_every_pixel_once() {
+        for size in [[1, 1], [37, 1], [1, 9], [13, 29], [64, 32]] {
+            let mut visits = vec![0; size[0] * size[1]];
+            along_z([0, 0], size, &mut |x, y| visits[y * size[0] + x] += 1);
+            assert!(visits.iter().all(|&count| count == 1), "{size:?}");
+        }
     }
 }

@@ -11,6 +11,7 @@ use super::gradient::{Pass, SplatGradient};
 use super::lsq::{Quantizers, StepGradients};
 use super::optimizer::{Bounds, Parameters, Row, shape_of};
 use super::options::MAX_GAUSSIANS;
+use super::plan::Plan;
 use super::raster::Raster;
 use super::training::{Portion, Training};
 use super::{EncodeError, Precision, Progress};
@@ -100,31 +101,36 @@ impl<'a> Fit<'a> {
 
     /// Trains from nothing.
     pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let Training { iterations, densification, quantization, .. } = self.training;
-        let share = |share: f32| (share * *iterations as f32).round() as u32;
-        let growth_end = share(densification.end).min(iterations - 1);
-        let interval = (growth_end / densification.steps.max(1)).max(1);
-        let quantized_from = match self.precision {
-            Precision::Float => u32::MAX,
-            // Growth needs the float values; quantizers are fitted to all Gaussians.
-            Precision::Packed => share(quantization.warm_up).clamp(growth_end, iterations - 1),
-        };
+        let Training { iterations, densification, optimizer, .. } = self.training;
+        let plan = Plan::new(self.training, self.precision);
         self.forward();
         let first = densification.initial * self.wanted(1.0) as f32;
         self.grow((first.ceil() as usize).max(1));
+        let mut surplus = None;
         for iteration in 0..*iterations {
-            if iteration == quantized_from {
+            if iteration == plan.quantized_from {
                 self.start_quantization();
             }
-            let factor = self.training.optimizer.schedule.factor(iteration, *iterations);
+            let factor = optimizer.schedule.factor(iteration, *iterations);
             self.iterate(factor, *iterations, observer)?;
             let done = iteration + 1;
             if done % densification.prune_interval == 0 {
                 self.prune();
             }
-            if done % interval == 0 && done <= growth_end {
-                let steps_left = (growth_end - done) / interval;
-                self.grow(self.portion(steps_left));
+            if let Some(steps_left) = plan.growths_left(done) {
+                let portion = self.portion(steps_left);
+                let replaced = (densification.replaced * self.len() as f32) as usize;
+                self.cull(replaced);
+                self.grow(portion + replaced);
+            }
+            if let Some(culls_left) = plan.culls_left(done) {
+                let surplus = surplus.get_or_insert_with(|| {
+                    let kept = self.len() as f32 / (1.0 + densification.surplus);
+                    self.len() - kept.round() as usize
+                });
+                let count = *surplus / (culls_left as usize + 1);
+                self.cull(count);
+                *surplus -= count;
             }
         }
         self.settle();
@@ -185,8 +191,10 @@ impl<'a> Fit<'a> {
 
     /// How many Gaussians to add, with so many steps to come after this one.
     fn portion(&self, steps_left: u32) -> usize {
-        let missing = self.wanted(FORESEEN).saturating_sub(self.parameters.len());
-        match self.training.densification.portion {
+        let densification = &self.training.densification;
+        let wanted = self.wanted(FORESEEN) as f64 * (1.0 + f64::from(densification.surplus));
+        let missing = (wanted.round() as usize).saturating_sub(self.parameters.len());
+        match densification.portion {
             _ if steps_left == 0 => missing,
             Portion::Even => missing.div_ceil(steps_left as usize + 1),
             Portion::Half => missing.div_ceil(2),
@@ -299,6 +307,36 @@ impl<'a> Fit<'a> {
             self.parameters.push(row);
         }
         // What was best had other Gaussians.
+        self.best = None;
+    }
+
+    /// Removes the `count` Gaussians that matter least: those that add least to the picture by
+    /// themselves, in squared samples.
+    fn cull(&mut self, count: usize) {
+        let count = count.min(self.len());
+        if count == 0 {
+            return;
+        }
+        let chart = self.bounds.chart;
+        let importances: Vec<f32> = self
+            .parameters
+            .values
+            .par_iter()
+            .map(|row| {
+                let [l11, _, l22] = chart.to_cholesky(shape_of(row).into());
+                let squared = row[5..].iter().map(|color| color * color).sum::<f32>();
+                squared * (l11 * l22)
+            })
+            .collect();
+        let mut order: Vec<u32> = (0..importances.len() as u32).collect();
+        order.select_nth_unstable_by(count - 1, |a, b| {
+            importances[*a as usize].total_cmp(&importances[*b as usize]).then_with(|| a.cmp(b))
+        });
+        let mut keep = vec![true; importances.len()];
+        for &index in &order[..count] {
+            keep[index as usize] = false;
+        }
+        self.parameters.retain(|index| keep[index]);
         self.best = None;
     }
 

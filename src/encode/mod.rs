@@ -11,6 +11,7 @@ mod layout;
 mod lsq;
 mod optimizer;
 mod options;
+mod plan;
 mod raster;
 mod source;
 pub(crate) mod training;

@@ -41,6 +41,14 @@ pub struct Densification {
     pub end: f32,
     /// How many are added each time.
     pub portion: Portion,
+    /// What growth adds beyond the budget, as a share of it (paper: 0). The least important
+    /// Gaussians go again, so what stays has stood the test.
+    pub surplus: f32,
+    /// Share of the iterations by which the surplus is gone, at least `end`, at most 1.
+    pub culled: f32,
+    /// Share of the Gaussians, the least important, that each growth step replaces by new ones
+    /// elsewhere, in [0, 1) (paper: 0).
+    pub replaced: f32,
     /// What is measured at each pixel.
     pub distortion: Distortion,
     /// Which pixels are chosen.
@@ -71,8 +79,8 @@ pub enum Portion {
 pub enum Distortion {
     /// The sum of absolute residuals (paper).
     L1,
-    /// The sum of squared residuals.
-    L2,
+    /// The cube of the residuals' Euclidean length.
+    L3,
 }
 
 /// Which pixels new Gaussians are put on.
@@ -81,8 +89,8 @@ pub enum Distortion {
 pub enum Placement {
     /// Those of largest distortion (paper). They come in clusters.
     Top,
-    /// Drawn at random, in proportion to their distortion.
-    Sampled,
+    /// As many everywhere as the distortion has its share there, evenly spread.
+    Spread,
 }
 
 /// The colour that a new Gaussian starts with.
@@ -187,8 +195,8 @@ pub struct Quantization {
 }
 
 impl Training {
-    /// Fast and good: growth early, often and in small portions, drawn in proportion to the error;
-    /// steps in each Gaussian's own frame; learning rates down to zero.
+    /// Fast and good: growth early, often and beyond the budget, evenly spread where the error is,
+    /// culled by importance; steps in each Gaussian's own frame; learning rates down to zero.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
         Self {
@@ -197,12 +205,15 @@ impl Training {
             parameterization: Chart::Cholesky,
             densification: Densification {
                 initial: 0.03,
-                steps: 40,
+                steps: 20,
                 end: 0.5,
                 portion: Portion::Even,
-                distortion: Distortion::L2,
-                placement: Placement::Sampled,
-                color: NewColor::Residual(0.5),
+                surplus: 0.3,
+                culled: 0.65,
+                replaced: 0.1,
+                distortion: Distortion::L3,
+                placement: Placement::Spread,
+                color: NewColor::Residual(0.1),
                 shape: NewShape::Point,
                 prune_interval: 25,
             },
@@ -210,10 +221,10 @@ impl Training {
             optimizer: Optimizer {
                 units: Units::Relative,
                 center: 0.1,
-                shape: 0.08,
+                shape: 0.1,
                 color: 0.015,
                 beta1: 0.9,
-                beta2: 0.999,
+                beta2: 0.99,
                 epsilon: 1e-15,
                 schedule: Schedule::Linear(0.6),
             },
@@ -242,6 +253,9 @@ impl Training {
                 steps: 9,
                 end: 0.9,
                 portion: Portion::Half,
+                surplus: 0.0,
+                culled: 0.9,
+                replaced: 0.0,
                 distortion: Distortion::L1,
                 placement: Placement::Top,
                 color: NewColor::Zero,
@@ -279,6 +293,15 @@ impl Training {
             (self.iterations >= 1, "iterations must be at least 1"),
             (share(d.initial), "densification.initial must be in (0, 1]"),
             (share(d.end), "densification.end must be in (0, 1]"),
+            (
+                d.culled >= d.end && d.culled <= 1.0,
+                "densification.culled must be at least densification.end and at most 1",
+            ),
+            (
+                d.surplus >= 0.0 && d.surplus.is_finite(),
+                "densification.surplus must be finite, not negative",
+            ),
+            ((0.0..1.0).contains(&d.replaced), "densification.replaced must be in [0, 1)"),
             (d.prune_interval >= 1, "densification.prune_interval must be at least 1"),
             (d.portion != Portion::Fixed(0), "densification.portion must be at least 1"),
             (
