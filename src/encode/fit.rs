@@ -24,6 +24,8 @@ pub(crate) type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 
 
 /// How much the error is expected to fall by training alone, once growth has ended.
 const FORESEEN: f64 = 0.75;
+/// Passes from one binning to the next, while no Gaussians come or go.
+const REBIN_INTERVAL: u32 = 8;
 /// Gaussians whose steps are summed up in one go, in a fixed order.
 const CHUNK: usize = 512;
 
@@ -40,6 +42,8 @@ pub(crate) struct Fit<'a> {
     quantizers: Option<Quantizers>,
     best: Option<Snapshot>,
     pass: Pass,
+    /// Passes for which the bins are good yet.
+    binned_for: u32,
     splats: Vec<Splat>,
     by_splat: Vec<SplatGradient>,
     gradients: Vec<Row>,
@@ -89,6 +93,7 @@ impl<'a> Fit<'a> {
             quantizers: None,
             best: None,
             pass: Pass::new(raster),
+            binned_for: 0,
             splats: Vec::new(),
             by_splat: Vec::new(),
             gradients: Vec::new(),
@@ -147,6 +152,7 @@ impl<'a> Fit<'a> {
         if let Some(best) = self.best.take() {
             self.parameters.replace(best.rows);
             self.quantizers = best.quantizers;
+            self.binned_for = 0;
         }
         self.forward();
         self.grow(count);
@@ -249,6 +255,11 @@ impl<'a> Fit<'a> {
             })
             .collect_into_vec(&mut self.splats);
         let kernel = self.training.kernel;
+        if self.binned_for == 0 {
+            self.pass.bin(self.raster, &self.splats, kernel);
+            self.binned_for = REBIN_INTERVAL;
+        }
+        self.binned_for -= 1;
         self.error =
             self.pass.run(self.raster, &self.splats, kernel, self.base, &mut self.by_splat);
     }
@@ -306,8 +317,14 @@ impl<'a> Fit<'a> {
         for row in newcomers {
             self.parameters.push(row);
         }
-        // What was best had other Gaussians.
+        self.parameters.sort();
+        self.restarted();
+    }
+
+    /// Forgets what was known of the values before: other Gaussians, or elsewhere.
+    fn restarted(&mut self) {
         self.best = None;
+        self.binned_for = 0;
     }
 
     /// Removes the `count` Gaussians that matter least: those that add least to the picture by
@@ -337,7 +354,7 @@ impl<'a> Fit<'a> {
             keep[index as usize] = false;
         }
         self.parameters.retain(|index| keep[index]);
-        self.best = None;
+        self.restarted();
     }
 
     /// Removes Gaussians that are invalid, or that nobody would miss.
@@ -355,7 +372,7 @@ impl<'a> Fit<'a> {
         let keep: Vec<bool> = (0..values.len()).into_par_iter().map(useful).collect();
         if keep.contains(&false) {
             self.parameters.retain(|index| keep[index]);
-            self.best = None;
+            self.restarted();
         }
     }
 
@@ -368,11 +385,12 @@ impl<'a> Fit<'a> {
             self.bounds,
             &self.training.quantization,
         ));
-        self.best = None;
+        self.restarted();
     }
 
     /// Looks at the values of the last step, which no pass has seen yet.
     fn settle(&mut self) {
+        self.binned_for = 0;
         self.forward();
         self.remember();
     }

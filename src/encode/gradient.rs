@@ -62,8 +62,30 @@ impl Pass {
         }
     }
 
-    /// Renders `splats` over `base`, and sets `gradients`, one per splat. Returns the sum of
-    /// squared errors over all samples.
+    /// Says which splats touch which tile. Good for passes over the same splats while they change
+    /// little, too: near the cut-off a splat weighs next to nothing.
+    pub(crate) fn bin(&mut self, raster: &Raster, splats: &[Splat], kernel: Kernel) {
+        let region =
+            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
+        self.ends.clear();
+        self.ends.resize(splats.len(), 0);
+        self.positions.clear();
+        let (ends, positions) = (&mut self.ends, &mut self.positions);
+        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, entry| {
+            positions.push(entry as u32);
+            ends[splat as usize] = positions.len() as u32;
+        });
+        // A splat outside the picture has no slots: it ends where the one before ends.
+        let mut last = 0;
+        for end in ends {
+            last = last.max(*end);
+            *end = last;
+        }
+        self.slots.resize(self.positions.len() * slots_per_pair(raster.channels), Slot::default());
+    }
+
+    /// Renders the `splats` that [`Pass::bin`] was told over `base`, and sets `gradients`, one per
+    /// splat. Returns the sum of squared errors over all samples.
     pub(crate) fn run(
         &mut self,
         raster: &Raster,
@@ -112,26 +134,6 @@ impl Pass {
         &self.positions[start as usize..self.ends[splat] as usize]
     }
 
-    /// Says which splats touch which tile.
-    fn bin(&mut self, raster: &Raster, splats: &[Splat], cutoff: f32) {
-        let region =
-            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
-        self.ends.clear();
-        self.ends.resize(splats.len(), 0);
-        self.positions.clear();
-        let (ends, positions) = (&mut self.ends, &mut self.positions);
-        self.tiling.rebuild(splats, cutoff, region, |splat, entry| {
-            positions.push(entry as u32);
-            ends[splat as usize] = positions.len() as u32;
-        });
-        // A splat outside the picture has no slots: it ends where the one before ends.
-        let mut last = 0;
-        for end in ends {
-            last = last.max(*end);
-            *end = last;
-        }
-    }
-
     fn run_of<const CHANNELS: usize>(
         &mut self,
         raster: &Raster,
@@ -139,10 +141,8 @@ impl Pass {
         kernel: Kernel,
         base: [f32; 4],
     ) {
-        self.bin(raster, splats, kernel.cutoff());
         let tiling = &self.tiling;
         let per_pair = slots_per_pair(CHANNELS);
-        self.slots.resize(self.positions.len() * per_pair, Slot::default());
         let mut slots = &mut self.slots[..];
         let rows: Vec<_> = (0..tiling.rows())
             .map(|row| {
@@ -191,8 +191,8 @@ impl Pass {
                 let mut sum = [Slot::default(); 2];
                 for &position in self.slots_of(splat) {
                     let slots = &self.slots[position as usize * per_pair..][..per_pair];
-                    for (sum, value) in sum.iter_mut().flatten().zip(slots.as_flattened()) {
-                        *sum += value;
+                    for (sum, slot) in sum.iter_mut().zip(slots) {
+                        *sum = core::array::from_fn(|lane| sum[lane] + slot[lane]);
                     }
                 }
                 let sum = sum.as_flattened();
@@ -493,7 +493,9 @@ mod tests {
             })
             .collect();
         let mut by_splat = Vec::new();
-        Pass::new(raster).run(raster, &splats, kernel, BASE, &mut by_splat);
+        let mut pass = Pass::new(raster);
+        pass.bin(raster, &splats, kernel);
+        pass.run(raster, &splats, kernel, BASE, &mut by_splat);
         let by_row = by_splat.iter().zip(rows).map(|(gradient, row)| {
             let (center, shape) = gradient.moments.gradients(chart, Vec3::from_slice(&row[2..5]));
             let mut out = [0.0; MAX_COMPONENTS];
@@ -571,6 +573,7 @@ mod tests {
         let run = |level| {
             let mut pass = Pass { level, ..Pass::new(&raster) };
             let mut gradients = Vec::new();
+            pass.bin(&raster, &splats, Kernel::Quartic);
             let error = pass.run(&raster, &splats, Kernel::Quartic, BASE, &mut gradients);
             (error, gradients)
         };
@@ -603,8 +606,9 @@ mod tests {
             Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
         let splat = Splat::new(&gaussian, &View::identity(5, 3)).expect("it is sound");
         let mut gradients = Vec::new();
-        let error =
-            Pass::new(&raster).run(&raster, &[splat], Kernel::Quartic, [0.9; 4], &mut gradients);
+        let mut pass = Pass::new(&raster);
+        pass.bin(&raster, &[splat], Kernel::Quartic);
+        let error = pass.run(&raster, &[splat], Kernel::Quartic, [0.9; 4], &mut gradients);
         assert_eq!(error, 0.0);
         assert_eq!(gradients[0], SplatGradient::default());
     }

@@ -104,6 +104,21 @@ impl Parameters {
         self.moments.retain(|_| keep(index.next().expect("endless")));
     }
 
+    /// Sorts the Gaussians along a Z curve, so that what is near in the picture is near in memory.
+    pub(crate) fn sort(&mut self) {
+        let spread = |value: f32| {
+            // A bit of the number, a bit of the other coordinate's, and so on.
+            (0..16).fold(0, |sum, bit| sum | (value.max(0.0) as u32 >> bit & 1) << (2 * bit))
+        };
+        let mut order: Vec<(u32, u32)> = (0..)
+            .zip(&self.values)
+            .map(|(index, row)| (spread(row[0] / 4.0) | spread(row[1] / 4.0) << 1, index))
+            .collect();
+        order.sort_unstable();
+        self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
+        self.moments = order.iter().map(|&(_, index)| self.moments[index as usize]).collect();
+    }
+
     /// Takes one step against `gradients`, given by the values themselves; `factor` scales all
     /// learning rates.
     pub(crate) fn step(
@@ -152,15 +167,17 @@ fn step(
     let (beta1, beta2) = (options.beta1, options.beta2);
     moments.age += 1;
     let age = moments.age.min(i32::MAX as u32) as i32;
-    let (unbias1, unbias2) = (1.0 - beta1.powi(age), 1.0 - beta2.powi(age));
+    let rate = factor / (1.0 - beta1.powi(age));
+    let unbias = 1.0 / (1.0 - beta2.powi(age));
     let mut steps = [0.0; MAX_COMPONENTS];
-    for index in 0..5 + bounds.channels {
+    // Absent channels as well, whose gradients are zero: a loop of constant length is vector code.
+    for index in 0..MAX_COMPONENTS {
         let (mean, square) = (&mut moments.mean[index], &mut moments.square[index]);
         *mean = beta1 * *mean + (1.0 - beta1) * gradient[index];
         *square = beta2 * *square + (1.0 - beta2) * (gradient[index] * gradient[index]);
-        let root = (*square / unbias2).sqrt() + options.epsilon;
+        let root = (*square * unbias).sqrt() + options.epsilon;
         // 0 / 0: a parameter that no pixel depends on.
-        steps[index] = if root > 0.0 { *mean / unbias1 / root * factor } else { 0.0 };
+        steps[index] = if root > 0.0 { *mean * rate / root } else { 0.0 };
     }
     let center = frame.center * Vec2::from_slice(&steps) * options.center;
     let shape = shape_of(row) - frame.shape * shape_of(&steps) * options.shape;
