@@ -61,9 +61,14 @@ pub(crate) fn encode(
             break;
         }
     }
+    let pixels = raster.pixels();
+    let (iterations, peak_memory) = (fit.iterations, fit.peak_memory as u64);
     if let Target::Psnr(target) = encoder.target {
         file = trimmed(&layout, layout.ordered(&fit.fitted()), file, source, target);
     }
+    // The decoder needs memory, too.
+    drop(fit);
+    drop(raster);
     let verified = Verified::new(&file, source);
     let gaussians = verified.gaussians();
     let psnr = verified.psnr(gaussians);
@@ -71,9 +76,9 @@ pub(crate) fn encode(
         gaussians,
         psnr,
         psnr_float: verified.float_psnr(),
-        iterations: fit.iterations,
-        peak_memory: fit.peak_memory as u64,
-        shortfall: shortfall(encoder.target, raster.pixels(), file.len(), psnr, gaussians),
+        iterations,
+        peak_memory,
+        shortfall: shortfall(encoder.target, pixels, file.len(), psnr, gaussians),
         file,
     })
 }

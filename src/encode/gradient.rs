@@ -8,7 +8,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::chart::Moments;
-use super::raster::Raster;
+use super::raster::{FULL_SCALE, Raster, SamplePlane};
 use crate::render::{
     Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, Tiling, centers, kernel_simd,
 };
@@ -81,7 +81,10 @@ impl Pass {
             last = last.max(*end);
             *end = last;
         }
-        self.slots.resize(self.positions.len() * slots_per_pair(raster.channels), Slot::default());
+        let slots = self.positions.len() * slots_per_pair(raster.channels);
+        // Little more than is needed: slots are most of what a Gaussian takes.
+        self.slots.reserve_exact((slots + slots / 8).saturating_sub(self.slots.len()));
+        self.slots.resize(slots, Slot::default());
     }
 
     /// Renders the `splats` that [`Pass::bin`] was told over `base`, and sets `gradients`, one per
@@ -248,7 +251,7 @@ struct Tile<'a, const CHANNELS: usize> {
     /// Columns and rows that lie inside the picture.
     columns: usize,
     rows: usize,
-    target: &'a [Plane; CHANNELS],
+    target: &'a [SamplePlane; CHANNELS],
     base: [f32; 4],
     splats: &'a [Splat],
     list: &'a [u32],
@@ -353,7 +356,8 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         for row in 0..TILE_HEIGHT {
             let inside = if row < self.rows { inside } else { zero };
             for (plane, target) in planes.iter_mut().zip(self.target) {
-                let target = f32x16::load_array_ref(simd, &target[row]);
+                let target =
+                    f32x16::from_fn(simd, |column| f32::from(target[row][column])) / FULL_SCALE;
                 let value = f32x16::load_array_ref(simd, &plane[row]);
                 let mut residual = (value - target) * inside;
                 // Output is clamped: beyond white or black where the source is so, all is well.

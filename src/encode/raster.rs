@@ -1,9 +1,15 @@
-//! The source picture as float planes, tile by tile, in the layout of the training pass.
+//! The source picture as planes, tile by tile, in the layout of the training pass.
 
 use super::source::Source;
-use crate::render::{Plane, TILE_HEIGHT, TILE_WIDTH};
+use crate::render::{TILE_HEIGHT, TILE_WIDTH};
 
-/// The samples of a picture in [0, 1], one [`Plane`] per tile and channel: all channels of the
+/// One channel of a tile, row by row, [`FULL_SCALE`] being a full sample: half as large as floats
+/// and as exact.
+pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];
+/// What a full sample is in a [`SamplePlane`].
+pub(crate) const FULL_SCALE: f32 = 65535.0;
+
+/// The samples of a picture, one [`SamplePlane`] per tile and channel: all channels of the
 /// first tile, then all of the second. Pixels of a tile that lie outside the picture are 0.
 #[derive(Debug)]
 pub(crate) struct Raster {
@@ -12,7 +18,7 @@ pub(crate) struct Raster {
     pub(crate) channels: usize,
     /// Half of the distance between neighbouring samples of the source's depth.
     pub(crate) half_step: f32,
-    planes: Vec<Plane>,
+    planes: Vec<SamplePlane>,
 }
 
 impl Raster {
@@ -21,13 +27,13 @@ impl Raster {
         let channels = source.color().channels();
         let columns = width.div_ceil(TILE_WIDTH);
         let tiles = columns * height.div_ceil(TILE_HEIGHT);
-        let mut planes = vec![[[0.0; TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
+        let mut planes = vec![[[0; TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
         for y in 0..height {
             for x in 0..width {
                 let tile = y / TILE_HEIGHT * columns + x / TILE_WIDTH;
                 for channel in 0..channels {
                     planes[tile * channels + channel][y % TILE_HEIGHT][x % TILE_WIDTH] =
-                        source.sample((y * width + x) * channels + channel);
+                        source.wide_sample((y * width + x) * channels + channel);
                 }
             }
         }
@@ -36,28 +42,30 @@ impl Raster {
     }
 
     /// All channels of a tile.
-    pub(crate) fn tile<const CHANNELS: usize>(&self, tile: usize) -> &[Plane; CHANNELS] {
+    pub(crate) fn tile<const CHANNELS: usize>(&self, tile: usize) -> &[SamplePlane; CHANNELS] {
         self.planes[tile * CHANNELS..][..CHANNELS].try_into().expect("a tile has all channels")
     }
 
-    /// The samples of a pixel; 0 for absent channels.
+    /// The samples of a pixel, 1.0 being a full one; 0 for absent channels.
     pub(crate) fn sample(&self, x: usize, y: usize) -> [f32; 4] {
         let tile = y / TILE_HEIGHT * self.width.div_ceil(TILE_WIDTH) + x / TILE_WIDTH;
         let mut sample = [0.0; 4];
         for (channel, value) in sample[..self.channels].iter_mut().enumerate() {
-            *value = self.planes[tile * self.channels + channel][y % TILE_HEIGHT][x % TILE_WIDTH];
+            let plane = &self.planes[tile * self.channels + channel];
+            *value = f32::from(plane[y % TILE_HEIGHT][x % TILE_WIDTH]) / FULL_SCALE;
         }
         sample
     }
 
     /// The mean of each channel over the picture; 0 for absent channels.
     pub(crate) fn mean(&self) -> [f32; 4] {
-        let mut sums = [0.0_f64; 4];
+        let mut sums = [0_u64; 4];
         for (index, plane) in self.planes.iter().enumerate() {
-            let sum = plane.iter().flatten().map(|&sample| f64::from(sample)).sum::<f64>();
+            let sum = plane.iter().flatten().map(|&sample| u64::from(sample)).sum::<u64>();
             sums[index % self.channels] += sum;
         }
-        sums.map(|sum| (sum / (self.width * self.height) as f64) as f32)
+        let full = self.pixels() as f64 * f64::from(FULL_SCALE);
+        sums.map(|sum| (sum as f64 / full) as f32)
     }
 
     pub(crate) fn pixels(&self) -> usize {

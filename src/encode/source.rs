@@ -91,9 +91,14 @@ impl<'a> Source<'a> {
 
     /// The sample at an index of the interleaved order, 1.0 being a full one.
     pub(crate) fn sample(&self, index: usize) -> f32 {
+        f32::from(self.wide_sample(index)) / 65535.0
+    }
+
+    /// The sample at an index of the interleaved order, with 16 bits.
+    pub(crate) fn wide_sample(&self, index: usize) -> u16 {
         match self.samples {
-            Samples::Eight(samples) => f32::from(samples[index]) / 255.0,
-            Samples::Sixteen(samples) => f32::from(samples[index]) / 65535.0,
+            Samples::Eight(samples) => u16::from(samples[index]) * 257,
+            Samples::Sixteen(samples) => samples[index],
         }
     }
 }

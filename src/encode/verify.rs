@@ -4,7 +4,10 @@ use super::source::{Samples, Source};
 use crate::decoder::StreamDecoder;
 use crate::limits::Limits;
 use crate::metrics;
-use crate::render::{Picture, RenderOptions};
+use crate::render::{Picture, Region, RenderOptions};
+
+/// Rows that are compared at a time.
+const STRIP: u32 = 64;
 
 /// A file, decoded again.
 #[derive(Debug)]
@@ -46,19 +49,26 @@ impl<'a> Verified<'a> {
 
     /// PSNR of the rendering before it is rounded to samples, in dB.
     pub(crate) fn float_psnr(&self) -> f64 {
-        let (channels, samples) = (self.source.color().channels(), self.source.len());
-        let mut planes = vec![0.0; samples];
-        let options = RenderOptions::new();
-        self.picture().render_planes(&options, &mut planes).expect("there are no limits");
-        // Plane by plane on one side, interleaved on the other.
-        let mut source = Vec::with_capacity(samples);
-        for channel in 0..channels {
-            source.extend((channel..samples).step_by(channels).map(|at| self.source.sample(at)));
+        let (width, height) = (self.source.width(), self.source.height());
+        let channels = self.source.color().channels();
+        let mut planes = Vec::new();
+        let mut squares = 0.0;
+        // In strips, for floats are large.
+        for y in (0..height).step_by(STRIP as usize) {
+            let region = Region { x: 0, y, width, height: STRIP.min(height - y) };
+            let options = RenderOptions::new().region(region);
+            let pixels = region.pixels() as usize;
+            planes.resize(pixels * channels, 0.0);
+            self.picture().render_planes(&options, &mut planes).expect("there are no limits");
+            let first = y as usize * width as usize;
+            for (channel, plane) in planes.chunks_exact(pixels).enumerate() {
+                for (value, pixel) in plane.iter().zip(first..) {
+                    let source = self.source.sample(pixel * channels + channel);
+                    squares += f64::from(value.clamp(0.0, 1.0) - source).powi(2);
+                }
+            }
         }
-        for value in &mut planes {
-            *value = value.clamp(0.0, 1.0);
-        }
-        metrics::psnr(&planes, &source, 1.0)
+        10.0 * (self.source.len() as f64 / squares).log10()
     }
 
     fn picture(&self) -> Picture<'_> {
