@@ -305,6 +305,8 @@ impl<'a> Fit<'a> {
         if count == 0 {
             return;
         }
+        // They are of no use to the new population, and room for the map of distortions.
+        self.pass.unbin();
         let site = Site {
             options: &self.training.densification,
             filter: self.training.filter,
@@ -393,6 +395,8 @@ impl<'a> Fit<'a> {
         self.binned_for = 0;
         self.forward();
         self.remember();
+        self.binned_for = 0;
+        self.pass.unbin();
     }
 
     /// Keeps the values of the last pass if they are the best so far.

@@ -87,6 +87,13 @@ impl Pass {
         self.slots.resize(slots, Slot::default());
     }
 
+    /// Gives back the memory of the bins; the residuals stay.
+    pub(crate) fn unbin(&mut self) {
+        self.slots = Vec::new();
+        self.ends = Vec::new();
+        self.positions = Vec::new();
+    }
+
     /// Renders the `splats` that [`Pass::bin`] was told over `base`, and sets `gradients`, one per
     /// splat. Returns the sum of squared errors over all samples.
     pub(crate) fn run(

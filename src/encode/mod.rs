@@ -28,7 +28,7 @@ use training::Training;
 use crate::container::Metadata;
 
 /// Iterations by effort, from 1 to 9.
-const ITERATIONS: [u32; 9] = [75, 150, 250, 400, 600, 1000, 1600, 2800, 5000];
+const ITERATIONS: [u32; 9] = [60, 90, 150, 300, 600, 1200, 2400, 4800, 9600];
 /// Most threads that can be asked for.
 const MAX_THREADS: usize = 1024;
 

@@ -199,18 +199,21 @@ impl Training {
     /// culled by importance; steps in each Gaussian's own frame; learning rates down to zero.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
+        let steps = (iterations / 30).clamp(20, 160);
+        // The longer the run, the more is left for settling.
+        let (end, culled) = if iterations > 2_400 { (0.4, 0.5) } else { (0.5, 0.65) };
         Self {
             iterations,
             kernel: Kernel::Quartic,
             parameterization: Chart::Cholesky,
             densification: Densification {
                 initial: 0.03,
-                steps: 20,
-                end: 0.5,
+                steps,
+                end,
                 portion: Portion::Even,
                 surplus: 0.3,
-                culled: 0.65,
-                replaced: 0.1,
+                culled,
+                replaced: (2.0 / steps as f32).max(0.05),
                 distortion: Distortion::L3,
                 placement: Placement::Spread,
                 color: NewColor::Residual(0.1),
@@ -222,7 +225,8 @@ impl Training {
                 units: Units::Relative,
                 center: 0.1,
                 shape: 0.1,
-                color: 0.015,
+                // A short run must get to its colours in fewer steps.
+                color: 0.015 * (300.0 / iterations.max(1) as f32).clamp(1.0, 4.0).sqrt(),
                 beta1: 0.9,
                 beta2: 0.99,
                 epsilon: 1e-15,
