@@ -111,7 +111,7 @@ impl<'a> Fit<'a> {
         self.forward();
         let first = densification.initial * self.wanted(1.0) as f32;
         self.grow((first.ceil() as usize).max(1));
-        let mut surplus = None;
+        let mut kept = usize::MAX;
         for iteration in 0..*iterations {
             if iteration == plan.quantized_from {
                 self.start_quantization();
@@ -123,19 +123,16 @@ impl<'a> Fit<'a> {
                 self.prune();
             }
             if let Some(steps_left) = plan.growths_left(done) {
+                kept = self.wanted(FORESEEN);
                 let portion = self.portion(steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
                 self.cull(replaced);
                 self.grow(portion + replaced);
             }
             if let Some(culls_left) = plan.culls_left(done) {
-                let surplus = surplus.get_or_insert_with(|| {
-                    let kept = self.len() as f32 / (1.0 + densification.surplus);
-                    self.len() - kept.round() as usize
-                });
-                let count = *surplus / (culls_left as usize + 1);
-                self.cull(count);
-                *surplus -= count;
+                // Growth may have ended before the budget, where there is little to correct.
+                let surplus = self.len().saturating_sub(kept);
+                self.cull(surplus / (culls_left as usize + 1));
             }
         }
         self.settle();

@@ -143,7 +143,7 @@ mod simd {
 
 #[cfg(all(test, feature = "std"))]
 mod tests {
-    use std::cell::RefCell;
+    use core::cell::RefCell;
 
     use fearless_simd::Level;
     use proptest::prelude::*;
