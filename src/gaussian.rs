@@ -44,6 +44,14 @@ impl Gaussian {
         [i11 * i11 + w * w, w * i22, i22 * i22]
     }
 
+    /// How much the Gaussian adds to the picture by itself: squared samples summed up over the
+    /// pixels, but for a constant of the kernel.
+    #[cfg(feature = "encode")]
+    pub(crate) fn importance(&self) -> f32 {
+        let [l11, _, l22] = self.cholesky;
+        self.color.iter().map(|color| color * color).sum::<f32>() * l11 * l22
+    }
+
     /// Whether the renderer draws this Gaussian: all values within the format's bounds and the
     /// covariance positive definite (spec, section 8.5).
     #[must_use]

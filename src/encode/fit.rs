@@ -124,7 +124,7 @@ impl<'a> Fit<'a> {
             }
             if let Some(steps_left) = plan.growths_left(done) {
                 kept = self.wanted(FORESEEN);
-                let portion = self.portion(steps_left);
+                let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
                 self.cull(replaced);
                 self.grow(portion + replaced);
@@ -192,11 +192,11 @@ impl<'a> Fit<'a> {
         self.budget.wanted(self.parameters.len(), self.error * foreseen, self.most())
     }
 
-    /// How many Gaussians to add, with so many steps to come after this one.
-    fn portion(&self, steps_left: u32) -> usize {
+    /// How many Gaussians to add if `kept` are to stay, with so many steps to come after this one.
+    fn portion(&self, kept: usize, steps_left: u32) -> usize {
         let densification = &self.training.densification;
-        let wanted = self.wanted(FORESEEN) as f64 * (1.0 + f64::from(densification.surplus));
-        let missing = (wanted.round() as usize).saturating_sub(self.parameters.len());
+        let grown = kept as f64 * (1.0 + f64::from(densification.surplus));
+        let missing = (grown.round() as usize).saturating_sub(self.parameters.len());
         match densification.portion {
             _ if steps_left == 0 => missing,
             Portion::Even => missing.div_ceil(steps_left as usize + 1),
@@ -326,23 +326,16 @@ impl<'a> Fit<'a> {
         self.binned_for = 0;
     }
 
-    /// Removes the `count` Gaussians that matter least: those that add least to the picture by
-    /// themselves, in squared samples.
+    /// Removes the `count` Gaussians of least importance.
     fn cull(&mut self, count: usize) {
         let count = count.min(self.len());
         if count == 0 {
             return;
         }
-        let chart = self.bounds.chart;
-        let importances: Vec<f32> = self
-            .parameters
-            .values
-            .par_iter()
-            .map(|row| {
-                let [l11, _, l22] = chart.to_cholesky(shape_of(row).into());
-                let squared = row[5..].iter().map(|color| color * color).sum::<f32>();
-                squared * (l11 * l22)
-            })
+        let (chart, components) = (self.bounds.chart, 5 + self.raster.channels);
+        let rows = self.parameters.values.par_iter();
+        let importances: Vec<f32> = rows
+            .map(|row| Gaussian::from_components(&row[..components], chart).importance())
             .collect();
         let mut order: Vec<u32> = (0..importances.len() as u32).collect();
         order.select_nth_unstable_by(count - 1, |a, b| {

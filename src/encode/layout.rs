@@ -97,9 +97,7 @@ impl<'a> Layout<'a> {
                 }
                 let values = &values[..fitted.quantizers.len()];
                 let gaussian = Gaussian::from_components(values, self.header.chart);
-                let [l11, _, l22] = gaussian.cholesky;
-                let energy = gaussian.color.iter().map(|color| color * color).sum::<f32>();
-                (energy * l11 * l22, codes)
+                (gaussian.importance(), codes)
             })
             .collect();
         order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
