@@ -127,7 +127,7 @@ fn encode_info_decode_compare() {
     let bpp = report["bpp"].as_f64().expect("a number");
     assert!((bpp - bytes as f64 * 8.0 / (48.0 * 36.0)).abs() < 1e-9);
     assert!(report["gaussians"].as_u64().expect("a number") <= 30);
-    for field in ["psnr", "psnr_float", "iterations", "seconds", "peak_memory"] {
+    for field in ["psnr", "psnr_float", "iterations", "evaluations", "seconds", "peak_memory"] {
         assert!(report[field].is_number(), "{field}: {report}");
     }
     assert!(report["shortfall"].is_null() || report["shortfall"].is_string());

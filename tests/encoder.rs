@@ -369,16 +369,22 @@ fn progress_is_told_and_may_cancel() {
         seen.push((progress.iteration, progress.gaussians));
         ControlFlow::Continue(())
     });
-    assert_eq!(seen.len() as u32, encoded.expect("it encodes").report.iterations);
+    let iterations = encoded.expect("it encodes").report.iterations;
     assert!(seen.is_sorted_by_key(|(iteration, _)| *iteration));
+    let mut told: Vec<u32> = seen.iter().map(|(iteration, _)| *iteration).collect();
+    told.dedup();
+    assert_eq!(told, (0..iterations).collect::<Vec<_>>());
     assert!(seen.last().expect("not empty").1 > seen[0].1);
-    let mut calls = 0;
-    let error = encoder.encode_with(&source, &mut |_| {
-        calls += 1;
-        if calls == 5 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    assert!(matches!(error, Err(EncodeError::Cancelled)));
-    assert_eq!(calls, 5);
+    // Whenever it is stopped, during training or at the very end, it is not called again.
+    for stop in [1, 5, seen.len()] {
+        let mut calls = 0;
+        let error = encoder.encode_with(&source, &mut |_| {
+            calls += 1;
+            if calls == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        assert!(matches!(error, Err(EncodeError::Cancelled)));
+        assert_eq!(calls, stop);
+    }
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! Rate control: one training run, steered to the caller's target and finished on real files.
 
 use super::budget::Budget;
-use super::fit::{Fit, Fitted, Observer};
+use super::fit::{Fit, Fitted};
 use super::layout::{Layout, layers_length};
+use super::progress::Observer;
 use super::raster::Raster;
 use super::source::Source;
 use super::training::Training;
-use super::verify::Verified;
+use super::verify::{Distortion, Verified};
 use super::{EncodeError, Encoder, Precision, Target};
 use crate::quantizer::{Quantizer, Steps};
 
@@ -28,6 +29,7 @@ pub(crate) struct Outcome {
     pub(crate) psnr: f64,
     pub(crate) psnr_float: f64,
     pub(crate) iterations: u32,
+    pub(crate) evaluations: u64,
     pub(crate) peak_memory: u64,
     pub(crate) shortfall: Option<String>,
 }
@@ -48,7 +50,7 @@ pub(crate) fn encode(
 
     let mut file = layout.write(&fit.fitted());
     for _ in 0..MAX_ROUNDS {
-        let more = missing(encoder.target, budget, &file, source, &fit);
+        let more = missing(encoder.target, budget, &file, source, &fit, observer)?;
         let more = more.min(fit.most().saturating_sub(fit.len()));
         if more == 0 {
             break;
@@ -62,21 +64,23 @@ pub(crate) fn encode(
         }
     }
     let pixels = raster.pixels();
-    let (iterations, peak_memory) = (fit.iterations, fit.peak_memory as u64);
+    let (iterations, evaluations) = (fit.iterations, fit.evaluations);
+    let peak_memory = fit.peak_memory as u64;
     if let Target::Psnr(target) = encoder.target {
-        file = trimmed(&layout, layout.ordered(&fit.fitted()), file, source, target);
+        file = trimmed(&layout, layout.ordered(&fit.fitted()), file, source, target, observer)?;
     }
     // The decoder needs memory, too.
     drop(fit);
     drop(raster);
     let verified = Verified::new(&file, source);
     let gaussians = verified.gaussians();
-    let psnr = verified.psnr(gaussians);
+    let Distortion { psnr, psnr_float } = verified.distortion(gaussians, observer)?;
     Ok(Outcome {
         gaussians,
         psnr,
-        psnr_float: verified.float_psnr(),
+        psnr_float,
         iterations,
+        evaluations,
         peak_memory,
         shortfall: shortfall(encoder.target, pixels, file.len(), psnr, gaussians),
         file,
@@ -141,10 +145,11 @@ fn missing(
     file: &[u8],
     source: &Source<'_>,
     fit: &Fit<'_>,
-) -> usize {
-    match (target, budget) {
+    observer: &mut Observer<'_>,
+) -> Result<usize, EncodeError> {
+    Ok(match (target, budget) {
         (Target::Psnr(target), _) => {
-            let psnr = Verified::new(file, source).psnr(u32::MAX);
+            let psnr = Verified::new(file, source).distortion(u32::MAX, observer)?.psnr;
             // A decibel takes somewhat less than 0.3 times as many Gaussians again.
             if psnr >= target {
                 0
@@ -159,7 +164,7 @@ fn missing(
             count.saturating_sub(fit.len())
         }
         _ => 0,
-    }
+    })
 }
 
 /// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
@@ -171,10 +176,12 @@ fn trimmed(
     mut file: Vec<u8>,
     source: &Source<'_>,
     target: f64,
-) -> Vec<u8> {
-    fitted.codes.truncate(least_prefix(&Verified::new(&file, source), target) as usize);
+    observer: &mut Observer<'_>,
+) -> Result<Vec<u8>, EncodeError> {
+    let fewest = least_prefix(&Verified::new(&file, source), target, observer)?;
+    fitted.codes.truncate(fewest as usize);
     file = layout.write(&fitted);
-    let mut psnr = Verified::new(&file, source).psnr(u32::MAX);
+    let mut psnr = Verified::new(&file, source).distortion(u32::MAX, observer)?.psnr;
     for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
         if psnr <= target + PSNR_TOLERANCE {
             break;
@@ -182,23 +189,28 @@ fn trimmed(
         let mut fewer = fitted.clone();
         fewer.codes.remove(index);
         let trial = layout.write(&fewer);
-        let reached = Verified::new(&trial, source).psnr(u32::MAX);
+        let reached = Verified::new(&trial, source).distortion(u32::MAX, observer)?.psnr;
         if reached >= target {
             (fitted, file, psnr) = (fewer, trial, reached);
         }
     }
-    file
+    Ok(file)
 }
 
 /// The fewest of the file's first Gaussians that reach `target`; all of them if none do.
-fn least_prefix(verified: &Verified<'_>, target: f64) -> u32 {
+fn least_prefix(
+    verified: &Verified<'_>,
+    target: f64,
+    observer: &mut Observer<'_>,
+) -> Result<u32, EncodeError> {
+    let mut reaches = |count| Ok(verified.distortion(count, observer)?.psnr >= target);
     let (mut short, mut enough) = (0, verified.gaussians());
     // Nearly monotone, and whatever this ends on was seen to be enough.
     while enough - short > 1 {
         let middle = u32::midpoint(short, enough);
-        if verified.psnr(middle) >= target { enough = middle } else { short = middle }
+        if reaches(middle)? { enough = middle } else { short = middle }
     }
-    if verified.psnr(short) >= target { short } else { enough }
+    Ok(if reaches(short)? { short } else { enough })
 }
 
 /// Why the target was not met, if it was not.

@@ -10,6 +10,7 @@ use super::optimizer::{Bounds, Row};
 use super::raster::Raster;
 use super::training::{Densification, Distortion, Filter, NewColor, NewShape, Placement};
 use crate::gaussian::{Chart, MAX_COMPONENTS};
+use crate::render::{Plane, TILE_HEIGHT, TILE_WIDTH};
 
 /// Gaussians whose peak is below this share of a full sample are useless: a 16th of a step of 8
 /// bits.
@@ -32,10 +33,13 @@ impl Site<'_> {
     /// Up to `count` new Gaussians where the picture is worst. Fewer where there is nothing left
     /// to correct.
     pub(crate) fn newcomers(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
-        let map = self.distortions();
         let pixels = match self.options.placement {
-            Placement::Top => top(count, &map),
-            Placement::Spread => spread(count, &map, self.raster.width, rng.f64()),
+            Placement::Top => top(count, &self.map()),
+            Placement::Spread => {
+                spread(count, self.raster.width, self.tiles(), rng.f64(), |tile| {
+                    self.distortions(tile)
+                })
+            }
         };
         let total = self.present + pixels.len();
         let variance = self
@@ -69,26 +73,63 @@ impl Site<'_> {
         self.bounds.confined(row)
     }
 
-    /// The distortion of every pixel, row by row; 0 where the output could not be improved.
-    fn distortions(&self) -> Vec<f32> {
-        let raster = self.raster;
-        let mut map = vec![0.0; raster.pixels()];
-        map.par_chunks_exact_mut(raster.width).enumerate().for_each(|(y, line)| {
-            for (x, value) in line.iter_mut().enumerate() {
-                let residual = self.pass.residual(x, y, raster.channels);
-                // Less than half a step of the source's depth: exact after rounding.
-                let exact = residual.iter().all(|value| value.abs() < raster.half_step);
-                *value = match self.options.distortion {
-                    _ if exact => 0.0,
-                    Distortion::L1 => residual.iter().map(|value| value.abs()).sum(),
-                    Distortion::L3 => {
-                        let squared = residual.iter().map(|value| value * value).sum::<f32>();
-                        squared * squared.sqrt()
-                    }
-                };
+    /// Columns and rows of tiles.
+    fn tiles(&self) -> [usize; 2] {
+        [self.raster.width.div_ceil(TILE_WIDTH), self.raster.height.div_ceil(TILE_HEIGHT)]
+    }
+
+    /// The distortion of every pixel, row by row.
+    fn map(&self) -> Vec<f32> {
+        let mut map = vec![0.0; self.raster.pixels()];
+        let [columns, _] = self.tiles();
+        let rows = map.par_chunks_mut(self.raster.width * TILE_HEIGHT).enumerate();
+        rows.for_each(|(row, lines)| {
+            for column in 0..columns {
+                let distortions = self.distortions(row * columns + column);
+                let lines = lines.chunks_exact_mut(self.raster.width).zip(&distortions);
+                for (line, values) in lines {
+                    let line = &mut line[column * TILE_WIDTH..];
+                    let length = line.len().min(TILE_WIDTH);
+                    line[..length].copy_from_slice(&values[..length]);
+                }
             }
         });
         map
+    }
+
+    /// The distortion of every pixel of a tile; 0 where the output could not be improved.
+    fn distortions(&self, tile: usize) -> Plane {
+        let residuals = self.pass.residuals(tile, self.raster.channels);
+        let measure = |measure: &dyn Fn(f32, f32) -> f32| -> Plane {
+            let mut plane = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
+            for residual in residuals {
+                for (value, residual) in
+                    plane.as_flattened_mut().iter_mut().zip(residual.as_flattened())
+                {
+                    *value = measure(*value, residual.abs());
+                }
+            }
+            plane
+        };
+        let mut distortions = match self.options.distortion {
+            Distortion::L1 => measure(&|sum, residual| sum + residual),
+            Distortion::L3 => {
+                let mut plane = measure(&|sum, residual| sum + residual * residual);
+                for value in plane.as_flattened_mut() {
+                    *value *= value.sqrt();
+                }
+                plane
+            }
+        };
+        let worst = measure(&f32::max);
+        let pixels = distortions.as_flattened_mut().iter_mut().zip(worst.as_flattened());
+        for (value, &worst) in pixels {
+            // Less than half a step of the source's depth: exact after rounding.
+            if worst < self.raster.half_step {
+                *value = 0.0;
+            }
+        }
+        distortions
     }
 }
 
@@ -106,33 +147,48 @@ fn top(count: usize, map: &[f32]) -> Vec<u32> {
 }
 
 /// Up to `count` pixels, in every part of the picture as many as it has of the distortion: at equal
-/// steps of the distortion summed up along a Z curve. `phase` in [0, 1) shifts them all.
-fn spread(count: usize, map: &[f32], width: usize, phase: f64) -> Vec<u32> {
-    let total = map.iter().map(|&value| f64::from(value)).sum::<f64>();
-    let step = total / count as f64;
+/// steps of the distortion summed up along a Z curve of tiles. `phase` in [0, 1) shifts them all.
+fn spread(
+    count: usize,
+    width: usize,
+    [columns, rows]: [usize; 2],
+    phase: f64,
+    distortions: impl Fn(usize) -> Plane + Sync,
+) -> Vec<u32> {
+    // Summed up by tile first, on all threads; only tiles with a step in them are looked into.
+    let sum_of =
+        |tile| distortions(tile).as_flattened().iter().map(|&value| f64::from(value)).sum();
+    let sums: Vec<f64> = (0..columns * rows).into_par_iter().map(sum_of).collect();
+    let step = sums.iter().sum::<f64>() / count as f64;
     let (mut sum, mut next) = (0.0, phase * step);
     let mut pixels = Vec::new();
-    if total > 0.0 {
-        along_z([0, 0], [width, map.len() / width], &mut |x, y| {
-            sum += f64::from(map[y * width + x]);
-            if sum > next {
-                pixels.push((y * width + x) as u32);
-                // A pixel of more than one step gets one Gaussian.
-                next += step * ((sum - next) / step).ceil();
+    along_z([0, 0], [columns, rows], &mut |column, row| {
+        let tile = row * columns + column;
+        let end = sum + sums[tile];
+        if end > next {
+            let first = row * TILE_HEIGHT * width + column * TILE_WIDTH;
+            for (y, line) in distortions(tile).iter().enumerate() {
+                for (x, &value) in line.iter().enumerate() {
+                    sum += f64::from(value);
+                    // What is not to be improved, or not of the picture, is never chosen.
+                    if sum > next && value > 0.0 {
+                        pixels.push((first + y * width + x) as u32);
+                        // A pixel of more than one step gets one Gaussian.
+                        next += step * ((sum - next) / step).ceil();
+                    }
+                }
             }
-        });
-    }
+        }
+        sum = end;
+    });
     pixels
 }
 
-/// Visits the pixels of a rectangle along a Z curve: neighbours follow each other closely.
+/// Visits the points of a rectangle along a Z curve: neighbours follow each other closely.
 fn along_z([x, y]: [usize; 2], [width, height]: [usize; 2], visit: &mut impl FnMut(usize, usize)) {
-    const LEAF: usize = 4;
-    if width.max(height) <= LEAF {
-        for y in y..y + height {
-            for x in x..x + width {
-                visit(x, y);
-            }
+    if width.max(height) <= 1 {
+        if width.min(height) == 1 {
+            visit(x, y);
         }
     } else if width > height {
         let half = width / 2;
@@ -176,45 +232,55 @@ mod tests {
         assert_eq!(top(10, &map), [1, 3, 5, 2]);
     }
 
+    /// A tile whose distortions depend on the picture's column alone.
+    fn tile_of(column: usize, value: impl Fn(usize) -> f32) -> Plane {
+        [core::array::from_fn(|x| value(column * TILE_WIDTH + x)); TILE_HEIGHT]
+    }
+
     #[test]
     fn spread_pixels_follow_the_distortion() {
         // Left half: weak; right half: three times as much.
-        let (width, height) = (50, 40);
-        let map: Vec<f32> =
-            (0..width * height).map(|at| if at % width < 25 { 1.0 } else { 3.0 }).collect();
-        let pixels = spread(400, &map, width, 0.5);
-        assert!((399..=400).contains(&pixels.len()));
+        let width = 50;
+        let pixels = spread(397, width, [4, 5], 0.5, |tile| {
+            tile_of(tile % 4, |x| match x {
+                0..25 => 1.0,
+                25..50 => 3.0,
+                _ => 0.0,
+            })
+        });
+        assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
         sorted.sort_unstable();
         sorted.dedup();
         assert_eq!(sorted.len(), pixels.len(), "each at most once");
         let right = pixels.iter().filter(|&&at| at as usize % width >= 25).count();
-        assert!((295..=305).contains(&right), "{right}");
-        // Evenly: every 10 x 10 block of the right half has about its 30.
-        for block in 0..8 {
-            let (x, y) = (30 + block % 2 * 10, block / 2 * 10);
-            let inside = |at: &&u32| {
-                let (px, py) = (**at as usize % width, **at as usize / width);
-                (x..x + 10).contains(&px) && (y..y + 10).contains(&py)
-            };
-            let count = pixels.iter().filter(inside).count();
-            assert!((26..=34).contains(&count), "{count}");
+        assert!((290..=305).contains(&right), "{right}");
+        // Evenly: every tile has its share.
+        for (column, share) in [(0, 12.7), (2, 38.1)] {
+            for row in 0..5 {
+                let inside = |at: &&u32| {
+                    let (x, y) = (**at as usize % width, **at as usize / width);
+                    x / TILE_WIDTH == column && y / TILE_HEIGHT == row
+                };
+                let count = pixels.iter().filter(inside).count() as f64;
+                assert!((count - share).abs() < 1.0, "{count} of {share}");
+            }
         }
     }
 
     #[test]
     fn spread_leaves_out_what_is_exact() {
-        let mut map = vec![0.0; 35];
-        assert!(spread(10, &map, 7, 0.0).is_empty());
-        map[17] = 2.0;
-        map[18] = 1e-3;
-        let pixels = spread(10, &map, 7, 0.9);
+        let exact = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
+        assert!(spread(10, 7, [1, 1], 0.0, |_| exact).is_empty());
+        let mut map = exact;
+        (map[2][3], map[2][4]) = (2.0, 1e-3);
+        let pixels = spread(10, 7, [1, 1], 0.9, |_| map);
         assert!(pixels == [17] || pixels == [17, 18], "{pixels:?}");
     }
 
     #[test]
     fn the_curve_visits_every_pixel_once() {
-        for size in [[1, 1], [37, 1], [1, 9], [13, 29], [64, 32]] {
+        for size in [[1, 1], [37, 1], [1, 9], [13, 29], [64, 32], [0, 3], [0, 0]] {
             let mut visits = vec![0; size[0] * size[1]];
             along_z([0, 0], size, &mut |x, y| visits[y * size[0] + x] += 1);
             assert!(visits.iter().all(|&count| count == 1), "{size:?}");

@@ -1,32 +1,28 @@
 //! The training loop: from a picture to Gaussians (paper, section "Methodology").
 
-use core::ops::ControlFlow;
-
 use glam::Vec2;
 use rayon::prelude::*;
 
 use super::budget::Budget;
 use super::densify::{Site, USELESS_COLOR};
-use super::gradient::{Pass, SplatGradient};
+use super::gradient::Pass;
 use super::lsq::{Quantizers, StepGradients};
 use super::optimizer::{Bounds, Parameters, Row, shape_of};
 use super::options::MAX_GAUSSIANS;
 use super::plan::Plan;
+use super::progress::{Observer, Progress};
 use super::raster::Raster;
 use super::training::{Portion, Training};
-use super::{EncodeError, Precision, Progress};
+use super::{EncodeError, Precision};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::quantizer::Quantizer;
 use crate::render::{Splat, View};
-
-/// What a caller is told, and may stop.
-pub(crate) type Observer<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
 
 /// How much the error is expected to fall by training alone, once growth has ended.
 const FORESEEN: f64 = 0.75;
 /// Passes from one binning to the next, while no Gaussians come or go.
 const REBIN_INTERVAL: u32 = 8;
-/// Gaussians whose steps are summed up in one go, in a fixed order.
+/// Gaussians that one thread prepares in one go.
 const CHUNK: usize = 512;
 
 /// A picture being fitted.
@@ -45,11 +41,10 @@ pub(crate) struct Fit<'a> {
     /// Passes for which the bins are good yet.
     binned_for: u32,
     splats: Vec<Splat>,
-    by_splat: Vec<SplatGradient>,
-    gradients: Vec<Row>,
     /// Sum of squared errors of the last pass.
     error: f64,
     pub(crate) iterations: u32,
+    pub(crate) evaluations: u64,
     pub(crate) peak_memory: usize,
     rng: fastrand::Rng,
 }
@@ -95,10 +90,9 @@ impl<'a> Fit<'a> {
             pass: Pass::new(raster),
             binned_for: 0,
             splats: Vec::new(),
-            by_splat: Vec::new(),
-            gradients: Vec::new(),
             error: 0.0,
             iterations: 0,
+            evaluations: 0,
             peak_memory: 0,
             rng: fastrand::Rng::with_seed(seed),
         }
@@ -108,16 +102,16 @@ impl<'a> Fit<'a> {
     pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let Training { iterations, densification, optimizer, .. } = self.training;
         let plan = Plan::new(self.training, self.precision);
-        self.forward();
+        self.forward(observer)?;
         let first = densification.initial * self.wanted(1.0) as f32;
-        self.grow((first.ceil() as usize).max(1));
+        self.grow((first.ceil() as usize).max(1), observer)?;
         let mut kept = usize::MAX;
         for iteration in 0..*iterations {
             if iteration == plan.quantized_from {
                 self.start_quantization();
             }
             let factor = optimizer.schedule.factor(iteration, *iterations);
-            self.iterate(factor, *iterations, observer)?;
+            self.iterate(factor, *iterations, plan.is_settled(iteration), observer)?;
             let done = iteration + 1;
             if done % densification.prune_interval == 0 {
                 self.prune();
@@ -127,7 +121,7 @@ impl<'a> Fit<'a> {
                 let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
                 self.cull(replaced);
-                self.grow(portion + replaced);
+                self.grow(portion + replaced, observer)?;
             }
             if let Some(culls_left) = plan.culls_left(done) {
                 // Growth may have ended before the budget, where there is little to correct.
@@ -135,8 +129,7 @@ impl<'a> Fit<'a> {
                 self.cull(surplus / (culls_left as usize + 1));
             }
         }
-        self.settle();
-        Ok(())
+        self.settle(observer)
     }
 
     /// Adds `count` Gaussians to a finished fit and trains all for `iterations` more.
@@ -151,15 +144,14 @@ impl<'a> Fit<'a> {
             self.quantizers = best.quantizers;
             self.binned_for = 0;
         }
-        self.forward();
-        self.grow(count);
+        self.forward(observer)?;
+        self.grow(count, observer)?;
         let total = self.iterations + iterations;
         for iteration in 0..iterations {
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
-            self.iterate(factor, total, observer)?;
+            self.iterate(factor, total, true, observer)?;
         }
-        self.settle();
-        Ok(())
+        self.settle(observer)
     }
 
     /// The best Gaussians so far.
@@ -205,39 +197,34 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// One iteration: a pass, and a step of everything that is trained.
+    /// One iteration: a pass, and a step of everything that is trained. If `settled`, the values
+    /// of the pass are kept where they are the best so far.
     fn iterate(
         &mut self,
         factor: f32,
         iterations: u32,
+        settled: bool,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        self.forward();
-        self.remember();
-        let progress = Progress {
+        self.forward(observer)?;
+        if settled {
+            self.remember();
+        }
+        observer.tell(Progress {
             iteration: self.iterations,
             iterations,
             gaussians: self.parameters.len() as u32,
             psnr: self.psnr(),
-        };
-        if observer(&progress).is_break() {
-            return Err(EncodeError::Cancelled);
-        }
+        })?;
         self.iterations += 1;
-        let by_steps = self.backward();
-        let options = &self.training.optimizer;
-        self.parameters.step(&self.gradients, options, self.bounds, factor);
-        if let (Some(quantizers), Some(by_steps)) = (&mut self.quantizers, by_steps) {
-            let rate = self.training.quantization.learning_rate * factor;
-            quantizers.step(&by_steps, self.parameters.len(), rate);
-        }
+        self.step(factor);
         let memory = self.memory();
         self.peak_memory = self.peak_memory.max(memory);
         Ok(())
     }
 
     /// Renders what the file would hold now, and takes the gradient.
-    fn forward(&mut self) {
+    fn forward(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let view = View::identity(self.raster.width as u32, self.raster.height as u32);
         let (chart, quantizers) = (self.bounds.chart, &self.quantizers);
         let components = 5 + self.raster.channels;
@@ -253,54 +240,48 @@ impl<'a> Fit<'a> {
             .collect_into_vec(&mut self.splats);
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
+            observer.poll()?;
             self.pass.bin(self.raster, &self.splats, kernel);
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
-        self.error =
-            self.pass.run(self.raster, &self.splats, kernel, self.base, &mut self.by_splat);
+        self.evaluations += self.pass.evaluations();
+        self.error = self.pass.run(self.raster, &self.splats, kernel, self.base, observer)?;
+        Ok(())
     }
 
-    /// Carries the pass's gradients on to the trained values, and to the quantizers.
-    fn backward(&mut self) -> Option<StepGradients> {
-        let (chart, quantizers) = (self.bounds.chart, self.quantizers.as_ref());
-        self.gradients.resize(self.parameters.len(), [0.0; MAX_COMPONENTS]);
-        let rows = self.parameters.values.par_chunks(CHUNK);
-        let by_splat = self.by_splat.par_chunks(CHUNK);
-        let gradients = self.gradients.par_chunks_mut(CHUNK);
-        let sums: Vec<StepGradients> = rows
-            .zip(by_splat)
-            .zip(gradients)
-            .map(|((rows, by_splat), gradients)| {
-                let mut sum = [[0.0; 2]; MAX_COMPONENTS];
-                for ((row, by_splat), gradient) in rows.iter().zip(by_splat).zip(gradients) {
-                    let decoded = decoded(quantizers, row);
-                    let (center, shape) = by_splat.moments.gradients(chart, shape_of(&decoded));
-                    gradient[..2].copy_from_slice(&center.to_array());
-                    gradient[2..5].copy_from_slice(&shape.to_array());
-                    gradient[5..].copy_from_slice(&by_splat.color);
-                    let Some(quantizers) = quantizers else { continue };
-                    let by_steps = quantizers.backward(row, &decoded, gradient);
-                    for (sum, value) in sum.iter_mut().flatten().zip(by_steps.as_flattened()) {
-                        *sum += value;
-                    }
+    /// Carries the pass's gradients on to the trained values and the quantizers, and takes a step
+    /// of both.
+    fn step(&mut self, factor: f32) {
+        let (chart, channels) = (self.bounds.chart, self.raster.channels);
+        let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
+        let options = &self.training.optimizer;
+        let by_chunk: Vec<StepGradients> =
+            self.parameters.step(options, self.bounds, factor, |index, row, sum| {
+                let decoded = decoded(quantizers, row);
+                let by_splat = pass.gradient(index, channels);
+                let (center, shape) = by_splat.moments.gradients(chart, shape_of(&decoded));
+                let mut gradient = [0.0; MAX_COMPONENTS];
+                gradient[..2].copy_from_slice(&center.to_array());
+                gradient[2..5].copy_from_slice(&shape.to_array());
+                gradient[5..].copy_from_slice(&by_splat.color);
+                if let Some(quantizers) = quantizers {
+                    add(sum, &quantizers.backward(row, &decoded, &mut gradient));
                 }
-                sum
-            })
-            .collect();
-        quantizers?;
-        // In the order of the Gaussians, whatever thread was first.
-        Some(sums.into_iter().fold([[0.0; 2]; MAX_COMPONENTS], |mut total, sum| {
-            for (total, value) in total.iter_mut().flatten().zip(sum.as_flattened()) {
-                *total += value;
-            }
-            total
-        }))
+                gradient
+            });
+        if let Some(quantizers) = &mut self.quantizers {
+            // In the order of the Gaussians, whatever thread was first.
+            let mut total = StepGradients::default();
+            by_chunk.iter().for_each(|sum| add(&mut total, sum));
+            let rate = self.training.quantization.learning_rate * factor;
+            quantizers.step(&total, self.parameters.len(), rate);
+        }
     }
 
-    fn grow(&mut self, count: usize) {
+    fn grow(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         if count == 0 {
-            return;
+            return Ok(());
         }
         // They are of no use to the new population, and room for the map of distortions.
         self.pass.unbin();
@@ -312,12 +293,15 @@ impl<'a> Fit<'a> {
             bounds: self.bounds,
             present: self.parameters.len(),
         };
+        observer.poll()?;
         let newcomers = site.newcomers(count, &mut self.rng);
+        observer.poll()?;
         for row in newcomers {
             self.parameters.push(row);
         }
         self.parameters.sort();
         self.restarted();
+        Ok(())
     }
 
     /// Forgets what was known of the values before: other Gaussians, or elsewhere.
@@ -381,12 +365,13 @@ impl<'a> Fit<'a> {
     }
 
     /// Looks at the values of the last step, which no pass has seen yet.
-    fn settle(&mut self) {
+    fn settle(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         self.binned_for = 0;
-        self.forward();
+        self.forward(observer)?;
         self.remember();
         self.binned_for = 0;
         self.pass.unbin();
+        Ok(())
     }
 
     /// Keeps the values of the last pass if they are the best so far.
@@ -414,13 +399,18 @@ impl<'a> Fit<'a> {
         self.raster.memory()
             + self.pass.memory()
             + self.parameters.memory()
-            + (self.gradients.capacity() + best) * size_of::<Row>()
+            + best * size_of::<Row>()
             + self.splats.capacity() * size_of::<Splat>()
-            + self.by_splat.capacity() * size_of::<SplatGradient>()
     }
 }
 
 /// The values that a file would hold for a trained row.
 fn decoded(quantizers: Option<&Quantizers>, row: &Row) -> Row {
     quantizers.map_or(*row, |quantizers| quantizers.decoded(&quantizers.codes(row)))
+}
+
+fn add(sum: &mut StepGradients, values: &StepGradients) {
+    for (sum, value) in sum.as_flattened_mut().iter_mut().zip(values.as_flattened()) {
+        *sum += value;
+    }
 }

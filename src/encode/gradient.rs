@@ -1,23 +1,30 @@
 //! One pass over the picture: rendering, residual and gradient, tile by tile.
 //!
 //! The L2 loss is a sum over pixels, so a tile goes forward and backward while it sits in the
-//! first cache. Every (tile, Gaussian) pair has a slot of its own for its sums, gathered
-//! afterwards in a fixed order: no atomics, the same bits for any number of threads.
+//! first cache. Every Gaussian has a slot for its sums in every row of tiles that it touches, and
+//! its slots are added up in a fixed order: no atomics, the same bits for any number of threads.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::chart::Moments;
+use super::error::EncodeError;
+use super::progress::Observer;
 use super::raster::{FULL_SCALE, Raster, SamplePlane};
 use crate::render::{
-    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, Tiling, centers, kernel_simd,
+    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, TileRow, Tiling, centers, kernel_simd,
 };
 
-/// Sums of one (tile, Gaussian) pair: five of the geometry, then one by channel.
+/// Sums of a Gaussian in a row of tiles: five of the geometry, then one by channel.
 type Slot = [f32; 8];
 
-/// How many slots a pair takes.
-const fn slots_per_pair(channels: usize) -> usize {
+/// Pairs of a tile and a Gaussian between two polls: some milliseconds.
+const WORK_PER_POLL: usize = 1 << 18;
+/// What a tile costs by itself, in such pairs.
+const WORK_PER_TILE: usize = 4;
+
+/// How many slots a span takes.
+const fn slots_per_span(channels: usize) -> usize {
     (5 + channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
 }
 
@@ -35,11 +42,12 @@ pub(crate) struct SplatGradient {
 pub(crate) struct Pass {
     level: Level,
     tiling: Tiling,
-    /// Sums by tile, then by Gaussian.
+    rows: Vec<TileRow>,
+    /// Sums by row of tiles, then by Gaussian.
     slots: Vec<Slot>,
-    /// For each splat, where its slots end in `positions`.
+    /// For each splat, where its spans end in `positions`.
     ends: Vec<u32>,
-    /// Where the slots of a splat are, splat by splat.
+    /// Where the spans of a splat are among those of all rows, splat by splat.
     positions: Vec<u32>,
     /// Rendering minus source, in the layout of the [`Raster`].
     residuals: Vec<Plane>,
@@ -54,6 +62,7 @@ impl Pass {
         Self {
             level: Level::new(),
             tiling: Tiling::default(),
+            rows: Vec::new(),
             slots: Vec::new(),
             ends: Vec::new(),
             positions: Vec::new(),
@@ -71,47 +80,78 @@ impl Pass {
         self.ends.resize(splats.len(), 0);
         self.positions.clear();
         let (ends, positions) = (&mut self.ends, &mut self.positions);
-        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, entry| {
-            positions.push(entry as u32);
+        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, span| {
+            positions.push(span as u32);
             ends[splat as usize] = positions.len() as u32;
         });
-        // A splat outside the picture has no slots: it ends where the one before ends.
+        let tiling = &self.tiling;
+        (0..tiling.rows())
+            .into_par_iter()
+            .map(|row| TileRow::new(tiling, row))
+            .collect_into_vec(&mut self.rows);
+        // A splat outside the picture has no spans: it ends where the one before ends.
         let mut last = 0;
         for end in ends {
             last = last.max(*end);
             *end = last;
         }
-        let slots = self.positions.len() * slots_per_pair(raster.channels);
+        let slots = self.positions.len() * slots_per_span(raster.channels);
         // Little more than is needed: slots are most of what a Gaussian takes.
         self.slots.reserve_exact((slots + slots / 8).saturating_sub(self.slots.len()));
         self.slots.resize(slots, Slot::default());
     }
 
+    /// Kernel evaluations of a pass with these bins.
+    pub(crate) fn evaluations(&self) -> u64 {
+        let pairs = self.rows.iter().map(TileRow::entries).sum::<usize>();
+        (pairs * TILE_WIDTH * TILE_HEIGHT) as u64
+    }
+
     /// Gives back the memory of the bins; the residuals stay.
     pub(crate) fn unbin(&mut self) {
+        self.rows = Vec::new();
         self.slots = Vec::new();
         self.ends = Vec::new();
         self.positions = Vec::new();
     }
 
-    /// Renders the `splats` that [`Pass::bin`] was told over `base`, and sets `gradients`, one per
-    /// splat. Returns the sum of squared errors over all samples.
+    /// Renders the `splats` that [`Pass::bin`] was told over `base`, for [`Pass::gradient`] to be
+    /// asked then. Returns the sum of squared errors over all samples.
+    ///
+    /// # Errors
+    /// Those of `observer`, which is polled every few milliseconds.
     pub(crate) fn run(
         &mut self,
         raster: &Raster,
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
-        gradients: &mut Vec<SplatGradient>,
-    ) -> f64 {
+        observer: &mut Observer<'_>,
+    ) -> Result<f64, EncodeError> {
         match raster.channels {
-            1 => self.run_of::<1>(raster, splats, kernel, base),
-            2 => self.run_of::<2>(raster, splats, kernel, base),
-            3 => self.run_of::<3>(raster, splats, kernel, base),
-            _ => self.run_of::<4>(raster, splats, kernel, base),
+            1 => self.run_of::<1>(raster, splats, kernel, base, observer),
+            2 => self.run_of::<2>(raster, splats, kernel, base, observer),
+            3 => self.run_of::<3>(raster, splats, kernel, base, observer),
+            _ => self.run_of::<4>(raster, splats, kernel, base, observer),
+        }?;
+        Ok(self.row_errors.iter().sum())
+    }
+
+    /// The gradient by a splat of the last pass, its slots added up in the order of its rows.
+    pub(crate) fn gradient(&self, splat: usize, channels: usize) -> SplatGradient {
+        let per_span = slots_per_span(channels);
+        let mut sum = [Slot::default(); 2];
+        for &span in self.spans_of(splat) {
+            let slots = &self.slots[span as usize * per_span..][..per_span];
+            for (sum, slot) in sum.iter_mut().zip(slots) {
+                *sum = core::array::from_fn(|lane| sum[lane] + slot[lane]);
+            }
         }
-        self.gather(raster.channels, gradients);
-        self.row_errors.iter().sum()
+        let sum = sum.as_flattened();
+        SplatGradient {
+            moments: Moments { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
+            color: [sum[5], sum[6], sum[7], sum[8]],
+        }
     }
 
     /// Rendering minus source at a pixel, by channel; as large as it is visible, for output is
@@ -119,27 +159,33 @@ impl Pass {
     pub(crate) fn residual(&self, x: usize, y: usize, channels: usize) -> [f32; 4] {
         let tile = y / TILE_HEIGHT * self.tiling.columns() + x / TILE_WIDTH;
         let mut residual = [0.0; 4];
-        for (channel, value) in residual[..channels].iter_mut().enumerate() {
-            *value = self.residuals[tile * channels + channel][y % TILE_HEIGHT][x % TILE_WIDTH];
+        for (value, plane) in residual.iter_mut().zip(self.residuals(tile, channels)) {
+            *value = plane[y % TILE_HEIGHT][x % TILE_WIDTH];
         }
         residual
     }
 
+    /// Rendering minus source in a tile, by channel; 0 outside the picture.
+    pub(crate) fn residuals(&self, tile: usize, channels: usize) -> &[Plane] {
+        &self.residuals[tile * channels..][..channels]
+    }
+
     /// Whether a splat of the last pass touched the picture.
     pub(crate) fn touches(&self, splat: usize) -> bool {
-        !self.slots_of(splat).is_empty()
+        !self.spans_of(splat).is_empty()
     }
 
     /// Bytes held.
     pub(crate) fn memory(&self) -> usize {
         self.tiling.memory()
+            + self.rows.iter().map(TileRow::memory).sum::<usize>()
             + self.slots.capacity() * size_of::<Slot>()
             + (self.ends.capacity() + self.positions.capacity()) * size_of::<u32>()
             + size_of_val(&self.residuals[..])
     }
 
-    /// Where the slots of a splat are, in the order of its tiles.
-    fn slots_of(&self, splat: usize) -> &[u32] {
+    /// Where the spans of a splat are, in the order of its rows.
+    fn spans_of(&self, splat: usize) -> &[u32] {
         let start = splat.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.positions[start as usize..self.ends[splat] as usize]
     }
@@ -150,30 +196,40 @@ impl Pass {
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
-    ) {
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         let tiling = &self.tiling;
-        let per_pair = slots_per_pair(CHANNELS);
+        let per_span = slots_per_span(CHANNELS);
         let mut slots = &mut self.slots[..];
-        let rows: Vec<_> = (0..tiling.rows())
-            .map(|row| {
-                let length = tiling.row_entries(row) * per_pair;
+        let residuals = self.residuals.chunks_exact_mut(tiling.columns() * CHANNELS);
+        let rows = self.rows.iter().zip(residuals).zip(&mut self.row_errors);
+        let mut jobs: Vec<_> = (rows.enumerate())
+            .map(|(row, ((tiles, residuals), error))| {
+                let length = tiling.spans(row).len() * per_span;
                 let (taken, rest) = core::mem::take(&mut slots).split_at_mut(length);
                 slots = rest;
-                (row, taken)
+                (row, tiles, taken, residuals, error)
             })
             .collect();
-        let residuals = self.residuals.par_chunks_exact_mut(tiling.columns() * CHANNELS);
         let level = self.level;
-        rows.into_par_iter().zip(residuals).zip(&mut self.row_errors).for_each(
-            |(((row, mut slots), residuals), row_error)| {
+        while !jobs.is_empty() {
+            observer.poll()?;
+            let mut work = 0;
+            let count = jobs.iter().take_while(|(_, tiles, ..)| {
+                let more = work < WORK_PER_POLL;
+                work += tiles.entries() + WORK_PER_TILE * tiling.columns();
+                more
+            });
+            let count = count.count();
+            // Row by row, for the last ones to be shared fairly.
+            let band = jobs.par_drain(..count).with_max_len(1);
+            band.for_each(|(row, tiles, slots, residuals, error)| {
+                let splats = &tiling.splats(row, splats);
                 let mut states = Vec::new();
-                *row_error = 0.0;
+                slots.fill(Slot::default());
+                *error = 0.0;
                 for (column, residual) in residuals.chunks_exact_mut(CHANNELS).enumerate() {
-                    let residual: &mut [Plane; CHANNELS] =
-                        residual.try_into().expect("a tile has all channels");
-                    let list = tiling.splats(column, row);
-                    let (taken, rest) = slots.split_at_mut(list.len() * per_pair);
-                    slots = rest;
+                    let list = tiles.spans(column);
                     let tile = Tile::<CHANNELS> {
                         x: (column * TILE_WIDTH) as u32,
                         y: (row * TILE_HEIGHT) as u32,
@@ -185,33 +241,12 @@ impl Pass {
                         list,
                     };
                     states.resize(list.len(), [[0.0; TILE_WIDTH]; TILE_HEIGHT]);
-                    *row_error += tile.run(level, kernel, &mut states, taken, residual);
+                    let residual = residual.try_into().expect("a tile has all channels");
+                    *error += tile.run(level, kernel, &mut states, slots, residual);
                 }
-            },
-        );
-    }
-
-    /// Adds up the slots of every splat, in the order of its tiles.
-    fn gather(&self, channels: usize, gradients: &mut Vec<SplatGradient>) {
-        let per_pair = slots_per_pair(channels);
-        (0..self.ends.len())
-            .into_par_iter()
-            .with_min_len(256)
-            .map(|splat| {
-                let mut sum = [Slot::default(); 2];
-                for &position in self.slots_of(splat) {
-                    let slots = &self.slots[position as usize * per_pair..][..per_pair];
-                    for (sum, slot) in sum.iter_mut().zip(slots) {
-                        *sum = core::array::from_fn(|lane| sum[lane] + slot[lane]);
-                    }
-                }
-                let sum = sum.as_flattened();
-                SplatGradient {
-                    moments: Moments { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
-                    color: [sum[5], sum[6], sum[7], sum[8]],
-                }
-            })
-            .collect_into_vec(gradients);
+            });
+        }
+        Ok(())
     }
 }
 
@@ -260,7 +295,9 @@ struct Tile<'a, const CHANNELS: usize> {
     rows: usize,
     target: &'a [SamplePlane; CHANNELS],
     base: [f32; 4],
+    /// The splats of the row of tiles.
     splats: &'a [Splat],
+    /// Those of the tile, by their places in `splats`, and in `slots` below.
     list: &'a [u32],
 }
 
@@ -317,9 +354,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             }
         }
         let squared = self.residual(simd, planes);
-        for ((&index, state), slot) in
-            self.list.iter().zip(states).zip(slots.chunks_exact_mut(slots_per_pair(CHANNELS)))
-        {
+        for (&index, state) in self.list.iter().zip(states) {
             let splat = &self.splats[index as usize];
             let zero = f32x16::splat(simd, 0.0);
             let (mut s0, mut s1, mut s2) = (zero, zero, zero);
@@ -345,8 +380,11 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             let mut all = [[zero; 8]; 2];
             all[0][..5].copy_from_slice(&[x0, s1, dx * x0, dx * s1, s2]);
             all.as_flattened_mut()[5..5 + CHANNELS].copy_from_slice(&by_color);
+            let per_span = slots_per_span(CHANNELS);
+            let slot = &mut slots[index as usize * per_span..][..per_span];
             for (slot, vectors) in slot.iter_mut().zip(all) {
-                *slot = sums(vectors);
+                let sums = sums(vectors);
+                *slot = core::array::from_fn(|lane| slot[lane] + sums[lane]);
             }
         }
         squared
@@ -398,6 +436,8 @@ fn folded<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
 
 #[cfg(test)]
 mod tests {
+    use core::ops::ControlFlow;
+
     use glam::Vec3;
 
     use super::super::source::Source;
@@ -411,6 +451,20 @@ mod tests {
     const HEIGHT: u32 = 21;
     const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
     const CHARTS: [Chart; 3] = [Chart::Covariance, Chart::Cholesky, Chart::RotationScale];
+
+    /// A pass that nobody watches.
+    fn run(
+        pass: &mut Pass,
+        raster: &Raster,
+        splats: &[Splat],
+        kernel: Kernel,
+        base: [f32; 4],
+    ) -> f64 {
+        let mut silent = |_: &_| ControlFlow::Continue(());
+        let mut observer = Observer::new(&mut silent, 0);
+        pass.bin(raster, splats, kernel);
+        pass.run(raster, splats, kernel, base, &mut observer).expect("not cancelled")
+    }
 
     /// Half the sum of squared residuals, straight from the formulas, in f64.
     fn loss(
@@ -455,7 +509,8 @@ mod tests {
                 }
                 for (channel, sum) in sums[..channels].iter().enumerate() {
                     let index = (y * WIDTH + x) as usize * channels + channel;
-                    loss += 0.5 * (sum - f64::from(source.sample(index))).powi(2);
+                    let sample = f64::from(source.wide_sample(index)) / 65535.0;
+                    loss += 0.5 * (sum - sample).powi(2);
                 }
             }
         }
@@ -503,11 +558,10 @@ mod tests {
                 Splat::new(&gaussian, &view).expect("the scene is sound")
             })
             .collect();
-        let mut by_splat = Vec::new();
         let mut pass = Pass::new(raster);
-        pass.bin(raster, &splats, kernel);
-        pass.run(raster, &splats, kernel, BASE, &mut by_splat);
-        let by_row = by_splat.iter().zip(rows).map(|(gradient, row)| {
+        run(&mut pass, raster, &splats, kernel, BASE);
+        let by_row = rows.iter().enumerate().map(|(index, row)| {
+            let gradient = pass.gradient(index, raster.channels);
             let (center, shape) = gradient.moments.gradients(chart, Vec3::from_slice(&row[2..5]));
             let mut out = [0.0; MAX_COMPONENTS];
             out[..2].copy_from_slice(&center.to_array());
@@ -583,10 +637,9 @@ mod tests {
             .collect();
         let run = |level| {
             let mut pass = Pass { level, ..Pass::new(&raster) };
-            let mut gradients = Vec::new();
-            pass.bin(&raster, &splats, Kernel::Quartic);
-            let error = pass.run(&raster, &splats, Kernel::Quartic, BASE, &mut gradients);
-            (error, gradients)
+            let error = run(&mut pass, &raster, &splats, Kernel::Quartic, BASE);
+            let gradients = (0..splats.len()).map(|splat| pass.gradient(splat, 3));
+            (error, gradients.collect())
         };
         let bits = |(error, gradients): (f64, Vec<SplatGradient>)| -> Vec<u64> {
             let gradients = gradients.iter().flat_map(|gradient| {
@@ -616,11 +669,9 @@ mod tests {
         let gaussian =
             Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
         let splat = Splat::new(&gaussian, &View::identity(5, 3)).expect("it is sound");
-        let mut gradients = Vec::new();
         let mut pass = Pass::new(&raster);
-        pass.bin(&raster, &[splat], Kernel::Quartic);
-        let error = pass.run(&raster, &[splat], Kernel::Quartic, [0.9; 4], &mut gradients);
+        let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
         assert_eq!(error, 0.0);
-        assert_eq!(gradients[0], SplatGradient::default());
+        assert_eq!(pass.gradient(0, 3), SplatGradient::default());
     }
 }

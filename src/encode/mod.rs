@@ -12,6 +12,7 @@ mod lsq;
 mod optimizer;
 mod options;
 mod plan;
+mod progress;
 mod raster;
 mod source;
 pub(crate) mod training;
@@ -22,6 +23,8 @@ use std::time::Instant;
 
 pub use error::EncodeError;
 pub use options::{Precision, Target};
+use progress::Observer;
+pub use progress::Progress;
 pub use source::Source;
 use training::Training;
 
@@ -129,7 +132,8 @@ impl Encoder {
         self.encode_with(source, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// Encodes `source` and calls `progress` at every iteration.
+    /// Encodes `source` and calls `progress` at every iteration, and every few milliseconds of what
+    /// takes longer.
     ///
     /// # Errors
     /// As [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` breaks.
@@ -140,7 +144,8 @@ impl Encoder {
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
         let training = self.check()?;
-        let mut run = || control::encode(self, source, &training, progress);
+        let mut observer = Observer::new(progress, training.iterations);
+        let mut run = || control::encode(self, source, &training, &mut observer);
         let outcome = match self.threads {
             None => run(),
             Some(threads) => pool(threads)?.install(run),
@@ -152,6 +157,7 @@ impl Encoder {
                 psnr: outcome.psnr,
                 psnr_float: outcome.psnr_float,
                 iterations: outcome.iterations,
+                evaluations: outcome.evaluations,
                 seconds: start.elapsed().as_secs_f64(),
                 peak_memory: outcome.peak_memory,
                 shortfall: outcome.shortfall,
@@ -181,20 +187,6 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool, EncodeError> {
     pool.map_err(|error| EncodeError::Option(format!("{threads} threads: {error}")))
 }
 
-/// How far the encoder is.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Progress {
-    /// Iterations done.
-    pub iteration: u32,
-    /// Iterations in all, as far as known.
-    pub iterations: u32,
-    /// Gaussians at this moment.
-    pub gaussians: u32,
-    /// PSNR of the float rendering at this moment, in dB.
-    pub psnr: f64,
-}
-
 /// A file and how it came about.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
@@ -220,6 +212,8 @@ pub struct Report {
     pub psnr_float: f64,
     /// Iterations of training.
     pub iterations: u32,
+    /// Kernel evaluations of training: pairs of a Gaussian and a pixel, each with its gradient.
+    pub evaluations: u64,
     /// Wall-clock time in seconds.
     pub seconds: f64,
     /// Most bytes that the encoder held at a time, the source and the file not counted.

@@ -14,6 +14,9 @@ pub(crate) type Row = [f32; MAX_COMPONENTS];
 /// rounding.
 const MAX_COLOR: f32 = 8.0;
 
+/// Gaussians that are stepped, and whose sums are taken, in one go.
+const CHUNK: usize = 256;
+
 /// Adam's state of one Gaussian.
 #[derive(Clone, Copy, Debug)]
 struct Moments {
@@ -114,31 +117,36 @@ impl Parameters {
             .zip(&self.values)
             .map(|(index, row)| (spread(row[0] / 4.0) | spread(row[1] / 4.0) << 1, index))
             .collect();
-        order.sort_unstable();
+        order.par_sort_unstable();
         self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
         self.moments = order.iter().map(|&(_, index)| self.moments[index as usize]).collect();
     }
 
-    /// Takes one step against `gradients`, given by the values themselves; `factor` scales all
-    /// learning rates.
-    pub(crate) fn step(
+    /// Takes one step against the gradients that `gradient` tells by index and values; `factor`
+    /// scales all learning rates. What `gradient` sums up beside them comes back by runs of
+    /// [`CHUNK`] Gaussians.
+    pub(crate) fn step<Sum: Default + Send>(
         &mut self,
-        gradients: &[Row],
         options: &training::Optimizer,
         bounds: Bounds,
         factor: f32,
-    ) {
-        self.values
-            .par_iter_mut()
-            .zip(&mut self.moments)
-            .zip(gradients)
-            .with_min_len(128)
-            .for_each(|((row, moments), gradient)| {
+        gradient: impl Fn(usize, &Row, &mut Sum) -> Row + Sync,
+    ) -> Vec<Sum> {
+        let values = self.values.par_chunks_mut(CHUNK);
+        let chunks = values.zip(self.moments.par_chunks_mut(CHUNK)).enumerate();
+        let sums = chunks.map(|(chunk, (values, moments))| {
+            let mut sum = Sum::default();
+            let rows = values.iter_mut().zip(moments);
+            for (index, (row, moments)) in (chunk * CHUNK..).zip(rows) {
+                let gradient = gradient(index, row, &mut sum);
                 // A Gaussian that floats cannot describe any more stands still until pruned.
                 if gradient.iter().all(|value| value.is_finite()) {
-                    step(row, moments, gradient, options, bounds, factor);
+                    step(row, moments, &gradient, options, bounds, factor);
                 }
-            });
+            }
+            sum
+        });
+        sums.collect()
     }
 
     /// Bytes held.

@@ -35,6 +35,11 @@ impl Plan {
         }
     }
 
+    /// Whether an iteration's Gaussians may be those of the file: none are to come or go any more.
+    pub(crate) fn is_settled(&self, iteration: u32) -> bool {
+        iteration >= self.cull_end
+    }
+
     /// If Gaussians are added after `done` iterations: how many times again later.
     pub(crate) fn growths_left(&self, done: u32) -> Option<u32> {
         let due = done.is_multiple_of(self.growth_interval) && done <= self.growth_end;

@@ -1,5 +1,7 @@
 //! The source picture as planes, tile by tile, in the layout of the training pass.
 
+use rayon::prelude::*;
+
 use super::source::Source;
 use crate::render::{TILE_HEIGHT, TILE_WIDTH};
 
@@ -28,15 +30,17 @@ impl Raster {
         let columns = width.div_ceil(TILE_WIDTH);
         let tiles = columns * height.div_ceil(TILE_HEIGHT);
         let mut planes = vec![[[0; TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
-        for y in 0..height {
-            for x in 0..width {
-                let tile = y / TILE_HEIGHT * columns + x / TILE_WIDTH;
-                for channel in 0..channels {
-                    planes[tile * channels + channel][y % TILE_HEIGHT][x % TILE_WIDTH] =
-                        source.wide_sample((y * width + x) * channels + channel);
+        planes.par_chunks_exact_mut(columns * channels).enumerate().for_each(|(row, planes)| {
+            let first = row * TILE_HEIGHT;
+            for y in first..height.min(first + TILE_HEIGHT) {
+                for x in 0..width {
+                    for channel in 0..channels {
+                        planes[x / TILE_WIDTH * channels + channel][y - first][x % TILE_WIDTH] =
+                            source.wide_sample((y * width + x) * channels + channel);
+                    }
                 }
             }
-        }
+        });
         let half_step = 0.5 / f32::from(source.depth().max_sample());
         Self { width, height, channels, half_step, planes }
     }

@@ -81,19 +81,6 @@ impl<'a> Source<'a> {
         self.samples
     }
 
-    /// The number of samples.
-    pub(crate) fn len(&self) -> usize {
-        match self.samples {
-            Samples::Eight(samples) => samples.len(),
-            Samples::Sixteen(samples) => samples.len(),
-        }
-    }
-
-    /// The sample at an index of the interleaved order, 1.0 being a full one.
-    pub(crate) fn sample(&self, index: usize) -> f32 {
-        f32::from(self.wide_sample(index)) / 65535.0
-    }
-
     /// The sample at an index of the interleaved order, with 16 bits.
     pub(crate) fn wide_sample(&self, index: usize) -> u16 {
         match self.samples {

@@ -1,19 +1,32 @@
 //! What the file really shows: the encoder's figures come from its own decoder.
 
+use rayon::prelude::*;
+
+use super::EncodeError;
+use super::progress::Observer;
 use super::source::{Samples, Source};
 use crate::decoder::StreamDecoder;
 use crate::limits::Limits;
-use crate::metrics;
-use crate::render::{Picture, Region, RenderOptions};
+use crate::render::{Region, RenderOptions, Sample};
 
-/// Rows that are compared at a time.
-const STRIP: u32 = 64;
+/// Pixels that are rendered and compared at a time, about: floats of a large picture are many, and
+/// the observer does not wait.
+const STRIP_PIXELS: u32 = 1 << 20;
 
 /// A file, decoded again.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
     stream: StreamDecoder,
     source: &'a Source<'a>,
+}
+
+/// How far the decoded picture is from the source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Distortion {
+    /// Of samples of the source's depth, in dB.
+    pub(crate) psnr: f64,
+    /// Before rounding to samples, but clamped; in dB.
+    pub(crate) psnr_float: f64,
 }
 
 impl<'a> Verified<'a> {
@@ -29,49 +42,63 @@ impl<'a> Verified<'a> {
         self.stream.gaussians().len() as u32
     }
 
-    /// PSNR of the first `count` Gaussians at the source's depth, in dB.
-    pub(crate) fn psnr(&self, count: u32) -> f64 {
-        let options = RenderOptions::new().prefix(count);
-        let full_scale = f64::from(self.source.depth().max_sample());
+    /// The distortion of the picture of the first `count` Gaussians.
+    pub(crate) fn distortion(
+        &self,
+        count: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Distortion, EncodeError> {
         match self.source.samples() {
-            Samples::Eight(samples) => {
-                let mut out = vec![0; samples.len()];
-                self.picture().render_u8(&options, &mut out).expect("there are no limits");
-                metrics::psnr(&out, samples, full_scale)
-            }
-            Samples::Sixteen(samples) => {
-                let mut out = vec![0; samples.len()];
-                self.picture().render_u16(&options, &mut out).expect("there are no limits");
-                metrics::psnr(&out, samples, full_scale)
-            }
+            Samples::Eight(samples) => self.distortion_from(samples, count, observer),
+            Samples::Sixteen(samples) => self.distortion_from(samples, count, observer),
         }
     }
 
-    /// PSNR of the rendering before it is rounded to samples, in dB.
-    pub(crate) fn float_psnr(&self) -> f64 {
+    fn distortion_from<T: Sample + Into<f64> + Sync>(
+        &self,
+        samples: &[T],
+        count: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Distortion, EncodeError> {
         let (width, height) = (self.source.width(), self.source.height());
         let channels = self.source.color().channels();
+        let stride = width as usize * channels;
+        let full_scale: f64 = T::OPAQUE.into();
+        let rows = (STRIP_PIXELS / width).max(1);
         let mut planes = Vec::new();
-        let mut squares = 0.0;
-        // In strips, for floats are large.
-        for y in (0..height).step_by(STRIP as usize) {
-            let region = Region { x: 0, y, width, height: STRIP.min(height - y) };
-            let options = RenderOptions::new().region(region);
+        let (mut rounded, mut exact) = (0.0, 0.0);
+        for y in (0..height).step_by(rows as usize) {
+            observer.poll()?;
+            let region = Region { x: 0, y, width, height: rows.min(height - y) };
+            let options = RenderOptions::new().region(region).prefix(count);
             let pixels = region.pixels() as usize;
             planes.resize(pixels * channels, 0.0);
-            self.picture().render_planes(&options, &mut planes).expect("there are no limits");
-            let first = y as usize * width as usize;
-            for (channel, plane) in planes.chunks_exact(pixels).enumerate() {
-                for (value, pixel) in plane.iter().zip(first..) {
-                    let source = self.source.sample(pixel * channels + channel);
-                    squares += f64::from(value.clamp(0.0, 1.0) - source).powi(2);
+            let picture = self.stream.picture().expect("the header was read");
+            picture.render_planes(&options, &mut planes).expect("there are no limits");
+            observer.poll()?;
+            let source = &samples[y as usize * stride..][..pixels * channels];
+            let errors = source.par_chunks_exact(stride).enumerate().map(|(row, source)| {
+                let mut errors = [0.0; 2];
+                for (index, &source) in source.iter().enumerate() {
+                    let (x, channel) = (index / channels, index % channels);
+                    let value = planes[channel * pixels + row * width as usize + x];
+                    let (source, sample): (f64, f64) = (source.into(), T::from_unit(value).into());
+                    errors[0] += (sample - source).powi(2);
+                    let value = f64::from(value.clamp(0.0, 1.0));
+                    errors[1] += (value * full_scale - source).powi(2);
                 }
+                errors
+            });
+            // In the order of the rows, whatever thread was first.
+            for [by_samples, by_values] in errors.collect::<Vec<_>>() {
+                rounded += by_samples;
+                exact += by_values;
             }
         }
-        10.0 * (self.source.len() as f64 / squares).log10()
-    }
-
-    fn picture(&self) -> Picture<'_> {
-        self.stream.picture().expect("the header was read")
+        let most = full_scale * full_scale * samples.len() as f64;
+        Ok(Distortion {
+            psnr: 10.0 * (most / rounded).log10(),
+            psnr_float: 10.0 * (most / exact).log10(),
+        })
     }
 }

@@ -15,11 +15,12 @@ pub use view::{Region, RenderOptions};
 
 #[cfg(feature = "encode")]
 pub(crate) use kernel::simd as kernel_simd;
+pub(crate) use output::Sample;
 pub(crate) use splat::Splat;
 #[cfg(feature = "encode")]
 pub(crate) use tile::centers;
 pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
-pub(crate) use tiling::Tiling;
+pub(crate) use tiling::{TileRow, Tiling};
 #[cfg(feature = "encode")]
 pub(crate) use view::View;
 
@@ -27,7 +28,6 @@ use crate::container::Header;
 use crate::error::{DecodeError, LimitKind};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
-use output::Sample;
 
 /// Most bytes that a row of tiles takes for slices of the output.
 const STRIP: u64 = 128;
@@ -163,7 +163,8 @@ impl<'a> Picture<'a> {
         splats.extend(gaussians.iter().filter_map(|g| Splat::new(g, &view)));
         let kernel = self.header.kernel;
         let (region, cutoff) = (view.region, kernel.cutoff());
-        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held)?;
+        let threads = threads(options.parallel);
+        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held, threads)?;
         Ok(Job {
             splats,
             tiling,
@@ -203,16 +204,27 @@ impl Job {
 
     fn row_of<const CHANNELS: usize>(&self, row: usize, mut write: impl FnMut(&[Plane], usize)) {
         let y = self.region.y + (row * TILE_HEIGHT) as u32;
+        let tiles = TileRow::new(&self.tiling, row);
+        let splats = self.tiling.splats(row, &self.splats);
         for column in 0..self.tiling.columns() {
             let x = column * TILE_WIDTH;
             let origin = (self.region.x + x as u32, y);
             let mut planes: [Plane; CHANNELS] =
                 core::array::from_fn(|channel| [[self.base[channel]; TILE_WIDTH]; TILE_HEIGHT]);
-            let list = self.tiling.splats(column, row);
-            self.backend.add(&mut planes, origin, &self.splats, list, self.kernel);
+            self.backend.add(&mut planes, origin, &splats, tiles.spans(column), self.kernel);
             write(&planes, x);
         }
     }
+}
+
+/// How many threads [`for_each`] uses.
+fn threads(parallel: bool) -> usize {
+    #[cfg(feature = "rayon")]
+    if parallel {
+        return rayon::current_num_threads();
+    }
+    let _ = parallel;
+    1
 }
 
 /// Runs `work` on every item, on the threads of the current pool if there are any.

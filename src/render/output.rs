@@ -4,7 +4,7 @@ use super::tile::{Plane, TILE_HEIGHT, TILE_WIDTH};
 use crate::color::ColorModel;
 
 /// An integer sample type.
-pub(super) trait Sample: Copy + Send {
+pub(crate) trait Sample: Copy + Send {
     /// A full sample.
     const OPAQUE: Self;
     /// Rounds to the nearest sample: clamp to [0, 1], scale, add one half, drop the fraction.

@@ -25,6 +25,10 @@ struct Cost {
     megapixels: f64,
     gaussians: f64,
     psnr: f64,
+    /// Kernel evaluations of training, per pixel and iteration.
+    evaluations: f64,
+    /// What each took on average, in nanoseconds of wall-clock time.
+    nanoseconds: f64,
     encode: f64,
     encode_memory: f64,
     decode: [f64; 2],
@@ -53,6 +57,8 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
         ["image", "megapixels", "gaussians", "effort"],
         [
             "psnr",
+            "iterations",
+            "evaluations",
             "encode_seconds",
             "encode_peak_memory",
             "decode_seconds_one",
@@ -73,6 +79,8 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
             let file = &coded.file;
             Ok([
                 coded.distortion.psnr,
+                coded.report.iterations.into(),
+                coded.report.evaluations as f64,
                 coded.report.seconds,
                 coded.memory,
                 gip::decode_seconds(file, false)?,
@@ -80,9 +88,19 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
                 gip::decode_memory(file)?,
             ])
         })?;
-        let [psnr, encode, encode_memory, one, all, decode_memory] = values;
-        let (gaussians, decode) = (f64::from(gaussians), [one, all]);
-        Ok(Cost { megapixels, gaussians, psnr, encode, encode_memory, decode, decode_memory })
+        let [psnr, iterations, evaluations, encode, encode_memory, one, all, decode_memory] =
+            values;
+        Ok(Cost {
+            megapixels,
+            gaussians: f64::from(gaussians),
+            psnr,
+            evaluations: evaluations / iterations / (1e6 * megapixels),
+            nanoseconds: 1e9 * encode / evaluations,
+            encode,
+            encode_memory,
+            decode: [one, all],
+            decode_memory,
+        })
     };
     let by_size = megapixels
         .iter()
@@ -93,7 +111,8 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
     let mut text = format!(
         "\n### Growth\n\nCompared with itself: our codec alone, at effort {GROWTH_EFFORT}, on {}, \
          cut or continued in mirror images. Other efforts multiply the encoding time by their \
-         iterations. Memory is what the program's allocator gave out at a time, at most: to the \
+         iterations. Evaluations are those of the kernel in training, each with its gradient, per \
+         pixel and iteration; what each takes is the whole encoding time shared among them. Memory is what the program's allocator gave out at a time, at most: to the \
          encoder beside the source, to the decoder (with all threads) beside the file, its samples \
          included.\n",
         picture.name
@@ -129,6 +148,8 @@ fn growth_table(costs: &[Cost]) -> String {
         "megapixels",
         "Gaussians",
         "PSNR in dB",
+        "evaluations",
+        "ns each",
         "encode s",
         "memory MiB",
         "decode ms, one thread",
@@ -140,6 +161,8 @@ fn growth_table(costs: &[Cost]) -> String {
             cost.megapixels.to_string(),
             cost.gaussians.to_string(),
             format!("{:.2}", cost.psnr),
+            format!("{:.1}", cost.evaluations),
+            format!("{:.2}", cost.nanoseconds),
             format!("{:.2}", cost.encode),
             format!("{:.1}", cost.encode_memory / MEBIBYTE),
             format!("{:.1}", 1000.0 * cost.decode[0]),
@@ -199,6 +222,8 @@ mod tests {
             megapixels,
             gaussians: 1.0,
             psnr: 30.0,
+            evaluations: 20.0,
+            nanoseconds: 0.5,
             encode,
             encode_memory: megapixels * MEBIBYTE,
             decode: [megapixels, 0.5 * megapixels],

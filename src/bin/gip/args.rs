@@ -72,9 +72,9 @@ pub(crate) struct Encode {
     /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.
     ///
     /// Fields: width, height, gaussians, bytes, bpp (bits per pixel of the whole file), psnr (dB,
-    /// of the decoded file), psnr_float (dB, before quantization), iterations, seconds,
-    /// peak_memory (bytes), shortfall (null, or why the target was not met). A PSNR that is
-    /// infinite (an exact copy) is given as 999.
+    /// of the decoded file), psnr_float (dB, before rounding to samples), iterations, evaluations
+    /// (of the kernel, in training), seconds, peak_memory (bytes), shortfall (null, or why the
+    /// target was not met). A PSNR that is infinite (an exact copy) is given as 999.
     #[arg(long)]
     pub(crate) json: bool,
 }
