@@ -4,9 +4,11 @@
 use alloc::vec::Vec;
 
 use crate::coding::fixed::LayerReader;
-use crate::container::{ChunkType, Event, Header, Metadata, Parser};
+use crate::coding::set::{Models, SetCoding};
+use crate::container::{ChunkType, Coding, Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
+use crate::lattice::{Grid, Lattice};
 use crate::limits::Limits;
 use crate::quantizer::Quantizer;
 use crate::render::Picture;
@@ -45,7 +47,10 @@ pub struct StreamDecoder {
     limits: Limits,
     stage: Stage,
     header: Option<Header>,
+    /// Of coding 0.
     quantizers: Vec<Quantizer>,
+    /// Of coding 1.
+    lattice: Option<(Lattice, Models)>,
     metadata: Metadata,
     gaussians: Vec<Gaussian>,
     layers: u16,
@@ -108,6 +113,7 @@ impl StreamDecoder {
             stage: Stage::Idle,
             header: None,
             quantizers: Vec::new(),
+            lattice: None,
             metadata: Metadata::default(),
             gaussians: Vec::new(),
             layers: 0,
@@ -170,7 +176,7 @@ impl StreamDecoder {
     }
 
     /// How each component is stored: two of position, three of shape, one per channel. Empty
-    /// until that has arrived.
+    /// until that has arrived, and where Gaussians are stored as sets ([`Coding::Set`]).
     #[must_use]
     pub fn quantizers(&self) -> &[Quantizer] {
         &self.quantizers
@@ -238,28 +244,37 @@ impl StreamDecoder {
         }
         match chunk {
             ChunkType::GHDR if self.header.is_some() => misplaced("appears twice"),
-            ChunkType::QNTZ if !self.quantizers.is_empty() => misplaced("appears twice"),
+            ChunkType::QNTZ if self.is_quantized() => misplaced("appears twice"),
             ChunkType::GHDR | ChunkType::QNTZ if length > MAX_SMALL_CHUNK => {
                 misplaced("is too long")
             }
-            ChunkType::GAUS if self.quantizers.is_empty() => misplaced("stands before QNTZ"),
+            ChunkType::GAUS if !self.is_quantized() => misplaced("stands before QNTZ"),
             ChunkType::GAUS if Some(self.layers) == self.header.as_ref().map(|h| h.layers) => {
                 misplaced("more layers than the header declares")
             }
+            ChunkType::GAUS if self.lattice.is_some() => self.collected(length),
             ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
             // A later version may add to these; version 0 reads them before any layer only.
-            _ if Metadata::knows(chunk) && self.layers == 0 => {
-                let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
-                let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
-                self.limits.check_memory(self.metadata.size() + declared)?;
-                Ok(collect(length))
-            }
+            _ if Metadata::knows(chunk) && self.layers == 0 => self.collected(length),
             ChunkType::GHDR | ChunkType::QNTZ => Ok(collect(length)),
             ChunkType::GEND => Ok(Stage::Skip),
             _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
             _ => Ok(Stage::Skip),
         }
+    }
+
+    /// Whether `QNTZ` was read.
+    fn is_quantized(&self) -> bool {
+        self.lattice.is_some() || !self.quantizers.is_empty()
+    }
+
+    /// The stage that collects a chunk of any length.
+    fn collected(&self, length: u32) -> Result<Stage, DecodeError> {
+        let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
+        let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
+        self.limits.check_memory(self.metadata.size() + declared)?;
+        Ok(collect(length))
     }
 
     fn payload(&mut self, mut payload: &[u8]) -> Result<(), DecodeError> {
@@ -294,8 +309,21 @@ impl StreamDecoder {
                 self.header = Some(header);
             }
             (ChunkType::QNTZ, Stage::Collect { payload, .. }) => {
-                let components = self.header.as_ref().map_or(0, Header::components);
-                self.quantizers = Quantizer::parse_all(payload, components)?;
+                let Some(header) = &self.header else { return Ok(()) };
+                match header.coding {
+                    Coding::Fixed => {
+                        self.quantizers = Quantizer::parse_all(payload, header.components())?;
+                    }
+                    Coding::Set => {
+                        let lattice = Lattice::parse(payload, header.color.channels())?;
+                        self.lattice = Some((lattice, Models::default()));
+                    }
+                }
+            }
+            (ChunkType::GAUS, Stage::Collect { payload, .. }) => {
+                let payload = core::mem::take(payload);
+                self.read_set(&payload)?;
+                self.layers += 1;
             }
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
@@ -318,6 +346,26 @@ impl StreamDecoder {
         }
         self.stage = Stage::Idle;
         Ok(())
+    }
+
+    /// Reads a layer of coding 1.
+    fn read_set(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
+        let (Some(header), Some((lattice, models))) = (&self.header, &mut self.lattice) else {
+            return Ok(());
+        };
+        let grid = Grid::new(header.width, header.height);
+        let coding = SetCoding { lattice, grid, channels: header.color.channels() };
+        let before = self.gaussians.len();
+        let allowed = header.gaussians - before as u32;
+        let gaussians = &mut self.gaussians;
+        let outcome = coding.read(payload, allowed, models, |code| {
+            grow(gaussians, 1, header.gaussians as usize);
+            gaussians.push(lattice.gaussian(&code, &grid, header.color));
+        });
+        if outcome.is_err() {
+            self.gaussians.truncate(before);
+        }
+        outcome
     }
 
     /// Checks what a header declares against the limits.

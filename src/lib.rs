@@ -81,6 +81,7 @@ mod gaussian;
 #[cfg(feature = "image")]
 mod image;
 #[cfg(feature = "decode")]
+mod lattice;
 mod limits;
 #[cfg(feature = "decode")]
 mod math;
@@ -100,7 +101,7 @@ pub use crate::image::{GipDecoder, register};
 #[cfg(feature = "decode")]
 pub use color::{ColorModel, SampleDepth};
 #[cfg(feature = "decode")]
-pub use container::{ChunkType, Header, Metadata, Text};
+pub use container::{ChunkType, Coding, Header, Metadata, Text};
 #[cfg(all(feature = "decode", feature = "std"))]
 pub use decoder::Decoder;
 #[cfg(feature = "decode")]

@@ -2,3 +2,6 @@
 
 mod bits;
 pub(crate) mod fixed;
+mod rans;
+pub(crate) mod set;
+mod tables;

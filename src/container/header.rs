@@ -10,12 +10,38 @@ use crate::render::Kernel;
 
 /// The version that this crate reads and writes. 0 is a draft: files may become unreadable.
 pub(crate) const VERSION: u8 = 0;
-/// Fixed-length bit packing, the only coding of version 0.
-const CODING_FIXED: u8 = 0;
 /// Largest width and height.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;
 /// Bytes in the payload of `GHDR`.
 pub(crate) const HEADER_LENGTH: usize = 36;
+
+/// How the attributes of Gaussians become bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Coding {
+    /// Every component at a fixed bit depth, Gaussians in any order.
+    Fixed,
+    /// Each layer as a set, entropy coded, with steps as fine as a Gaussian is strong.
+    Set,
+}
+
+impl Coding {
+    #[cfg(feature = "encode")]
+    const fn code(self) -> u8 {
+        match self {
+            Self::Fixed => 0,
+            Self::Set => 1,
+        }
+    }
+
+    const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0 => Some(Self::Fixed),
+            1 => Some(Self::Set),
+            _ => None,
+        }
+    }
+}
 
 /// What a file says of its picture before the first Gaussian.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +49,8 @@ pub(crate) const HEADER_LENGTH: usize = 36;
 pub struct Header {
     /// Version of the format; 0 is a draft.
     pub version: u8,
+    /// How the Gaussians are stored.
+    pub coding: Coding,
     /// Width in pixels, 1 to 2^20.
     pub width: u32,
     /// Height in pixels, 1 to 2^20.
@@ -57,9 +85,8 @@ impl Header {
         let payload: &[u8; HEADER_LENGTH] = payload
             .try_into()
             .map_err(|_| DecodeError::malformed(CHUNK, "the length is not 36 bytes"))?;
-        if payload[1] != CODING_FIXED {
-            return Err(DecodeError::unsupported(CHUNK, "coding", payload[1].into()));
-        }
+        let coding = Coding::from_code(payload[1])
+            .ok_or_else(|| DecodeError::unsupported(CHUNK, "coding", payload[1].into()))?;
         let color = ColorModel::from_code(payload[2])
             .ok_or_else(|| DecodeError::unsupported(CHUNK, "colour model", payload[2].into()))?;
         let depth = SampleDepth::from_bits(payload[3])
@@ -83,6 +110,9 @@ impl Header {
         let kernel = Kernel::parse(payload[18], LittleEndian::read_f32(&payload[20..]))?;
         let chart = Chart::from_code(payload[19])
             .ok_or_else(|| DecodeError::unsupported(CHUNK, "chart", payload[19].into()))?;
+        if coding == Coding::Set && chart != Chart::Cholesky {
+            return Err(DecodeError::malformed(CHUNK, "a chart that this coding does not have"));
+        }
         if payload[24] != 0 {
             return Err(DecodeError::unsupported(CHUNK, "colour transform", payload[24].into()));
         }
@@ -96,6 +126,7 @@ impl Header {
         }
         Ok(Self {
             version: VERSION,
+            coding,
             width,
             height,
             color,
@@ -113,7 +144,7 @@ impl Header {
     pub(crate) fn to_payload(&self) -> [u8; HEADER_LENGTH] {
         let mut payload = [0; HEADER_LENGTH];
         payload[0] = self.version;
-        payload[1] = CODING_FIXED;
+        payload[1] = self.coding.code();
         payload[2] = self.color.code();
         payload[3] = self.depth.bits();
         LittleEndian::write_u32(&mut payload[4..], self.width);

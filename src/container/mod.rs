@@ -10,7 +10,7 @@ pub use chunk::ChunkType;
 pub(crate) use chunk::SIGNATURE;
 #[cfg(feature = "encode")]
 pub(crate) use chunk::write_chunk;
-pub use header::Header;
+pub use header::{Coding, Header};
 #[cfg(feature = "encode")]
 pub(crate) use header::{MAX_SIDE, VERSION};
 pub use metadata::{Metadata, Text};

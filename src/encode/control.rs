@@ -48,6 +48,35 @@ pub(crate) fn encode(
     let mut fit = Fit::new(&raster, training, budget, encoder.precision, base, encoder.seed);
     fit.run(observer)?;
 
+    if encoder.precision == Precision::Coded {
+        let (iterations, evaluations) = (fit.iterations, fit.evaluations);
+        let peak_memory = fit.peak_memory as u64;
+        let (gaussians, error) = (fit.gaussians(), fit.best_error());
+        drop(fit);
+        let coder = super::coded::Coder {
+            raster: &raster,
+            layout: &layout,
+            grid: crate::lattice::Grid::new(source.width(), source.height()),
+            model: source.color(),
+        };
+        let fineness = std::env::var("GIP_S").map_or(1.0, |v| v.parse().unwrap());
+        let coded = coder.code(&gaussians, error, fineness, observer)?;
+        let file = layout.write_set(&coded);
+        drop(raster);
+        let verified = Verified::new(&file, source);
+        let gaussians = verified.gaussians();
+        let Distortion { psnr, psnr_float } = verified.distortion(gaussians, observer)?;
+        return Ok(Outcome {
+            gaussians,
+            psnr,
+            psnr_float,
+            iterations,
+            evaluations,
+            peak_memory,
+            shortfall: None,
+            file,
+        });
+    }
     let mut file = layout.write(&fit.fitted());
     for _ in 0..MAX_ROUNDS {
         let more = missing(encoder.target, budget, &file, source, &fit, observer)?;
@@ -130,7 +159,7 @@ fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec
     let packed = |bits| Quantizer::Linear(Steps { bits, scale: 1.0, offset: 0.0 });
     (0..5 + channels)
         .map(|component| match (precision, component) {
-            (Precision::Float, _) => Quantizer::Float,
+            (Precision::Float | Precision::Coded, _) => Quantizer::Float,
             (Precision::Packed, 0 | 1) => packed(depths.position_bits),
             (Precision::Packed, 2..5) => packed(depths.shape_bits),
             (Precision::Packed, _) => packed(depths.color_bits),

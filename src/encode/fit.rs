@@ -170,6 +170,19 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// The best Gaussians so far, as they are.
+    pub(crate) fn gaussians(&self) -> Vec<Gaussian> {
+        let rows = self.best.as_ref().map_or(&[][..], |best| &best.rows);
+        let components = 5 + self.raster.channels;
+        let gaussian = |row: &Row| Gaussian::from_components(&row[..components], self.bounds.chart);
+        rows.iter().map(gaussian).collect()
+    }
+
+    /// The squared error of the best Gaussians.
+    pub(crate) fn best_error(&self) -> f64 {
+        self.best.as_ref().map_or(self.error, |best| best.error)
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.parameters.len()
     }

@@ -1,11 +1,14 @@
 //! Fitted Gaussians to a file: order, layers, chunks (spec, sections 4 to 7).
 
+use super::coded::Coded;
 use super::fit::Fitted;
 use super::source::Source;
 use super::training::Training;
 use crate::coding::fixed;
-use crate::container::{ChunkType, Header, Metadata, SIGNATURE, write_chunk};
-use crate::gaussian::{Gaussian, MAX_COMPONENTS};
+use crate::coding::set::{Models, SetCoding};
+use crate::container::{ChunkType, Coding, Header, Metadata, SIGNATURE, write_chunk};
+use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
+use crate::lattice::Grid;
 use crate::quantizer::Quantizer;
 
 /// Fewest Gaussians that are worth a layer of their own.
@@ -31,6 +34,7 @@ impl<'a> Layout<'a> {
     ) -> Self {
         let header = Header {
             version: crate::container::VERSION,
+            coding: Coding::Fixed,
             width: source.width(),
             height: source.height(),
             color: source.color(),
@@ -42,6 +46,11 @@ impl<'a> Layout<'a> {
             base_color: mean.map(|value| (value * 65535.0).round() as u16),
         };
         Self { header, metadata }
+    }
+
+    /// The header, but for the numbers of Gaussians and layers.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
     }
 
     /// The colour that Gaussians are added to, as the decoder has it.
@@ -71,6 +80,33 @@ impl<'a> Layout<'a> {
             let (layer, later) = rest.split_at(count);
             rest = later;
             write_chunk(&mut file, ChunkType::GAUS, &fixed::write_layer(layer, quantizers));
+        }
+        write_chunk(&mut file, ChunkType::GEND, &[]);
+        file
+    }
+
+    /// The file of coded Gaussians.
+    pub(crate) fn write_set(&self, coded: &Coded) -> Vec<u8> {
+        let header = Header {
+            coding: Coding::Set,
+            chart: Chart::Cholesky,
+            gaussians: coded.codes.len() as u32,
+            layers: u16::from(!coded.codes.is_empty()),
+            ..self.header.clone()
+        };
+        let mut file = SIGNATURE.to_vec();
+        write_chunk(&mut file, ChunkType::GHDR, &header.to_payload());
+        write_chunk(&mut file, ChunkType::QNTZ, &coded.lattice.to_payload());
+        for (kind, payload) in self.metadata.chunks() {
+            write_chunk(&mut file, kind, &payload);
+        }
+        if !coded.codes.is_empty() {
+            let grid = Grid::new(header.width, header.height);
+            let channels = header.color.channels();
+            let coding = SetCoding { lattice: &coded.lattice, grid, channels };
+            let mut codes = coded.codes.clone();
+            let payload = coding.write(&mut codes, &mut Vec::new(), &mut Models::default());
+            write_chunk(&mut file, ChunkType::GAUS, &payload);
         }
         write_chunk(&mut file, ChunkType::GEND, &[]);
         file

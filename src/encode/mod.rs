@@ -2,8 +2,10 @@
 
 mod budget;
 mod chart;
+mod coded;
 mod control;
 mod densify;
+mod descent;
 mod error;
 mod fit;
 mod gradient;
@@ -11,6 +13,7 @@ mod layout;
 mod lsq;
 mod optimizer;
 mod options;
+mod patch;
 mod plan;
 mod progress;
 mod raster;

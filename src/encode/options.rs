@@ -79,4 +79,6 @@ pub enum Precision {
     Float,
     /// Quantization-aware training and bit packing.
     Packed,
+    /// Entropy coded, every code chosen by what it costs and what it does to the picture.
+    Coded,
 }

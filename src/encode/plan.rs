@@ -28,7 +28,7 @@ impl Plan {
             growth_interval: (growth_end / densification.steps.max(1)).max(1),
             cull_end,
             quantized_from: match precision {
-                Precision::Float => u32::MAX,
+                Precision::Float | Precision::Coded => u32::MAX,
                 // Growth needs the float values; quantizers are fitted to all Gaussians.
                 Precision::Packed => share(quantization.warm_up).clamp(cull_end, iterations - 1),
             },

@@ -119,6 +119,8 @@ pub(crate) enum PrecisionArg {
     F32,
     /// Quantized with training, and bit-packed
     Packed,
+    /// Entropy coded: smallest.
+    Coded,
 }
 
 impl From<PrecisionArg> for Precision {
@@ -126,6 +128,7 @@ impl From<PrecisionArg> for Precision {
         match arg {
             PrecisionArg::F32 => Self::Float,
             PrecisionArg::Packed => Self::Packed,
+            PrecisionArg::Coded => Self::Coded,
         }
     }
 }

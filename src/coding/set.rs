@@ -1,0 +1,354 @@
+//! Coding 1: the Gaussians of a layer as a set, in the order of a tree of cells, every attribute
+//! entropy coded (spec, section 7.4).
+
+use core::ops::Range;
+
+use alloc::vec::Vec;
+
+#[cfg(feature = "encode")]
+use super::rans::Cost;
+#[cfg(feature = "encode")]
+pub(crate) use super::rans::Costs;
+use super::rans::{Coder, Decoder, MAX_BITS, Model, SYMBOLS};
+use super::tables;
+use crate::container::ChunkType;
+use crate::error::DecodeError;
+use crate::lattice::{Cell, Code, Grid, Lattice, MAX_CLASS};
+
+/// Bytes of payload before the coded Gaussians: how many they are.
+pub(crate) const LAYER_PREFIX: usize = 4;
+/// No coded Gaussian is shorter than this on average, in Gaussians per byte: more are refused
+/// before time is spent on them.
+const MOST_PER_BYTE: usize = 4;
+
+/// The contexts of symbols: the first of each kind. Contexts of a kind follow each other.
+mod context {
+    use super::{CLASSES, LEVELS, MAGNITUDES, RATIOS};
+
+    /// Class of precision.
+    pub(super) const CLASS: usize = 0;
+    /// Magnitude of the first colour axis, by class.
+    pub(super) const FIRST_AXIS: usize = CLASS + 1;
+    /// The other colour axes, by axis, class and magnitude of the axis before.
+    pub(super) const OTHER_AXES: usize = FIRST_AXIS + CLASSES;
+    /// Size, ratio and slant, by level of precision; slant by ratio as well.
+    pub(super) const SIZE: usize = OTHER_AXES + 3 * CLASSES * MAGNITUDES;
+    pub(super) const RATIO: usize = SIZE + LEVELS;
+    pub(super) const SLANT: usize = RATIO + LEVELS;
+    /// Length of what exceeds the symbols.
+    pub(super) const EXCESS: usize = SLANT + LEVELS * RATIOS;
+    /// How many of a few Gaussians are in the first part of a cell, by their number.
+    pub(super) const FEW: usize = EXCESS + 1;
+    /// Which share of many, by the logarithm of their number.
+    pub(super) const MANY: usize = FEW + super::FEW;
+    /// All contexts.
+    pub(super) const COUNT: usize = MANY + 32;
+}
+
+/// Classes of precision.
+const CLASSES: usize = MAX_CLASS as usize + 1;
+/// Kinds of magnitudes that contexts tell apart.
+const MAGNITUDES: usize = 5;
+/// Geometry is modelled as precisely as class 2 has it; finer classes add plain bits.
+const LEVELS: usize = 3;
+/// Colours are modelled as precisely as class 3 has them.
+const COLOR_LEVEL: u32 = 3;
+/// Kinds of ratios that contexts tell apart.
+const RATIOS: usize = 7;
+/// Counts below this are coded as they are.
+const FEW: usize = SYMBOLS;
+/// The symbol that says that a value is beyond all others.
+const BEYOND: u32 = SYMBOLS as u32 - 1;
+/// Signed symbols stand for -7 to 7.
+const SIGNED: i32 = 7;
+/// The size that a Gaussian is expected to have, from the level of the cell that it has for
+/// itself: logarithm for a pixel, and what every doubling of the area adds.
+const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
+
+/// The models of all contexts, learning from layer to layer.
+#[derive(Clone, Debug)]
+pub(crate) struct Models(Vec<Model>);
+
+#[cfg(feature = "encode")]
+impl Models {
+    /// What symbols cost by what was learnt.
+    pub(crate) fn costs(&self) -> Costs {
+        self.0.iter().map(Model::costs).collect()
+    }
+}
+
+impl Default for Models {
+    fn default() -> Self {
+        Self(tables::STARTS.iter().map(|&starts| Model::new(starts)).collect())
+    }
+}
+
+/// Where the Gaussians of a layer come from or go to.
+trait Members {
+    /// Sorts some by whether they lie before `middle` along an axis; how many do.
+    fn partition(&mut self, range: Range<usize>, axis: usize, middle: u32) -> usize;
+    /// What is known of one.
+    fn get(&self, index: usize) -> Code;
+    /// What was coded of one; they come in order.
+    fn set(&mut self, index: usize, code: Code, cell: &Cell);
+}
+
+/// What a layer is coded with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SetCoding<'a> {
+    pub(crate) lattice: &'a Lattice,
+    pub(crate) grid: Grid,
+    pub(crate) channels: usize,
+}
+
+impl SetCoding<'_> {
+    /// Reads a layer of at most `allowed` Gaussians and hands over their codes in order.
+    pub(crate) fn read(
+        &self,
+        payload: &[u8],
+        allowed: u32,
+        models: &mut Models,
+        receive: impl FnMut(Code),
+    ) -> Result<(), DecodeError> {
+        struct Unknown<F>(F);
+        impl<F: FnMut(Code)> Members for Unknown<F> {
+            fn partition(&mut self, _: Range<usize>, _: usize, _: u32) -> usize {
+                0
+            }
+            fn get(&self, _: usize) -> Code {
+                Code::default()
+            }
+            fn set(&mut self, _: usize, code: Code, _: &Cell) {
+                (self.0)(code);
+            }
+        }
+        let malformed = |reason| Err(DecodeError::malformed(ChunkType::GAUS, reason));
+        let Some((prefix, bytes)) = payload.split_first_chunk::<LAYER_PREFIX>() else {
+            return malformed("too short for a number of Gaussians");
+        };
+        let count = u32::from_le_bytes(*prefix);
+        if count == 0 {
+            return malformed("no Gaussians");
+        }
+        if count > allowed {
+            return malformed("more Gaussians than the header declares");
+        }
+        if count as usize > bytes.len().saturating_mul(MOST_PER_BYTE) {
+            return malformed("too short for its number of Gaussians");
+        }
+        let mut decoder = Decoder::new(bytes, &mut models.0);
+        self.walk(&mut decoder, count as usize, &mut Unknown(receive));
+        if !decoder.is_complete() {
+            return malformed("the coded Gaussians do not add up");
+        }
+        Ok(())
+    }
+
+    /// The payload of a layer; sorts `codes` as the file has them, and rounds their centres to
+    /// what it tells. The level of each one's cell goes to `levels`.
+    #[cfg(feature = "encode")]
+    pub(crate) fn write(
+        &self,
+        codes: &mut [Code],
+        levels: &mut Vec<u32>,
+        models: &mut Models,
+    ) -> Vec<u8> {
+        let mut encoder = super::rans::Encoder::new(&mut models.0);
+        levels.clear();
+        self.walk(&mut encoder, codes.len(), &mut Known { codes, levels });
+        let mut payload = (codes.len() as u32).to_le_bytes().to_vec();
+        payload.extend(encoder.finish());
+        payload
+    }
+
+    /// The bits that a code takes in a cell of a level, without its share of the tree.
+    #[cfg(feature = "encode")]
+    pub(crate) fn cost(&self, code: Code, level: u32, costs: &Costs) -> f32 {
+        let mut cost = Cost { costs, bits: 0.0 };
+        self.attributes(&mut cost, level, code);
+        let cholesky = self.lattice.cholesky(&code);
+        let fineness = self.lattice.fineness_of_position(code.class, cholesky);
+        // Cells are square, or twice as high as wide.
+        let pixels = [level / 2, level.div_ceil(2)].map(|pixels| pixels as i32);
+        let bits = pixels.iter().zip(fineness).map(|(&pixels, fine)| (pixels + fine).max(0));
+        cost.bits + bits.sum::<i32>() as f32
+    }
+
+    /// Walks through the tree of cells, first parts first, and codes every Gaussian in the cell
+    /// that it has for itself.
+    fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {
+        let mut cells = alloc::vec![(self.grid.whole(), 0..count)];
+        while let Some((cell, range)) = cells.pop() {
+            let is_split = range.len() > 1 || !self.grid.is_within_root(&cell);
+            match self.grid.split(&cell).filter(|_| is_split) {
+                Some((axis, parts)) => {
+                    let middle = parts[1].corner[axis];
+                    let first = members.partition(range.clone(), axis, middle);
+                    let first = count_of(coder, range.len() as u32, first as u32) as usize;
+                    let middle = range.start + first;
+                    // The last one pushed comes first.
+                    for (part, range) in [(1, middle..range.end), (0, range.start..middle)] {
+                        if !range.is_empty() {
+                            cells.push((parts[part], range));
+                        }
+                    }
+                }
+                None => {
+                    for index in range {
+                        let code = self.gaussian(coder, &cell, members.get(index));
+                        members.set(index, code, &cell);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Codes a Gaussian within a cell.
+    pub(crate) fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> Code {
+        let mut code = self.attributes(coder, cell.level(), known);
+        let fineness = self.lattice.fineness_of_position(code.class, self.lattice.cholesky(&code));
+        let bits = cell.bits(fineness);
+        for axis in 0..2 {
+            let part = cell.part(axis, bits[axis], known.center[axis]);
+            let part = plain(coder, bits[axis], part);
+            code.center[axis] = cell.middle(axis, bits[axis], part);
+        }
+        code
+    }
+
+    /// Codes all but the centre.
+    fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
+        let mut code = Code::default();
+        code.class = coder.symbol(context::CLASS, known.class);
+        if code.class > MAX_CLASS {
+            coder.refuse();
+            code.class = MAX_CLASS;
+        }
+        let class = code.class as usize;
+        code.color = self.color(coder, class, known.color);
+
+        let shift = code.class.saturating_sub(LEVELS as u32 - 1);
+        let rank = class.min(LEVELS - 1);
+        let step = self.lattice.size * crate::lattice::fineness(code.class);
+        let expected = EXPECTED_SIZE[0] + EXPECTED_SIZE[1] * level as f32;
+        let expected = (expected / step) as i32;
+        code.size = signed(coder, context::SIZE + rank, shift, known.size.wrapping_sub(expected))
+            .wrapping_add(expected);
+        code.ratio = signed(coder, context::RATIO + rank, shift, known.ratio);
+        // In steps of class 2, whatever the class.
+        let ratio =
+            if code.class < 2 { code.ratio << (2 - code.class) } else { code.ratio >> shift };
+        let kind = (ratio.div_euclid(3) + RATIOS as i32 / 2).clamp(0, RATIOS as i32 - 1) as usize;
+        code.slant = signed(coder, context::SLANT + rank * RATIOS + kind, shift, known.slant);
+        code
+    }
+
+    /// Codes the colour axes: the first by its magnitude and sign, the others relative to that sign.
+    fn color(&self, coder: &mut impl Coder, class: usize, known: [i32; 4]) -> [i32; 4] {
+        let shift = (class as u32).saturating_sub(COLOR_LEVEL);
+        let mut color = [0; 4];
+        let first = known[0].unsigned_abs();
+        let symbol = coder.symbol(context::FIRST_AXIS + class, (first >> shift).min(BEYOND));
+        let mut high = symbol;
+        if symbol == BEYOND {
+            high += excess(coder, (first >> shift).wrapping_sub(BEYOND));
+        }
+        let magnitude = (high << shift | plain(coder, shift, first & ((1 << shift) - 1))) as i32;
+        let negative = magnitude != 0 && coder.bits(1, u32::from(known[0] < 0)) == 1;
+        let sign = if negative { -1 } else { 1 };
+        color[0] = sign * magnitude;
+        for axis in 1..self.channels {
+            let before = kind_of_magnitude(color[axis - 1]);
+            let context =
+                context::OTHER_AXES + ((axis - 1) * CLASSES + class) * MAGNITUDES + before;
+            color[axis] = sign * signed(coder, context, shift, sign * known[axis]);
+        }
+        color
+    }
+}
+
+/// Codes how many of `count` Gaussians are in the first part of a cell.
+fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
+    let choices = u64::from(count) + 1;
+    let (context, symbols) = if count < FEW as u32 {
+        (context::FEW + count as usize, choices)
+    } else {
+        (context::MANY + count.ilog2() as usize, SYMBOLS as u64)
+    };
+    let symbol = u64::from(coder.symbol(context, (u64::from(first) * symbols / choices) as u32));
+    if symbol >= symbols {
+        coder.refuse();
+        return 0;
+    }
+    // The counts that share this symbol.
+    let least = (symbol * choices).div_ceil(symbols) as u32;
+    let most = ((symbol + 1) * choices).div_ceil(symbols) as u32 - 1;
+    let rest =
+        plain(coder, (most - least + 1).next_power_of_two().ilog2(), first.wrapping_sub(least));
+    if rest > most - least {
+        coder.refuse();
+        return least;
+    }
+    least + rest
+}
+
+/// Codes a signed value, its low `shift` bits plainly.
+fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32 {
+    let high = value >> shift;
+    let is_beyond = high.unsigned_abs() > SIGNED as u32;
+    let symbol = if is_beyond { BEYOND } else { (high + SIGNED) as u32 };
+    let mut decoded = coder.symbol(context, symbol) as i32 - SIGNED;
+    if decoded > SIGNED {
+        let negative = coder.bits(1, u32::from(high < 0)) == 1;
+        let rest = excess(coder, high.unsigned_abs().wrapping_sub(SIGNED as u32 + 1)) as i32;
+        let magnitude = rest + SIGNED + 1;
+        decoded = if negative { -magnitude } else { magnitude };
+    }
+    decoded << shift | plain(coder, shift, value as u32 & ((1 << shift) - 1)) as i32
+}
+
+/// Codes a number by its length (Elias, 1975).
+fn excess(coder: &mut impl Coder, value: u32) -> u32 {
+    let length = coder.symbol(context::EXCESS, value.saturating_add(1).ilog2().min(BEYOND));
+    let low = plain(coder, length, value.wrapping_add(1) & ((1 << length) - 1));
+    (1 << length | low) - 1
+}
+
+/// Codes the low `count` bits of a value without a model, however many.
+fn plain(coder: &mut impl Coder, count: u32, value: u32) -> u32 {
+    let low = count.min(MAX_BITS);
+    let value = value & ((1_u64 << count) - 1) as u32;
+    let bits = coder.bits(low, value & ((1 << low) - 1));
+    if count > low { bits | coder.bits(count - low, value >> low) << low } else { bits }
+}
+
+/// 0, 1, 2 to 3, 4 to 7, more.
+fn kind_of_magnitude(value: i32) -> usize {
+    value
+        .checked_abs()
+        .map_or(MAGNITUDES - 1, |value| ((32 - value.leading_zeros()) as usize).min(MAGNITUDES - 1))
+}
+
+#[cfg(feature = "encode")]
+struct Known<'a> {
+    codes: &'a mut [Code],
+    levels: &'a mut Vec<u32>,
+}
+
+#[cfg(feature = "encode")]
+impl Members for Known<'_> {
+    fn partition(&mut self, range: Range<usize>, axis: usize, middle: u32) -> usize {
+        let codes = &mut self.codes[range];
+        codes.sort_by_key(|code| code.center[axis] >= middle);
+        codes.partition_point(|code| code.center[axis] < middle)
+    }
+
+    fn get(&self, index: usize) -> Code {
+        self.codes[index]
+    }
+
+    fn set(&mut self, index: usize, code: Code, cell: &Cell) {
+        self.codes[index] = code;
+        self.levels.push(cell.level());
+    }
+}

@@ -1,0 +1,330 @@
+//! The lattice of Gaussians that coding 1 can store: codes to values, with steps as fine as a
+//! Gaussian is strong (spec, section 8.2).
+
+use alloc::vec::Vec;
+
+use byteorder::{ByteOrder, LittleEndian};
+
+use crate::color::ColorModel;
+use crate::container::ChunkType;
+use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
+use crate::math;
+
+/// Steps of geometry: position, size, ratio, slant.
+const GEOMETRY: usize = 4;
+/// Largest class of precision.
+pub(crate) const MAX_CLASS: u32 = 7;
+/// Positions are multiples of half of this many parts of a pixel.
+const UNITS_PER_PIXEL: u32 = 128;
+/// The finest cell of positions is 2^-6 pixel wide.
+const FINEST: i32 = 6;
+/// Steps lie within these.
+const STEPS: core::ops::RangeInclusive<f32> = 9.536_743e-7..=1024.0;
+/// Logarithms of size and of ratio are confined to this magnitude, so that their exponentials stay
+/// finite.
+const MAX_LOGARITHM: f32 = 20.0;
+/// Red, green and blue by the three colour axes: lightness, red against blue, green against both.
+/// Orthonormal, so that an error is as large in one as in the other.
+const AXES: [[f32; 3]; 3] = [
+    [0.577_350_26, 0.577_350_26, 0.577_350_26],
+    [0.707_106_77, 0.0, -0.707_106_77],
+    [0.408_248_3, -0.816_496_6, 0.408_248_3],
+];
+
+/// A Gaussian in whole steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Code {
+    /// Class of precision, up to [`MAX_CLASS`]: steps of geometry are halved so many times.
+    pub(crate) class: u32,
+    /// Amplitudes along the colour axes, times the root of the area.
+    pub(crate) color: [i32; 4],
+    /// Logarithm of the geometric mean of l11 and l22.
+    pub(crate) size: i32,
+    /// Half of the logarithm of l11 / l22.
+    pub(crate) ratio: i32,
+    /// l21 / l22.
+    pub(crate) slant: i32,
+    /// Centre in units of the [`Grid`].
+    pub(crate) center: [u32; 2],
+}
+
+/// The steps of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Lattice {
+    /// Of the position, relative to the Gaussian's own extent.
+    pub(crate) position: f32,
+    pub(crate) size: f32,
+    pub(crate) ratio: f32,
+    pub(crate) slant: f32,
+    /// Of each colour axis.
+    pub(crate) color: Vec<f32>,
+}
+
+impl Lattice {
+    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel.
+    pub(crate) fn parse(payload: &[u8], channels: usize) -> Result<Self, DecodeError> {
+        let malformed = |reason| DecodeError::malformed(ChunkType::QNTZ, reason);
+        if payload.len() != (GEOMETRY + channels) * size_of::<f32>() {
+            return Err(malformed("the length is not four bytes per step"));
+        }
+        let steps: Vec<f32> = payload.chunks_exact(4).map(LittleEndian::read_f32).collect();
+        if !steps.iter().all(|step| STEPS.contains(step)) {
+            return Err(malformed("a step that is not within 2^-20 to 2^10"));
+        }
+        let [position, size, ratio, slant] = [steps[0], steps[1], steps[2], steps[3]];
+        Ok(Self { position, size, ratio, slant, color: steps[GEOMETRY..].to_vec() })
+    }
+
+    /// The payload of `QNTZ`.
+    #[cfg(feature = "encode")]
+    pub(crate) fn to_payload(&self) -> Vec<u8> {
+        let geometry = [self.position, self.size, self.ratio, self.slant];
+        geometry.iter().chain(&self.color).flat_map(|step| step.to_le_bytes()).collect()
+    }
+
+    /// Exponentials of size and ratio, and the Cholesky factor.
+    fn extent(&self, code: &Code) -> (f32, [f32; 3]) {
+        let fine = fineness(code.class);
+        let exp = |code: i32, step: f32| {
+            math::exp((code as f32 * (step * fine)).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
+        };
+        let (size, ratio) = (exp(code.size, self.size), exp(code.ratio, self.ratio));
+        let (l11, l22) = (size * ratio, size / ratio);
+        (size, [l11, code.slant as f32 * (self.slant * fine) * l22, l22])
+    }
+
+    /// The Cholesky factor that a code stands for.
+    pub(crate) fn cholesky(&self, code: &Code) -> [f32; 3] {
+        self.extent(code).1
+    }
+
+    /// How fine the position is along x and y: cells are 2^-n pixels wide.
+    pub(crate) fn fineness_of_position(&self, class: u32, [l11, _, l22]: [f32; 3]) -> [i32; 2] {
+        [l11, l22].map(|extent| {
+            // The nearest power of two, from the exponent of the number.
+            let step = self.position * fineness(class) * extent * core::f32::consts::SQRT_2;
+            let exponent = (step.to_bits() >> 23) as i32 - 127;
+            (-exponent).min(FINEST)
+        })
+    }
+
+    /// The Gaussian that a code stands for.
+    pub(crate) fn gaussian(&self, code: &Code, grid: &Grid, model: ColorModel) -> Gaussian {
+        let (size, cholesky) = self.extent(code);
+        let mut axes = [0.0; 4];
+        for ((axis, &code), &step) in axes.iter_mut().zip(&code.color).zip(&self.color) {
+            *axis = code as f32 * (step / size);
+        }
+        Gaussian { center: grid.center(code.center), cholesky, color: from_axes(axes, model) }
+    }
+}
+
+#[cfg(feature = "encode")]
+impl Lattice {
+    /// The code nearest to a Gaussian, with the precision of a class.
+    ///
+    /// Rounding errors of one component are made good by the next where they can be: what counts
+    /// is the covariance and the place, not the components.
+    pub(crate) fn code(
+        &self,
+        gaussian: &Gaussian,
+        class: u32,
+        grid: &Grid,
+        model: ColorModel,
+    ) -> Code {
+        let fine = fineness(class);
+        let nearest = |value: f32, step: f32| (value / step).round().clamp(-30_000.0, 30_000.0);
+        let [l11, l21, l22] = gaussian.cholesky;
+        let size = nearest(0.5 * (l11 * l22).ln(), self.size * fine) as i32;
+        let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio * fine) as i32;
+        let mut code = Code { class, size, ratio, ..Code::default() };
+        // With L (1 + D) for the rounded factor, the slant is to make D21 zero.
+        let [c11, _, c22] = self.cholesky(&code);
+        let slant = l21 / l22 * (1.0 + (c11 / l11).ln() - (c22 / l22).ln());
+        code.slant = nearest(slant, self.slant * fine) as i32;
+        code.center = self.placed(&code, gaussian.center, grid);
+        let axes = to_axes(gaussian.color, model);
+        let (size, _) = self.extent(&code);
+        for ((code, axis), step) in code.color.iter_mut().zip(axes).zip(&self.color) {
+            *code = nearest(axis * size, *step) as i32;
+        }
+        code
+    }
+
+    /// What stands for a point with a code's precision; an error along x is followed along the
+    /// Gaussian's slant.
+    pub(crate) fn placed(&self, code: &Code, [x, y]: [f32; 2], grid: &Grid) -> [u32; 2] {
+        let [l11, l21, l22] = self.cholesky(code);
+        let fineness = self.fineness_of_position(code.class, [l11, l21, l22]);
+        let column = grid.snapped(grid.units([x, y])[0], fineness[0]);
+        let error = grid.center([column, 0])[0] - x;
+        let row = grid.snapped(grid.units([x, y + l21 / l11 * error])[1], fineness[1]);
+        [column, row]
+    }
+
+    /// The amplitudes along the colour axes that a unit of a code stands for.
+    pub(crate) fn color_units(&self, code: &Code) -> [f32; 4] {
+        let (size, _) = self.extent(code);
+        let mut units = [0.0; 4];
+        for (unit, step) in units.iter_mut().zip(&self.color) {
+            *unit = step / size;
+        }
+        units
+    }
+
+    /// Moves a code by one cell along an axis; `None` at the end of the grid.
+    pub(crate) fn moved(
+        &self,
+        code: &Code,
+        axis: usize,
+        forward: bool,
+        grid: &Grid,
+    ) -> Option<Code> {
+        let fineness = self.fineness_of_position(code.class, self.cholesky(code))[axis];
+        let step = 1 << grid.cell_bits(fineness);
+        let center = code.center[axis];
+        let center = if forward { center.checked_add(step)? } else { center.checked_sub(step)? };
+        let mut code = *code;
+        code.center[axis] = center;
+        (center < grid.whole().sides[axis]).then_some(code)
+    }
+}
+
+/// 2^-class.
+pub(crate) fn fineness(class: u32) -> f32 {
+    f32::from_bits((127 - class) << 23)
+}
+
+/// Channels from colour axes. Gray and alpha are axes of their own.
+pub(crate) fn from_axes(axes: [f32; 4], model: ColorModel) -> [f32; 4] {
+    match model {
+        ColorModel::Gray | ColorModel::GrayAlpha => axes,
+        ColorModel::Rgb | ColorModel::Rgba => {
+            let channel =
+                |c: usize| AXES[0][c] * axes[0] + AXES[1][c] * axes[1] + AXES[2][c] * axes[2];
+            [channel(0), channel(1), channel(2), axes[3]]
+        }
+    }
+}
+
+/// Colour axes from channels.
+#[cfg(feature = "encode")]
+pub(crate) fn to_axes(color: [f32; 4], model: ColorModel) -> [f32; 4] {
+    match model {
+        ColorModel::Gray | ColorModel::GrayAlpha => color,
+        ColorModel::Rgb | ColorModel::Rgba => {
+            let axis = |a: usize| (0..3).map(|c| AXES[a][c] * color[c]).sum();
+            [axis(0), axis(1), axis(2), color[3]]
+        }
+    }
+}
+
+/// The grid of possible centres: square roots of a power of two of pixels, one more than the
+/// picture needs on every side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grid {
+    /// Side of a root in units.
+    root: u32,
+    columns: u32,
+    rows: u32,
+}
+
+/// A rectangle of the grid, in units.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    pub(crate) corner: [u32; 2],
+    pub(crate) sides: [u32; 2],
+}
+
+impl Grid {
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        // At least 8 pixels, and at least a 16th of the longer side.
+        let root = width.max(height).div_ceil(16).next_power_of_two().max(8);
+        let roots = |side: u32| side.div_ceil(root) + 2;
+        Self { root: root * UNITS_PER_PIXEL, columns: roots(width), rows: roots(height) }
+    }
+
+    /// All of it.
+    pub(crate) fn whole(&self) -> Cell {
+        Cell { corner: [0; 2], sides: [self.columns * self.root, self.rows * self.root] }
+    }
+
+    /// The longer side of a cell, where it is split, and the two parts. `None` for a pixel.
+    pub(crate) fn split(&self, cell: &Cell) -> Option<(usize, [Cell; 2])> {
+        let axis = usize::from(cell.sides[1] > cell.sides[0]);
+        let side = cell.sides[axis];
+        if side <= UNITS_PER_PIXEL {
+            return None;
+        }
+        // Whole roots first.
+        let first =
+            if side > self.root { (side / self.root).div_ceil(2) * self.root } else { side / 2 };
+        let mut parts = [*cell; 2];
+        parts[0].sides[axis] = first;
+        parts[1].sides[axis] = side - first;
+        parts[1].corner[axis] += first;
+        Some((axis, parts))
+    }
+
+    /// Whether a cell lies within one root: its sides are powers of two then.
+    pub(crate) fn is_within_root(&self, cell: &Cell) -> bool {
+        cell.sides.iter().all(|&side| side <= self.root)
+    }
+
+    /// The point that a centre's units stand for, in pixels.
+    pub(crate) fn center(&self, units: [u32; 2]) -> [f32; 2] {
+        units.map(|unit| (unit as i32 - self.root as i32) as f32 / UNITS_PER_PIXEL as f32)
+    }
+
+    /// The units nearest to a point.
+    #[cfg(feature = "encode")]
+    pub(crate) fn units(&self, center: [f32; 2]) -> [u32; 2] {
+        let last = self.whole().sides;
+        core::array::from_fn(|axis| {
+            let unit = (f64::from(center[axis]) * f64::from(UNITS_PER_PIXEL)).floor() as i64;
+            (unit + i64::from(self.root)).clamp(0, i64::from(last[axis]) - 1) as u32
+        })
+    }
+}
+
+#[cfg(feature = "encode")]
+impl Grid {
+    /// Logarithm of the width of the cells of a fineness, in units.
+    fn cell_bits(&self, fineness: i32) -> u32 {
+        let bits = UNITS_PER_PIXEL.ilog2() as i32 - fineness;
+        bits.clamp(1, self.root.ilog2() as i32) as u32
+    }
+
+    /// The middle of the cell that a unit lies in.
+    fn snapped(&self, unit: u32, fineness: i32) -> u32 {
+        let bits = self.cell_bits(fineness);
+        (unit >> bits << bits) + (1 << bits >> 1)
+    }
+}
+
+impl Cell {
+    /// Logarithm to base 2 of the area in square pixels; for cells within a root.
+    pub(crate) fn level(&self) -> u32 {
+        self.sides.iter().map(|side| side.ilog2()).sum::<u32>() - 2 * UNITS_PER_PIXEL.ilog2()
+    }
+
+    /// How many bits a position within the cell takes along each axis, for cells within a root.
+    pub(crate) fn bits(&self, fineness: [i32; 2]) -> [u32; 2] {
+        core::array::from_fn(|axis| {
+            let pixels = self.sides[axis].ilog2() as i32 - UNITS_PER_PIXEL.ilog2() as i32;
+            (pixels + fineness[axis]).max(0) as u32
+        })
+    }
+
+    /// Which of 2^bits parts a unit lies in, along an axis.
+    pub(crate) fn part(&self, axis: usize, bits: u32, unit: u32) -> u32 {
+        unit.wrapping_sub(self.corner[axis]) >> (self.sides[axis].ilog2() - bits)
+    }
+
+    /// The middle of one of 2^bits parts along an axis.
+    pub(crate) fn middle(&self, axis: usize, bits: u32, part: u32) -> u32 {
+        let shift = self.sides[axis].ilog2() - bits;
+        self.corner[axis] + (part << shift) + (1 << shift >> 1)
+    }
+}
