@@ -53,14 +53,8 @@ pub(crate) fn encode(
         let peak_memory = fit.peak_memory as u64;
         let (gaussians, error) = (fit.gaussians(), fit.best_error());
         drop(fit);
-        let coder = super::coded::Coder {
-            raster: &raster,
-            layout: &layout,
-            grid: crate::lattice::Grid::new(source.width(), source.height()),
-            model: source.color(),
-        };
-        let fineness = std::env::var("GIP_S").map_or(1.0, |v| v.parse().unwrap());
-        let coded = coder.code(&gaussians, error, fineness, observer)?;
+        let coder = super::coded::Coder::new(&raster, &layout);
+        let coded = coder.encode(&gaussians, error, encoder.target, observer)?;
         let file = layout.write_set(&coded);
         drop(raster);
         let verified = Verified::new(&file, source);
@@ -73,7 +67,13 @@ pub(crate) fn encode(
             iterations,
             evaluations,
             peak_memory,
-            shortfall: None,
+            shortfall: shortfall(
+                encoder.target,
+                (source.width() * source.height()) as usize,
+                file.len(),
+                psnr,
+                gaussians,
+            ),
             file,
         });
     }
@@ -124,6 +124,14 @@ fn budget(
     layout: &Layout<'_>,
 ) -> Result<Budget, EncodeError> {
     let target = encoder.target;
+    if let Some(bytes) = target.bytes(raster.pixels())
+        && encoder.precision == Precision::Coded
+    {
+        let least = 140;
+        return Ok(Budget::Count(
+            (bytes.saturating_sub(least) as f64 * 8.0 / super::coded::BITS_PER_GAUSSIAN) as usize,
+        ));
+    }
     if let Some(bytes) = target.bytes(raster.pixels()) {
         let quantizers = quantizers(encoder.precision, training, raster.channels);
         let least = layout.least_length(&quantizers);
@@ -146,7 +154,12 @@ fn budget(
     Ok(match target {
         Target::Psnr(psnr) => {
             let samples = (raster.pixels() * raster.channels) as f64;
-            Budget::Error(samples * 10_f64.powf(-psnr / 10.0))
+            let share = if encoder.precision == Precision::Coded {
+                super::coded::SHARE_OF_FIT
+            } else {
+                1.0
+            };
+            Budget::Error(share * samples * 10_f64.powf(-psnr / 10.0))
         }
         Target::Gaussians(count) => Budget::Count(count as usize),
         _ => unreachable!("the others were handled above"),
