@@ -97,11 +97,6 @@ impl<'a> Decoder<'a> {
         decoder
     }
 
-    /// Whether something was refused, or bytes were missing.
-    pub(crate) fn is_refused(&self) -> bool {
-        self.refused
-    }
-
     /// Whether all bytes were used and led back to where the encoder began.
     pub(crate) fn is_complete(&self) -> bool {
         !self.refused && self.words.is_empty() && self.state == LEAST_STATE

@@ -13,7 +13,7 @@ use super::rans::{Coder, Decoder, MAX_BITS, Model, SYMBOLS};
 use super::tables;
 use crate::container::ChunkType;
 use crate::error::DecodeError;
-use crate::lattice::{Cell, Code, Grid, Lattice, MAX_CLASS};
+use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS};
 
 /// Bytes of payload before the coded Gaussians: how many they are.
 pub(crate) const LAYER_PREFIX: usize = 4;
@@ -22,27 +22,27 @@ pub(crate) const LAYER_PREFIX: usize = 4;
 const MOST_PER_BYTE: usize = 4;
 
 /// The contexts of symbols: the first of each kind. Contexts of a kind follow each other.
-mod context {
+pub(super) mod context {
     use super::{CLASSES, LEVELS, MAGNITUDES, RATIOS};
 
     /// Class of precision.
-    pub(super) const CLASS: usize = 0;
+    pub(in super::super) const CLASS: usize = 0;
     /// Magnitude of the first colour axis, by class.
-    pub(super) const FIRST_AXIS: usize = CLASS + 1;
+    pub(in super::super) const FIRST_AXIS: usize = CLASS + 1;
     /// The other colour axes, by axis, class and magnitude of the axis before.
-    pub(super) const OTHER_AXES: usize = FIRST_AXIS + CLASSES;
+    pub(in super::super) const OTHER_AXES: usize = FIRST_AXIS + CLASSES;
     /// Size, ratio and slant, by level of precision; slant by ratio as well.
-    pub(super) const SIZE: usize = OTHER_AXES + 3 * CLASSES * MAGNITUDES;
-    pub(super) const RATIO: usize = SIZE + LEVELS;
-    pub(super) const SLANT: usize = RATIO + LEVELS;
+    pub(in super::super) const SIZE: usize = OTHER_AXES + 3 * CLASSES * MAGNITUDES;
+    pub(in super::super) const RATIO: usize = SIZE + LEVELS;
+    pub(in super::super) const SLANT: usize = RATIO + LEVELS;
     /// Length of what exceeds the symbols.
-    pub(super) const EXCESS: usize = SLANT + LEVELS * RATIOS;
+    pub(in super::super) const EXCESS: usize = SLANT + LEVELS * RATIOS;
     /// How many of a few Gaussians are in the first part of a cell, by their number.
-    pub(super) const FEW: usize = EXCESS + 1;
+    pub(in super::super) const FEW: usize = EXCESS + 1;
     /// Which share of many, by the logarithm of their number.
-    pub(super) const MANY: usize = FEW + super::FEW;
+    pub(in super::super) const MANY: usize = FEW + super::FEW;
     /// All contexts.
-    pub(super) const COUNT: usize = MANY + 32;
+    pub(in super::super) const COUNT: usize = MANY + 32;
 }
 
 /// Classes of precision.
@@ -196,39 +196,37 @@ impl SetCoding<'_> {
         let mut code = self.attributes(coder, cell.level(), known);
         let fineness = self.lattice.fineness_of_position(code.class, self.lattice.cholesky(&code));
         let bits = cell.bits(fineness);
-        for axis in 0..2 {
+        code.center = core::array::from_fn(|axis| {
             let part = cell.part(axis, bits[axis], known.center[axis]);
             let part = plain(coder, bits[axis], part);
-            code.center[axis] = cell.middle(axis, bits[axis], part);
-        }
+            cell.middle(axis, bits[axis], part)
+        });
         code
     }
 
     /// Codes all but the centre.
     fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
-        let mut code = Code::default();
-        code.class = coder.symbol(context::CLASS, known.class);
-        if code.class > MAX_CLASS {
+        let mut class = coder.symbol(context::CLASS, known.class);
+        if class > MAX_CLASS {
             coder.refuse();
-            code.class = MAX_CLASS;
+            class = MAX_CLASS;
         }
-        let class = code.class as usize;
-        code.color = self.color(coder, class, known.color);
+        let color = self.color(coder, class as usize, known.color);
 
-        let shift = code.class.saturating_sub(LEVELS as u32 - 1);
-        let rank = class.min(LEVELS - 1);
-        let step = self.lattice.size * crate::lattice::fineness(code.class);
+        let shift = class.saturating_sub(LEVELS as u32 - 1);
+        let rank = (class as usize).min(LEVELS - 1);
+        let step = self.lattice.size * lattice::fineness(class);
         let expected = EXPECTED_SIZE[0] + EXPECTED_SIZE[1] * level as f32;
         let expected = (expected / step) as i32;
-        code.size = signed(coder, context::SIZE + rank, shift, known.size.wrapping_sub(expected))
-            .wrapping_add(expected);
-        code.ratio = signed(coder, context::RATIO + rank, shift, known.ratio);
+        let size = known.size.wrapping_sub(expected);
+        let size = signed(coder, context::SIZE + rank, shift, size).wrapping_add(expected);
+        let ratio = signed(coder, context::RATIO + rank, shift, known.ratio);
         // In steps of class 2, whatever the class.
-        let ratio =
-            if code.class < 2 { code.ratio << (2 - code.class) } else { code.ratio >> shift };
-        let kind = (ratio.div_euclid(3) + RATIOS as i32 / 2).clamp(0, RATIOS as i32 - 1) as usize;
-        code.slant = signed(coder, context::SLANT + rank * RATIOS + kind, shift, known.slant);
-        code
+        let coarse = if class < 2 { ratio << (2 - class) } else { ratio >> shift };
+        let kind = (coarse.div_euclid(3) + RATIOS as i32 / 2).clamp(0, RATIOS as i32 - 1);
+        let context = context::SLANT + rank * RATIOS + kind as usize;
+        let slant = signed(coder, context, shift, known.slant);
+        Code { class, color, size, ratio, slant, center: known.center }
     }
 
     /// Codes the colour axes: the first by its magnitude and sign, the others relative to that sign.

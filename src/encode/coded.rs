@@ -1,9 +1,12 @@
 //! From fitted Gaussians to a file of coding 1 that meets its target.
 
 use super::EncodeError;
+use super::budget::Budget;
+use super::control::Finished;
 use super::descent::Descent;
+use super::fit::Fit;
 use super::layout::Layout;
-use super::options::Target;
+use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE, Target};
 use super::patch;
 use super::progress::Observer;
 use super::raster::Raster;
@@ -15,7 +18,7 @@ use crate::limits::Limits;
 use crate::render::{Picture, RenderOptions};
 
 /// Bits that a Gaussian takes, about: what decides how many a size holds.
-pub(crate) const BITS_PER_GAUSSIAN: f64 = 35.0;
+pub(crate) const BITS_PER_GAUSSIAN: f64 = 31.0;
 /// The share of the error that is there before rounding.
 pub(crate) const SHARE_OF_FIT: f64 = 0.84;
 /// How often every code is looked at, when the steps are being sought and for the file.
@@ -23,12 +26,14 @@ const SCOUTING_PASSES: u32 = 2;
 const PASSES: u32 = 8;
 /// How often steps are tried.
 const MAX_TRIES: u32 = 5;
-/// The share of a size that is aimed at, and the least that will do.
-const AIMED: f64 = 0.996;
-const ENOUGH: f64 = 0.99;
-/// What is aimed at beyond a PSNR, and how much at most, in dB.
+/// How often a finished fit may be extended.
+const MAX_ROUNDS: u32 = 8;
+/// The share of a size that is aimed at.
+const SIZE_AIMED: f64 = 0.996;
+/// What is aimed at beyond a PSNR, in dB.
 const PSNR_AIMED: f64 = 0.02;
-const PSNR_TOLERANCE: f64 = 0.05;
+/// Steps that a lattice may have.
+const STEPS: (f64, f64) = (1e-4, 16.0);
 /// Steps of geometry that harm as much as a step of colour, for a Gaussian of amplitude 1: from
 /// integrals of the quartic kernel's derivatives.
 const POSITION: f32 = 1.25;
@@ -41,11 +46,89 @@ const LAMBDA: f32 = 0.322;
 /// The squared step of colour for a squared error of 1 per Gaussian.
 const STEP: f64 = 0.094;
 
+/// How many Gaussians a file of a size holds, about, up to `most`.
+pub(crate) fn count_for_size(
+    bytes: u64,
+    most: usize,
+    layout: &Layout<'_>,
+) -> Result<usize, EncodeError> {
+    let least = layout.write_set(&Coded::empty(layout.header().color)).len() as u64;
+    layout.check_size(bytes, least)?;
+    Ok((((bytes - least) * 8) as f64 / BITS_PER_GAUSSIAN).min(most as f64) as usize)
+}
+
+/// The file of a finished fit for the target.
+pub(crate) fn finish(
+    mut fit: Fit<'_>,
+    raster: &Raster,
+    layout: &Layout<'_>,
+    target: Target,
+    extension: u32,
+    observer: &mut Observer<'_>,
+) -> Result<Finished, EncodeError> {
+    if let Target::Psnr(psnr) = target {
+        extend(&mut fit, SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
+    }
+    let (gaussians, error, work) = (fit.gaussians(), fit.best_error(), fit.work());
+    // The descent needs the memory.
+    drop(fit);
+    let coded = Coder::new(raster, layout).encode(&gaussians, error, target, observer)?;
+    Ok(Finished { file: layout.write_set(&coded), work })
+}
+
+/// Extends a fit until its squared error is at most `error`, or nothing helps.
+fn extend(
+    fit: &mut Fit<'_>,
+    error: f64,
+    iterations: u32,
+    observer: &mut Observer<'_>,
+) -> Result<(), EncodeError> {
+    for _ in 0..MAX_ROUNDS {
+        let before = fit.len();
+        let wanted = Budget::Error(error).wanted(before, fit.best_error(), fit.most());
+        if fit.best_error() <= error || wanted <= before {
+            break;
+        }
+        fit.extend(wanted - before, iterations, observer)?;
+        if fit.len() == before {
+            break;
+        }
+    }
+    Ok(())
+}
+
 /// Gaussians on a lattice.
 #[derive(Clone, Debug)]
 pub(crate) struct Coded {
     pub(crate) lattice: Lattice,
     pub(crate) codes: Vec<Code>,
+}
+
+impl Coded {
+    fn empty(model: ColorModel) -> Self {
+        Self { lattice: lattice(1.0, model), codes: Vec::new() }
+    }
+}
+
+/// The lattice of a step of colour.
+fn lattice(step: f32, model: ColorModel) -> Lattice {
+    Lattice {
+        position: POSITION,
+        size: SIZE,
+        ratio: RATIO,
+        slant: SLANT,
+        color: vec![step; model.channels()],
+    }
+}
+
+/// How a trial went.
+#[derive(Clone, Copy, Debug)]
+struct Judgement {
+    /// 0 if the target is met; the less the better, and large where it is passed on the wrong
+    /// side.
+    miss: f64,
+    /// What to multiply the step by.
+    factor: f64,
 }
 
 /// What fitted Gaussians are coded for.
@@ -73,65 +156,82 @@ impl<'a> Coder<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Coded, EncodeError> {
         let mut step = (STEP * error / gaussians.len().max(1) as f64).sqrt();
-        let bytes = target.bytes(self.raster.pixels());
-        let mut passes = if bytes.is_some() { SCOUTING_PASSES } else { PASSES };
-        let mut coded = self.coded(gaussians, step as f32, passes, observer)?;
+        let steered = matches!(target, Target::Psnr(_)) || target.bytes(self.pixels()).is_some();
+        if steered {
+            let scout = self.coded(gaussians, step, SCOUTING_PASSES, observer)?;
+            step *= self.judged(&scout, target, error).factor;
+        }
+        let mut best: Option<(Coded, f64)> = None;
         for _ in 0..MAX_TRIES {
-            let next = match (bytes, target) {
-                (Some(bytes), _) => self.step_for_size(&coded, step, bytes),
-                (None, Target::Psnr(psnr)) => self.step_for_psnr(&coded, step, error, psnr),
-                _ => None,
-            };
-            match next {
-                Some(next) => step = next,
-                None if passes == PASSES => break,
-                None => {}
+            let coded = self.coded(gaussians, step, PASSES, observer)?;
+            let judgement = self.judged(&coded, target, error);
+            if best.as_ref().is_none_or(|(_, miss)| judgement.miss < *miss) {
+                best = Some((coded, judgement.miss));
             }
-            passes = PASSES;
-            coded = self.coded(gaussians, step as f32, passes, observer)?;
+            if judgement.miss == 0.0 {
+                break;
+            }
+            step *= judgement.factor;
+        }
+        let (mut coded, _) = best.expect("at least one was tried");
+        if let Some(bytes) = target.bytes(self.pixels()) {
+            self.shorten(&mut coded, bytes);
         }
         Ok(coded)
     }
 
-    /// The step that brings the file to a size; `None` if it is there.
-    fn step_for_size(&self, coded: &Coded, step: f64, bytes: u64) -> Option<f64> {
-        let size = self.layout.write_set(coded).len() as f64;
-        let wanted = bytes as f64;
-        let is_met = (ENOUGH * wanted..=wanted).contains(&size);
-        // Each of eight attributes takes a bit less when the step doubles.
-        let gaussians = coded.codes.len().max(1) as f64;
-        let factor = ((size - AIMED * wanted) / gaussians).clamp(-1.0, 1.0).exp2();
-        (!is_met).then_some(step * factor)
+    /// How far a trial is from the target, and by what to change its step.
+    fn judged(&self, coded: &Coded, target: Target, fit: f64) -> Judgement {
+        if let Some(bytes) = target.bytes(self.pixels()) {
+            let (size, wanted) = (self.layout.write_set(coded).len() as f64, bytes as f64);
+            // Each of eight attributes takes a bit less when the step doubles.
+            let gaussians = coded.codes.len().max(1) as f64;
+            let factor = ((size - SIZE_AIMED * wanted) / gaussians).clamp(-1.0, 1.0).exp2();
+            let miss = if size > wanted { size } else { (SIZE_TOLERANCE * wanted - size).max(0.0) };
+            return Judgement { miss, factor };
+        }
+        let Target::Psnr(psnr) = target else { return Judgement { miss: 0.0, factor: 1.0 } };
+        let error = self.rendered(coded).error();
+        let reached = 10.0 * (self.raster.error_of(0.0) / error).log10();
+        // What rounding adds grows with the square of the step.
+        let wanted = self.raster.error_of(psnr + PSNR_AIMED);
+        let least = 0.01 * wanted;
+        let factor = ((wanted - fit).max(least) / (error - fit).max(least)).sqrt();
+        let above = reached - psnr;
+        let miss = if above < 0.0 { 1e3 - above } else { (above - PSNR_TOLERANCE).max(0.0) };
+        Judgement { miss, factor: factor.clamp(0.25, 4.0) }
     }
 
-    /// The step that brings the picture to a PSNR; `None` if it is there.
-    fn step_for_psnr(&self, coded: &Coded, step: f64, fit: f64, psnr: f64) -> Option<f64> {
-        let samples = (self.raster.pixels() * self.raster.channels) as f64;
-        let error = self.rendered(coded).error();
-        let reached = 10.0 * (samples / error).log10();
-        let is_met = (psnr..=psnr + PSNR_TOLERANCE).contains(&reached);
-        let wanted =
-            samples * (-(psnr + PSNR_AIMED) / 10.0).exp2().powf(core::f64::consts::LOG2_10);
-        // What rounding adds grows with the square of the step.
-        let factor = ((wanted - fit).max(0.01 * wanted) / (error - fit).max(0.01 * wanted)).sqrt();
-        (!is_met).then_some(step * factor.clamp(0.25, 4.0))
+    /// Removes the weakest Gaussians until the file has at most `bytes`.
+    fn shorten(&self, coded: &mut Coded, bytes: u64) {
+        loop {
+            let size = self.layout.write_set(coded).len() as u64;
+            let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else { break };
+            let strength = |code: &Code| {
+                let squares = code.color.iter().map(|&c| i64::from(c) * i64::from(c));
+                squares.sum::<i64>()
+            };
+            // Four bytes a Gaussian, and at least one.
+            let count = excess.div_ceil(4).min(coded.codes.len() as u64) as usize;
+            coded.codes.sort_by_key(|code| core::cmp::Reverse(strength(code)));
+            coded.codes.truncate(coded.codes.len() - count);
+        }
+    }
+
+    fn pixels(&self) -> usize {
+        self.raster.pixels()
     }
 
     /// Rounds `gaussians` to the lattice of a step, and descends from there.
     fn coded(
         &self,
         gaussians: &[Gaussian],
-        step: f32,
+        step: f64,
         passes: u32,
         observer: &mut Observer<'_>,
     ) -> Result<Coded, EncodeError> {
-        let lattice = Lattice {
-            position: POSITION,
-            size: SIZE,
-            ratio: RATIO,
-            slant: SLANT,
-            color: vec![step; self.model.channels()],
-        };
+        let step = step.clamp(STEPS.0, STEPS.1) as f32;
+        let lattice = lattice(step, self.model);
         let codes = gaussians.iter().map(|gaussian| {
             let class = class_of(gaussian, step, self.model);
             lattice.code(gaussian, class, &self.grid, self.model)

@@ -148,8 +148,7 @@ impl Descent<'_> {
             return None;
         }
         let units = lattice.color_units(&code);
-        for axis in 0..self.coding.channels {
-            let unit = units[axis];
+        for (axis, &unit) in units.iter().enumerate().take(self.coding.channels) {
             let best = code.color[axis] as f32 - change.by_axis[axis] / (change.weight * unit);
             let best = best.clamp(-30_000.0, 30_000.0);
             // By what the error grows for a unit beside the best value.

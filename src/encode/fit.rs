@@ -4,6 +4,7 @@ use glam::Vec2;
 use rayon::prelude::*;
 
 use super::budget::Budget;
+use super::control::Work;
 use super::densify::{Site, USELESS_COLOR};
 use super::gradient::Pass;
 use super::lsq::{Quantizers, StepGradients};
@@ -43,9 +44,7 @@ pub(crate) struct Fit<'a> {
     splats: Vec<Splat>,
     /// Sum of squared errors of the last pass.
     error: f64,
-    pub(crate) iterations: u32,
-    pub(crate) evaluations: u64,
-    pub(crate) peak_memory: usize,
+    work: Work,
     rng: fastrand::Rng,
 }
 
@@ -91,9 +90,7 @@ impl<'a> Fit<'a> {
             binned_for: 0,
             splats: Vec::new(),
             error: 0.0,
-            iterations: 0,
-            evaluations: 0,
-            peak_memory: 0,
+            work: Work { iterations: 0, evaluations: 0, peak_memory: 0 },
             rng: fastrand::Rng::with_seed(seed),
         }
     }
@@ -146,7 +143,7 @@ impl<'a> Fit<'a> {
         }
         self.forward(observer)?;
         self.grow(count, observer)?;
-        let total = self.iterations + iterations;
+        let total = self.work.iterations + iterations;
         for iteration in 0..iterations {
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
             self.iterate(factor, total, true, observer)?;
@@ -181,6 +178,11 @@ impl<'a> Fit<'a> {
     /// The squared error of the best Gaussians.
     pub(crate) fn best_error(&self) -> f64 {
         self.best.as_ref().map_or(self.error, |best| best.error)
+    }
+
+    /// What training has taken so far.
+    pub(crate) fn work(&self) -> Work {
+        self.work
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -224,15 +226,15 @@ impl<'a> Fit<'a> {
             self.remember();
         }
         observer.tell(Progress {
-            iteration: self.iterations,
+            iteration: self.work.iterations,
             iterations,
             gaussians: self.parameters.len() as u32,
             psnr: self.psnr(),
         })?;
-        self.iterations += 1;
+        self.work.iterations += 1;
         self.step(factor);
         let memory = self.memory();
-        self.peak_memory = self.peak_memory.max(memory);
+        self.work.peak_memory = self.work.peak_memory.max(memory);
         Ok(())
     }
 
@@ -258,7 +260,7 @@ impl<'a> Fit<'a> {
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
-        self.evaluations += self.pass.evaluations();
+        self.work.evaluations += self.pass.evaluations();
         self.error = self.pass.run(self.raster, &self.splats, kernel, self.base, observer)?;
         Ok(())
     }

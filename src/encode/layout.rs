@@ -1,5 +1,6 @@
 //! Fitted Gaussians to a file: order, layers, chunks (spec, sections 4 to 7).
 
+use super::EncodeError;
 use super::coded::Coded;
 use super::fit::Fitted;
 use super::source::Source;
@@ -110,6 +111,16 @@ impl<'a> Layout<'a> {
         }
         write_chunk(&mut file, ChunkType::GEND, &[]);
         file
+    }
+
+    /// Refuses a size that is less than a file takes without any Gaussian.
+    pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), EncodeError> {
+        if bytes < least {
+            return Err(EncodeError::Option(format!(
+                "a size of {bytes} bytes; this picture takes at least {least} without any Gaussian"
+            )));
+        }
+        Ok(())
     }
 
     /// The bytes of a file without any Gaussian.

@@ -13,6 +13,7 @@ mod layout;
 mod lsq;
 mod optimizer;
 mod options;
+mod packed;
 mod patch;
 mod plan;
 mod progress;
@@ -76,7 +77,7 @@ impl Encoder {
         Self {
             target: Target::default(),
             effort: 5,
-            precision: Precision::Packed,
+            precision: Precision::Coded,
             seed: 0,
             threads: None,
             metadata: Metadata::default(),
@@ -157,12 +158,12 @@ impl Encoder {
             bytes: outcome.file,
             report: Report {
                 gaussians: outcome.gaussians,
-                psnr: outcome.psnr,
-                psnr_float: outcome.psnr_float,
-                iterations: outcome.iterations,
-                evaluations: outcome.evaluations,
+                psnr: outcome.distortion.psnr,
+                psnr_float: outcome.distortion.psnr_float,
+                iterations: outcome.work.iterations,
+                evaluations: outcome.work.evaluations,
                 seconds: start.elapsed().as_secs_f64(),
-                peak_memory: outcome.peak_memory,
+                peak_memory: outcome.work.peak_memory as u64,
                 shortfall: outcome.shortfall,
             },
         })

@@ -22,6 +22,10 @@ pub enum Target {
     Quality(f64),
 }
 
+/// By how much a PSNR may exceed its target, in dB.
+pub(crate) const PSNR_TOLERANCE: f64 = 0.05;
+/// The least share of a size that a file must fill.
+pub(crate) const SIZE_TOLERANCE: f64 = 0.99;
 /// Most Gaussians that an encoder writes: as many as a decoder accepts by default.
 pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
 

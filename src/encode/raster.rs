@@ -72,6 +72,11 @@ impl Raster {
         sums.map(|sum| (sum as f64 / full) as f32)
     }
 
+    /// The sum of squared errors of a PSNR in dB, a full sample being 1.
+    pub(crate) fn error_of(&self, psnr: f64) -> f64 {
+        (self.pixels() * self.channels) as f64 * 10_f64.powf(-psnr / 10.0)
+    }
+
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
     }

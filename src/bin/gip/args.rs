@@ -62,7 +62,7 @@ pub(crate) struct Encode {
           value_parser = clap::value_parser!(u8).range(1..=9))]
     pub(crate) effort: u8,
     /// How the Gaussians are stored.
-    #[arg(long, value_enum, default_value_t = PrecisionArg::Packed)]
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Coded)]
     pub(crate) precision: PrecisionArg,
     /// Seed of everything random; the same picture, options and seed give the same file.
     #[arg(long, value_name = "S", default_value_t = 0)]

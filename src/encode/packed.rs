@@ -1,0 +1,159 @@
+//! From a fit to a file of coding 0 that meets its target.
+
+use super::budget::Budget;
+use super::control::Finished;
+use super::fit::{Fit, Fitted};
+use super::layout::{Layout, layers_length};
+use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE};
+use super::progress::Observer;
+use super::source::Source;
+use super::training::Training;
+use super::verify::Verified;
+use super::{EncodeError, Precision, Target};
+use crate::quantizer::{Quantizer, Steps};
+
+/// How often a finished fit may be extended to meet its target.
+const MAX_ROUNDS: u32 = 8;
+/// How many single Gaussians are tried without.
+const MAX_TRIALS: usize = 64;
+
+/// How many Gaussians a file of a size holds, up to `most`.
+pub(crate) fn count_for_size(
+    bytes: u64,
+    most: usize,
+    precision: Precision,
+    training: &Training,
+    channels: usize,
+    layout: &Layout<'_>,
+) -> Result<usize, EncodeError> {
+    let quantizers = quantizers(precision, training, channels);
+    let least = layout.least_length(&quantizers);
+    layout.check_size(bytes, least)?;
+    let fits = |count: usize| least + layers_length(&quantizers, count) <= bytes;
+    let (mut low, mut high) = (0, most + 1);
+    while high - low > 1 {
+        let middle = usize::midpoint(low, high);
+        if fits(middle) { low = middle } else { high = middle }
+    }
+    Ok(low)
+}
+
+/// The file of a finished fit, which is extended or trimmed to the target.
+pub(crate) fn finish(
+    mut fit: Fit<'_>,
+    layout: &Layout<'_>,
+    target: Target,
+    budget: Budget,
+    extension: u32,
+    source: &Source<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Finished, EncodeError> {
+    let mut file = layout.write(&fit.fitted());
+    for _ in 0..MAX_ROUNDS {
+        let more = missing(target, budget, &file, source, &fit, observer)?;
+        let more = more.min(fit.most().saturating_sub(fit.len()));
+        if more == 0 {
+            break;
+        }
+        let before = fit.len();
+        fit.extend(more, extension, observer)?;
+        file = layout.write(&fit.fitted());
+        if fit.len() == before {
+            // There is nothing left to correct.
+            break;
+        }
+    }
+    if let Target::Psnr(target) = target {
+        file = trimmed(layout, layout.ordered(&fit.fitted()), file, source, target, observer)?;
+    }
+    Ok(Finished { file, work: fit.work() })
+}
+
+/// Quantizers of the depths that a file will have.
+fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec<Quantizer> {
+    let depths = &training.quantization;
+    let packed = |bits| Quantizer::Linear(Steps { bits, scale: 1.0, offset: 0.0 });
+    (0..5 + channels)
+        .map(|component| match (precision, component) {
+            (Precision::Float, _) => Quantizer::Float,
+            (_, 0 | 1) => packed(depths.position_bits),
+            (_, 2..5) => packed(depths.shape_bits),
+            (_, _) => packed(depths.color_bits),
+        })
+        .collect()
+}
+
+/// How many Gaussians a finished fit still needs for its target.
+fn missing(
+    target: Target,
+    budget: Budget,
+    file: &[u8],
+    source: &Source<'_>,
+    fit: &Fit<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<usize, EncodeError> {
+    Ok(match (target, budget) {
+        (Target::Psnr(target), _) => {
+            let psnr = Verified::new(file, source).distortion(u32::MAX, observer)?.psnr;
+            // A decibel takes somewhat less than 0.3 times as many Gaussians again.
+            if psnr >= target {
+                0
+            } else {
+                (fit.len() as f64 * 0.3 * (target - psnr)).ceil() as usize
+            }
+        }
+        // Pruning may have left a file too small.
+        (Target::Bytes(_) | Target::BitsPerPixel(_), Budget::Count(count))
+            if (fit.len() as f64) < count as f64 * (1.0 + SIZE_TOLERANCE) / 2.0 =>
+        {
+            count.saturating_sub(fit.len())
+        }
+        _ => 0,
+    })
+}
+
+/// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
+/// those that are not needed among the last ones, where one Gaussian is worth more than the
+/// tolerance. The file as it is if it falls short.
+fn trimmed(
+    layout: &Layout<'_>,
+    mut fitted: Fitted,
+    mut file: Vec<u8>,
+    source: &Source<'_>,
+    target: f64,
+    observer: &mut Observer<'_>,
+) -> Result<Vec<u8>, EncodeError> {
+    let fewest = least_prefix(&Verified::new(&file, source), target, observer)?;
+    fitted.codes.truncate(fewest as usize);
+    file = layout.write(&fitted);
+    let mut psnr = Verified::new(&file, source).distortion(u32::MAX, observer)?.psnr;
+    for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
+        if psnr <= target + PSNR_TOLERANCE {
+            break;
+        }
+        let mut fewer = fitted.clone();
+        fewer.codes.remove(index);
+        let trial = layout.write(&fewer);
+        let reached = Verified::new(&trial, source).distortion(u32::MAX, observer)?.psnr;
+        if reached >= target {
+            (fitted, file, psnr) = (fewer, trial, reached);
+        }
+    }
+    Ok(file)
+}
+
+/// The fewest of the file's first Gaussians that reach `target`; all of them if none do.
+fn least_prefix(
+    verified: &Verified<'_>,
+    target: f64,
+    observer: &mut Observer<'_>,
+) -> Result<u32, EncodeError> {
+    let mut reaches = |count| Ok(verified.distortion(count, observer)?.psnr >= target);
+    let (mut short, mut enough) = (0, verified.gaussians());
+    // Nearly monotone, and whatever this ends on was seen to be enough.
+    while enough - short > 1 {
+        let middle = u32::midpoint(short, enough);
+        if reaches(middle)? { enough = middle } else { short = middle }
+    }
+    Ok(if reaches(short)? { short } else { enough })
+}
