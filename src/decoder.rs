@@ -3,6 +3,7 @@
 
 use alloc::vec::Vec;
 
+use crate::coding::account::AttributeBits;
 use crate::coding::fixed::LayerReader;
 use crate::coding::set::{Models, SetCoding};
 use crate::container::{ChunkType, Coding, Event, Header, Metadata, Parser};
@@ -53,6 +54,8 @@ pub struct StreamDecoder {
     lattice: Option<(Lattice, Models)>,
     metadata: Metadata,
     gaussians: Vec<Gaussian>,
+    /// Bits of the Gaussians of coding 1, where asked for.
+    account: Option<AttributeBits>,
     layers: u16,
     chunks: Vec<ChunkStatistics>,
 }
@@ -116,9 +119,37 @@ impl StreamDecoder {
             lattice: None,
             metadata: Metadata::default(),
             gaussians: Vec::new(),
+            account: None,
             layers: 0,
             chunks: Vec::new(),
         }
+    }
+
+    /// Keeps account of what bits are spent on, from here on. Takes time for every symbol.
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn with_account(mut self) -> Self {
+        self.account = Some(AttributeBits::default());
+        self
+    }
+
+    /// Bits of the Gaussians that have arrived, by attribute; `None` where the decoder was to keep
+    /// no account of them ([`StreamDecoder::with_account`]).
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn attribute_bits(&self) -> Option<AttributeBits> {
+        let account = self.account?;
+        let of = |components: core::ops::Range<usize>| {
+            let quantizers = self.quantizers.get(components).unwrap_or(&[]);
+            let bits = quantizers.iter().map(|quantizer| f64::from(quantizer.bits())).sum::<f64>();
+            bits * self.gaussians.len() as f64
+        };
+        Some(AttributeBits {
+            position: account.position + of(0..2),
+            shape: account.shape + of(2..5),
+            color: account.color + of(5..self.quantizers.len().max(5)),
+            ..account
+        })
     }
 
     /// Replaces the limits, for what is still to be read and for rendering.
@@ -180,6 +211,13 @@ impl StreamDecoder {
     #[must_use]
     pub fn quantizers(&self) -> &[Quantizer] {
         &self.quantizers
+    }
+
+    /// The steps of [`Coding::Set`]: of position, size, ratio and slant, then of each colour axis
+    /// (spec, section 7.5). Empty until they have arrived, and with [`Coding::Fixed`].
+    #[must_use]
+    pub fn steps(&self) -> Vec<f32> {
+        self.lattice.as_ref().map_or_else(Vec::new, |(lattice, _)| lattice.steps())
     }
 
     /// The metadata that has arrived. All of it stands before the first Gaussian.
@@ -358,10 +396,11 @@ impl StreamDecoder {
         let before = self.gaussians.len();
         let allowed = header.gaussians - before as u32;
         let gaussians = &mut self.gaussians;
-        let outcome = coding.read(payload, allowed, models, |code| {
-            grow(gaussians, 1, header.gaussians as usize);
-            gaussians.push(lattice.gaussian(&code, &grid, header.color));
-        });
+        let outcome =
+            coding.read(payload, allowed, models, self.account.as_mut(), |code, shape| {
+                grow(gaussians, 1, header.gaussians as usize);
+                gaussians.push(lattice.gaussian(&code, shape, &grid, header.color));
+            });
         if outcome.is_err() {
             self.gaussians.truncate(before);
         }

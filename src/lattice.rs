@@ -49,6 +49,14 @@ pub(crate) struct Code {
     pub(crate) center: [u32; 2],
 }
 
+/// The shape of a Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    /// Geometric mean of l11 and l22.
+    pub(crate) size: f32,
+    pub(crate) cholesky: [f32; 3],
+}
+
 /// The steps of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lattice {
@@ -76,31 +84,33 @@ impl Lattice {
         Ok(Self { position, size, ratio, slant, color: steps[GEOMETRY..].to_vec() })
     }
 
+    /// All steps: position, size, ratio, slant, colour axes.
+    pub(crate) fn steps(&self) -> Vec<f32> {
+        let geometry = [self.position, self.size, self.ratio, self.slant];
+        geometry.iter().chain(&self.color).copied().collect()
+    }
+
     /// The payload of `QNTZ`.
     #[cfg(feature = "encode")]
     pub(crate) fn to_payload(&self) -> Vec<u8> {
-        let geometry = [self.position, self.size, self.ratio, self.slant];
-        geometry.iter().chain(&self.color).flat_map(|step| step.to_le_bytes()).collect()
+        self.steps().into_iter().flat_map(f32::to_le_bytes).collect()
     }
 
-    /// Exponentials of size and ratio, and the Cholesky factor.
-    fn extent(&self, code: &Code) -> (f32, [f32; 3]) {
+    /// The shape that a code stands for.
+    pub(crate) fn shape(&self, code: &Code) -> Shape {
         let fine = fineness(code.class);
         let exp = |code: i32, step: f32| {
             math::exp((code as f32 * (step * fine)).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
         };
         let (size, ratio) = (exp(code.size, self.size), exp(code.ratio, self.ratio));
         let (l11, l22) = (size * ratio, size / ratio);
-        (size, [l11, code.slant as f32 * (self.slant * fine) * l22, l22])
-    }
-
-    /// The Cholesky factor that a code stands for.
-    pub(crate) fn cholesky(&self, code: &Code) -> [f32; 3] {
-        self.extent(code).1
+        let l21 = code.slant as f32 * (self.slant * fine) * l22;
+        Shape { size, cholesky: [l11, l21, l22] }
     }
 
     /// How fine the position is along x and y: cells are 2^-n pixels wide.
-    pub(crate) fn fineness_of_position(&self, class: u32, [l11, _, l22]: [f32; 3]) -> [i32; 2] {
+    pub(crate) fn fineness_of_position(&self, class: u32, shape: &Shape) -> [i32; 2] {
+        let [l11, _, l22] = shape.cholesky;
         [l11, l22].map(|extent| {
             // The nearest power of two, from the exponent of the number.
             let step = self.position * fineness(class) * extent * core::f32::consts::SQRT_2;
@@ -109,9 +119,15 @@ impl Lattice {
         })
     }
 
-    /// The Gaussian that a code stands for.
-    pub(crate) fn gaussian(&self, code: &Code, grid: &Grid, model: ColorModel) -> Gaussian {
-        let (size, cholesky) = self.extent(code);
+    /// The Gaussian that a code and its shape stand for.
+    pub(crate) fn gaussian(
+        &self,
+        code: &Code,
+        shape: &Shape,
+        grid: &Grid,
+        model: ColorModel,
+    ) -> Gaussian {
+        let Shape { size, cholesky } = *shape;
         let mut axes = [0.0; 4];
         for ((axis, &code), &step) in axes.iter_mut().zip(&code.color).zip(&self.color) {
             *axis = code as f32 * (step / size);
@@ -140,12 +156,11 @@ impl Lattice {
         let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio * fine) as i32;
         let mut code = Code { class, size, ratio, ..Code::default() };
         // With L (1 + D) for the rounded factor, the slant is to make D21 zero.
-        let [c11, _, c22] = self.cholesky(&code);
+        let Shape { size, cholesky: [c11, _, c22] } = self.shape(&code);
         let slant = l21 / l22 * (1.0 + (c11 / l11).ln() - (c22 / l22).ln());
         code.slant = nearest(slant, self.slant * fine) as i32;
         code.center = self.placed(&code, gaussian.center, grid);
         let axes = to_axes(gaussian.color, model);
-        let (size, _) = self.extent(&code);
         for ((code, axis), step) in code.color.iter_mut().zip(axes).zip(&self.color) {
             *code = nearest(axis * size, *step) as i32;
         }
@@ -155,8 +170,9 @@ impl Lattice {
     /// What stands for a point with a code's precision; an error along x is followed along the
     /// Gaussian's slant.
     pub(crate) fn placed(&self, code: &Code, [x, y]: [f32; 2], grid: &Grid) -> [u32; 2] {
-        let [l11, l21, l22] = self.cholesky(code);
-        let fineness = self.fineness_of_position(code.class, [l11, l21, l22]);
+        let shape = self.shape(code);
+        let [l11, l21, _] = shape.cholesky;
+        let fineness = self.fineness_of_position(code.class, &shape);
         let column = grid.snapped(grid.units([x, y])[0], fineness[0]);
         let error = grid.center([column, 0])[0] - x;
         let row = grid.snapped(grid.units([x, y + l21 / l11 * error])[1], fineness[1]);
@@ -165,7 +181,7 @@ impl Lattice {
 
     /// The amplitudes along the colour axes that a unit of a code stands for.
     pub(crate) fn color_units(&self, code: &Code) -> [f32; 4] {
-        let (size, _) = self.extent(code);
+        let Shape { size, .. } = self.shape(code);
         let mut units = [0.0; 4];
         for (unit, step) in units.iter_mut().zip(&self.color) {
             *unit = step / size;
@@ -181,7 +197,7 @@ impl Lattice {
         forward: bool,
         grid: &Grid,
     ) -> Option<Code> {
-        let fineness = self.fineness_of_position(code.class, self.cholesky(code))[axis];
+        let fineness = self.fineness_of_position(code.class, &self.shape(code))[axis];
         let step = 1 << grid.cell_bits(fineness);
         let center = code.center[axis];
         let center = if forward { center.checked_add(step)? } else { center.checked_sub(step)? };

@@ -99,8 +99,9 @@ pub use crate::image::GipEncoder;
 #[cfg(feature = "image")]
 pub use crate::image::{GipDecoder, register};
 #[cfg(feature = "decode")]
-pub use color::{ColorModel, SampleDepth};
+pub use coding::account::AttributeBits;
 #[cfg(feature = "decode")]
+pub use color::{ColorModel, SampleDepth};
 pub use container::{ChunkType, Coding, Header, Metadata, Text};
 #[cfg(all(feature = "decode", feature = "std"))]
 pub use decoder::Decoder;

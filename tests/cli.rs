@@ -143,13 +143,28 @@ fn encode_info_decode_compare() {
     let chunks = info["chunks"].as_array().expect("an array");
     let sum: u64 = chunks.iter().map(|c| c["bytes"].as_u64().expect("a number")).sum();
     assert_eq!(sum + 8, bytes, "the chunks and the signature are the whole file");
+    assert_eq!(info["coding"], "set");
+    assert_eq!(info["steps"].as_array().expect("an array").len(), 7);
+    let bits = |info: &Value, names: &[&str]| -> f64 {
+        let bits = &info["bits_per_gaussian"];
+        names.iter().map(|&name| bits[name].as_f64().expect("a number")).sum()
+    };
+    let attributes = ["position", "precision", "shape", "color"];
+    let total = bits(&info, &["total"]);
+    assert!((bits(&info, &attributes) - total).abs() < 1e-9);
+    // All but the framing, the count and the rounding of the last word.
+    let framing = (bits(&info, &["coded"]) - total) * report["gaussians"].as_f64().expect("some");
+    assert!((128.0..128.0 + 64.0).contains(&framing), "{framing}");
+
+    let packed = ["--gaussians", "30", "--effort", "1", "--precision", "packed"];
+    room.ok(&[&["encode", "a.png", "p.gip"], &packed[..]].concat());
+    let info = room.json(&["info", "p.gip", "--json"]);
+    assert_eq!(info["coding"], "fixed");
     let components = info["components"].as_array().expect("an array");
     assert_eq!(components.len(), 8);
     let sum: u64 = components.iter().map(|c| c["bits"].as_u64().expect("a number")).sum();
-    let bits = &info["bits_per_gaussian"];
-    assert_eq!(bits["total"], sum);
-    let by_attribute = ["position", "shape", "color"].map(|name| bits[name].as_u64().unwrap());
-    assert_eq!(by_attribute.iter().sum::<u64>(), sum);
+    assert_eq!(bits(&info, &["total"]), sum as f64);
+    assert_eq!(bits(&info, &attributes), sum as f64);
 
     room.ok(&["decode", "a.gip", "b.png"]);
     let decoded = open(&room.path("b.png"));

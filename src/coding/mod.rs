@@ -1,5 +1,6 @@
 //! Symbols to bytes and back (spec, section 7).
 
+pub(crate) mod account;
 mod bits;
 pub(crate) mod fixed;
 mod rans;

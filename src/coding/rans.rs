@@ -21,26 +21,44 @@ const SLOWER_AFTER: [u8; 2] = [32, 96];
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Model {
     /// The shares of all symbols before each one, summed up: the first is 0.
-    starts: [u16; SYMBOLS],
+    starts: [i16; SYMBOLS],
     seen: u8,
 }
 
+/// Where the shares would start if only one symbol ever came, with one share for each other.
+const TARGETS: [[i16; SYMBOLS]; SYMBOLS] = {
+    let mut targets = [[0; SYMBOLS]; SYMBOLS];
+    let mut symbol = 0;
+    while symbol < SYMBOLS {
+        let mut index = 0;
+        while index < SYMBOLS {
+            let rest = if index > symbol { (1 << SCALE_BITS) - SYMBOLS } else { 0 };
+            targets[symbol][index] = (rest + index) as i16;
+            index += 1;
+        }
+        symbol += 1;
+    }
+    targets
+};
+
 impl Model {
     /// A model that expects what its `starts` say: increasing from 0, all below 2^15.
-    pub(crate) const fn new(starts: [u16; SYMBOLS]) -> Self {
+    pub(crate) const fn new(starts: [i16; SYMBOLS]) -> Self {
         Self { starts, seen: 0 }
     }
 
     /// The first of the shares that stand for a symbol, and how many they are.
     fn share(&self, symbol: usize) -> (u32, u32) {
-        let start = u32::from(self.starts[symbol]);
-        let end = self.starts.get(symbol + 1).map_or(1 << SCALE_BITS, |&end| u32::from(end));
+        let start = self.starts[symbol] as u32;
+        let end = self.starts.get(symbol + 1).map_or(1 << SCALE_BITS, |&end| end as u32);
         (start, end - start)
     }
 
     /// The symbol that one of the shares stands for.
     fn symbol_at(&self, share: u32) -> usize {
-        self.starts[1..].iter().map(|&start| usize::from(u32::from(start) <= share)).sum()
+        // All at once rather than one by one: this is vector code.
+        let share = share as i16;
+        self.starts.iter().map(|&start| i16::from(start <= share)).sum::<i16>() as usize - 1
     }
 
     /// Learns from a symbol. Every symbol keeps a share.
@@ -48,16 +66,13 @@ impl Model {
         let rate =
             FIRST_RATE + SLOWER_AFTER.map(|after| u8::from(self.seen >= after)).iter().sum::<u8>();
         self.seen = self.seen.saturating_add(1);
-        for (index, start) in self.starts.iter_mut().enumerate() {
-            // Where it would stand if only this symbol ever came, with one share for each other.
-            let rest = if index > symbol { (1 << SCALE_BITS) - SYMBOLS as i32 } else { 0 };
-            let target = rest + index as i32;
-            *start = (i32::from(*start) + ((target - i32::from(*start)) >> rate)) as u16;
+        for (start, target) in self.starts.iter_mut().zip(&TARGETS[symbol]) {
+            *start += (target - *start) >> rate;
         }
     }
 
     /// What each symbol costs, in bits.
-    #[cfg(feature = "encode")]
+    #[cfg(feature = "std")]
     pub(crate) fn costs(&self) -> [f32; SYMBOLS] {
         core::array::from_fn(|symbol| SCALE_BITS as f32 - (self.share(symbol).1 as f32).log2())
     }
@@ -75,6 +90,18 @@ pub(crate) trait Coder {
 
     /// Notes that what was coded has no meaning.
     fn refuse(&mut self);
+
+    /// Notes what is coded from here on.
+    fn begin(&mut self, _: Attribute) {}
+}
+
+/// What a Gaussian's bits are for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Attribute {
+    Position,
+    Precision,
+    Shape,
+    Color,
 }
 
 /// Reads what an [`Encoder`] wrote. Whether the bytes were sound is known at the end.
@@ -119,6 +146,14 @@ impl<'a> Decoder<'a> {
         if self.state < LEAST_STATE {
             self.state = self.state << 16 | self.word();
         }
+    }
+}
+
+#[cfg(feature = "std")]
+impl Decoder<'_> {
+    /// What the symbols of a context cost now, in bits.
+    pub(crate) fn costs(&self, context: usize) -> [f32; SYMBOLS] {
+        self.models[context].costs()
     }
 }
 
@@ -239,7 +274,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn flat() -> Model {
-        Model::new(core::array::from_fn(|index| (index * 2048) as u16))
+        Model::new(core::array::from_fn(|index| (index * 2048) as i16))
     }
 
     /// What is coded in a test: a symbol by one of several models, or bits.

@@ -5,15 +5,18 @@ use core::ops::Range;
 
 use alloc::vec::Vec;
 
+#[cfg(feature = "std")]
+use super::account::Accounting;
+use super::account::AttributeBits;
 #[cfg(feature = "encode")]
 use super::rans::Cost;
 #[cfg(feature = "encode")]
 pub(crate) use super::rans::Costs;
-use super::rans::{Coder, Decoder, MAX_BITS, Model, SYMBOLS};
+use super::rans::{Attribute, Coder, Decoder, MAX_BITS, Model, SYMBOLS};
 use super::tables;
 use crate::container::ChunkType;
 use crate::error::DecodeError;
-use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS};
+use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS, Shape};
 
 /// Bytes of payload before the coded Gaussians: how many they are.
 pub(crate) const LAYER_PREFIX: usize = 4;
@@ -90,7 +93,7 @@ trait Members {
     /// What is known of one.
     fn get(&self, index: usize) -> Code;
     /// What was coded of one; they come in order.
-    fn set(&mut self, index: usize, code: Code, cell: &Cell);
+    fn set(&mut self, index: usize, code: Code, shape: &Shape, cell: &Cell);
 }
 
 /// What a layer is coded with.
@@ -102,13 +105,16 @@ pub(crate) struct SetCoding<'a> {
 }
 
 impl SetCoding<'_> {
-    /// Reads a layer of at most `allowed` Gaussians and hands over their codes in order.
+    /// Reads a layer of at most `allowed` Gaussians and hands over their codes in order. Adds to an
+    /// account, if there is one.
+    #[cfg_attr(not(feature = "std"), expect(clippy::needless_pass_by_value))]
     pub(crate) fn read(
         &self,
         payload: &[u8],
         allowed: u32,
         models: &mut Models,
-        receive: impl FnMut(Code),
+        account: Option<&mut AttributeBits>,
+        receive: impl FnMut(Code, &Shape),
     ) -> Result<(), DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(ChunkType::GAUS, reason));
         let Some((prefix, bytes)) = payload.split_first_chunk::<LAYER_PREFIX>() else {
@@ -125,11 +131,17 @@ impl SetCoding<'_> {
             return malformed("too short for its number of Gaussians");
         }
         let mut decoder = Decoder::new(bytes, &mut models.0);
-        self.walk(&mut decoder, count as usize, &mut Unknown(receive));
-        if !decoder.is_complete() {
-            return malformed("the coded Gaussians do not add up");
+        let (count, mut members) = (count as usize, Unknown(receive));
+        #[cfg(feature = "std")]
+        if let Some(account) = account {
+            let mut accounting = Accounting::new(decoder, account);
+            self.walk(&mut accounting, count, &mut members);
+            return checked(&accounting.into_decoder());
         }
-        Ok(())
+        #[cfg(not(feature = "std"))]
+        let _ = account;
+        self.walk(&mut decoder, count, &mut members);
+        checked(&decoder)
     }
 
     /// The payload of a layer; sorts `codes` as the file has them, and rounds their centres to
@@ -154,8 +166,8 @@ impl SetCoding<'_> {
     pub(crate) fn cost(&self, code: Code, level: u32, costs: &Costs) -> f32 {
         let mut cost = Cost { costs, bits: 0.0 };
         self.attributes(&mut cost, level, code);
-        let cholesky = self.lattice.cholesky(&code);
-        let fineness = self.lattice.fineness_of_position(code.class, cholesky);
+        let shape = self.lattice.shape(&code);
+        let fineness = self.lattice.fineness_of_position(code.class, &shape);
         // Cells are square, or twice as high as wide.
         let pixels = [level / 2, level.div_ceil(2)].map(|pixels| pixels as i32);
         let bits = pixels.iter().zip(fineness).map(|(&pixels, fine)| (pixels + fine).max(0));
@@ -165,6 +177,7 @@ impl SetCoding<'_> {
     /// Walks through the tree of cells, first parts first, and codes every Gaussian in the cell
     /// that it has for itself.
     fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {
+        coder.begin(Attribute::Position);
         let mut cells = alloc::vec![(self.grid.whole(), 0..count)];
         while let Some((cell, range)) = cells.pop() {
             let is_split = range.len() > 1 || !self.grid.is_within_root(&cell);
@@ -183,8 +196,8 @@ impl SetCoding<'_> {
                 }
                 None => {
                     for index in range {
-                        let code = self.gaussian(coder, &cell, members.get(index));
-                        members.set(index, code, &cell);
+                        let (code, shape) = self.gaussian(coder, &cell, members.get(index));
+                        members.set(index, code, &shape, &cell);
                     }
                 }
             }
@@ -192,26 +205,31 @@ impl SetCoding<'_> {
     }
 
     /// Codes a Gaussian within a cell.
-    pub(crate) fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> Code {
+    fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> (Code, Shape) {
         let mut code = self.attributes(coder, cell.level(), known);
-        let fineness = self.lattice.fineness_of_position(code.class, self.lattice.cholesky(&code));
+        let shape = self.lattice.shape(&code);
+        let fineness = self.lattice.fineness_of_position(code.class, &shape);
+        coder.begin(Attribute::Position);
         let bits = cell.bits(fineness);
         code.center = core::array::from_fn(|axis| {
             let part = cell.part(axis, bits[axis], known.center[axis]);
             let part = plain(coder, bits[axis], part);
             cell.middle(axis, bits[axis], part)
         });
-        code
+        (code, shape)
     }
 
     /// Codes all but the centre.
     fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
+        coder.begin(Attribute::Precision);
         let mut class = coder.symbol(context::CLASS, known.class);
         if class > MAX_CLASS {
             coder.refuse();
             class = MAX_CLASS;
         }
+        coder.begin(Attribute::Color);
         let color = self.color(coder, class as usize, known.color);
+        coder.begin(Attribute::Shape);
 
         let shift = class.saturating_sub(LEVELS as u32 - 1);
         let rank = (class as usize).min(LEVELS - 1);
@@ -251,6 +269,14 @@ impl SetCoding<'_> {
         }
         color
     }
+}
+
+/// Refuses what a decoder refused, or did not read to its end.
+fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
+    if decoder.is_complete() {
+        return Ok(());
+    }
+    Err(DecodeError::malformed(ChunkType::GAUS, "the coded Gaussians do not add up"))
 }
 
 /// Codes how many of `count` Gaussians are in the first part of a cell.
@@ -318,7 +344,7 @@ fn kind_of_magnitude(value: i32) -> usize {
 /// Members that are not known yet, handed over as they come.
 struct Unknown<F>(F);
 
-impl<F: FnMut(Code)> Members for Unknown<F> {
+impl<F: FnMut(Code, &Shape)> Members for Unknown<F> {
     fn partition(&mut self, _: Range<usize>, _: usize, _: u32) -> usize {
         0
     }
@@ -327,8 +353,8 @@ impl<F: FnMut(Code)> Members for Unknown<F> {
         Code::default()
     }
 
-    fn set(&mut self, _: usize, code: Code, _: &Cell) {
-        (self.0)(code);
+    fn set(&mut self, _: usize, code: Code, shape: &Shape, _: &Cell) {
+        (self.0)(code, shape);
     }
 }
 
@@ -351,7 +377,7 @@ impl Members for Known<'_> {
         self.codes[index]
     }
 
-    fn set(&mut self, index: usize, code: Code, cell: &Cell) {
+    fn set(&mut self, index: usize, code: Code, _: &Shape, cell: &Cell) {
         self.codes[index] = code;
         self.levels.push(cell.level());
     }
@@ -435,7 +461,7 @@ mod tests {
             let count = u32::from_le_bytes(payload[..4].try_into().expect("four bytes"));
             let decoder = Decoder::new(&payload[4..], &mut models.0);
             let mut coder = Counting { coder: decoder, counts };
-            coding.walk(&mut coder, count as usize, &mut Unknown(|_| ()));
+            coding.walk(&mut coder, count as usize, &mut Unknown(|_, _: &Shape| ()));
             assert!(coder.coder.is_complete());
             counts = coder.counts;
         }
@@ -444,7 +470,7 @@ mod tests {
     }
 
     /// A table for counts, which mean little where they are few: those before stand in.
-    fn starts(counts: &[f64; SYMBOLS], before: &[u16; SYMBOLS]) -> [u16; SYMBOLS] {
+    fn starts(counts: &[f64; SYMBOLS], before: &[i16; SYMBOLS]) -> [i16; SYMBOLS] {
         const LEAST: f64 = 8.0;
         const PRIOR: f64 = 100.0;
         let model = Model::new(*before);
@@ -455,8 +481,23 @@ mod tests {
         core::array::from_fn(|symbol| {
             let start = LEAST * symbol as f64 + (32768.0 - LEAST * SYMBOLS as f64) * sum / total;
             sum += weights[symbol];
-            start.round() as u16
+            start.round() as i16
         })
+    }
+
+    /// `BLESS=1 cargo test the_specification_has_the_models` writes the file anew.
+    #[test]
+    fn the_specification_has_the_models() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/spec/coding1-models.tsv");
+        let lines = tables::STARTS.iter().enumerate().map(|(context, starts)| {
+            let starts = starts.map(|start| start.to_string()).join("\t");
+            format!("{context}\t{starts}\n")
+        });
+        let text: String = lines.collect();
+        if std::env::var_os("BLESS").is_some() {
+            std::fs::write(path, &text).expect("the folder can be written");
+        }
+        assert_eq!(std::fs::read_to_string(path).expect("a text"), text);
     }
 
     fn codes(channels: usize) -> impl Strategy<Value = Vec<Code>> {
@@ -501,7 +542,7 @@ mod tests {
             let mut read = Vec::new();
             let allowed = codes.len() as u32;
             coding
-                .read(&payload, allowed, &mut Models::default(), |code| read.push(code))
+                .read(&payload, allowed, &mut Models::default(), None, |code, _| read.push(code))
                 .expect("sound");
             prop_assert_eq!(&read, &codes);
             // Written again, nothing moves any more.
@@ -517,7 +558,7 @@ mod tests {
             let coding = SetCoding { lattice: &lattice, grid: Grid::new(700, 400), channels: 3 };
             let payload = [&count.to_le_bytes(), &bytes[..]].concat();
             let mut received = 0;
-            let _ = coding.read(&payload, 1000, &mut Models::default(), |_| received += 1);
+            let _ = coding.read(&payload, 1000, &mut Models::default(), None, |_, _| received += 1);
             prop_assert!(received <= 1000);
         }
     }

@@ -6,7 +6,7 @@ use super::set::context;
 
 /// For each context the shares, out of 2^15, of all symbols before each one.
 #[rustfmt::skip]
-pub(super) const STARTS: [[u16; SYMBOLS]; context::COUNT] = [
+pub(super) const STARTS: [[i16; SYMBOLS]; context::COUNT] = [
     [0, 14, 2805, 11601, 22000, 28195, 30872, 31940, 32704, 32712, 32720, 32728, 32736, 32744, 32752, 32760],
     [0, 1457, 27374, 31827, 32278, 32345, 32366, 32381, 32396, 32410, 32425, 32439, 32453, 32468, 32482, 32497],
     [0, 84, 708, 22058, 32087, 32433, 32639, 32675, 32685, 32694, 32702, 32710, 32719, 32727, 32735, 32743],

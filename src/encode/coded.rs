@@ -274,7 +274,10 @@ impl<'a> Coder<'a> {
         let gaussians: Vec<Gaussian> = coded
             .codes
             .iter()
-            .map(|code| coded.lattice.gaussian(code, &self.grid, self.model))
+            .map(|code| {
+                let shape = coded.lattice.shape(code);
+                coded.lattice.gaussian(code, &shape, &self.grid, self.model)
+            })
             .collect();
         let limits = Limits::none();
         let picture = Picture::new(self.layout.header(), &gaussians, &limits, 0);

@@ -83,7 +83,8 @@ impl Descent<'_> {
     }
 
     fn gaussian(&self, code: &Code) -> crate::gaussian::Gaussian {
-        self.coding.lattice.gaussian(code, &self.coding.grid, self.model)
+        let SetCoding { lattice, grid, .. } = &self.coding;
+        lattice.gaussian(code, &lattice.shape(code), grid, self.model)
     }
 
     /// Indices in rounds: within one, no two patches touch; of two that touch, the first in order

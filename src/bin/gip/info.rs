@@ -3,7 +3,7 @@
 use core::fmt::{self, Display};
 
 use anyhow::{Context, Result, anyhow};
-use image_gip::{Chart, ChunkType, ColorModel, Header, Kernel, Quantizer, StreamDecoder};
+use image_gip::{Chart, ChunkType, Coding, ColorModel, Header, Kernel, Quantizer, StreamDecoder};
 use serde::Serialize;
 
 use crate::args;
@@ -13,7 +13,7 @@ use crate::files;
 pub(crate) fn run(args: &args::Info) -> Result<()> {
     let context = || files::input_name(&args.file);
     let bytes = files::read(&args.file)?;
-    let mut stream = StreamDecoder::new();
+    let mut stream = StreamDecoder::new().with_account();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
     let info = Info::new(header, &stream, bytes.len());
@@ -27,6 +27,7 @@ struct Info {
     bytes: usize,
     bpp: f64,
     version: u8,
+    coding: &'static str,
     width: u32,
     height: u32,
     color: &'static str,
@@ -40,7 +41,10 @@ struct Info {
     base_color: Vec<u16>,
     chunks: Vec<Chunk>,
     bits_per_gaussian: BitsPerGaussian,
+    /// With coding "fixed".
     components: Vec<Component>,
+    /// With coding "set": position, size, ratio, slant, then one for each colour axis.
+    steps: Vec<f32>,
     metadata: Metadata,
 }
 
@@ -56,11 +60,12 @@ struct Chunk {
 struct BitsPerGaussian {
     /// All bits of the chunks that hold Gaussians, by Gaussian; `None` without Gaussians.
     coded: Option<f64>,
-    /// The sum of the declared depths.
-    total: u32,
-    position: u32,
-    shape: u32,
-    color: u32,
+    /// The sum of all below.
+    total: f64,
+    position: f64,
+    precision: f64,
+    shape: f64,
+    color: f64,
 }
 
 /// How one component of every Gaussian is stored.
@@ -95,16 +100,15 @@ impl Info {
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
         let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::GAUS);
-        let bits = |attribute| {
-            let of = components.iter().filter(|component| component.attribute == attribute);
-            of.map(|component| u32::from(component.bits)).sum::<u32>()
-        };
+        let gaussians = f64::from(header.gaussians.max(1));
+        let bits = stream.attribute_bits().unwrap_or_default();
         let bits_per_gaussian = BitsPerGaussian {
-            coded: layers.map(|l| l.bytes as f64 * 8.0 / f64::from(header.gaussians)),
-            total: components.iter().map(|component| u32::from(component.bits)).sum(),
-            position: bits("position"),
-            shape: bits("shape"),
-            color: bits("color"),
+            coded: layers.map(|l| l.bytes as f64 * 8.0 / gaussians),
+            total: (bits.position + bits.precision + bits.shape + bits.color) / gaussians,
+            position: bits.position / gaussians,
+            precision: bits.precision / gaussians,
+            shape: bits.shape / gaussians,
+            color: bits.color / gaussians,
         };
         let metadata = stream.metadata();
         let size = |blob: &Option<Vec<u8>>| blob.as_ref().map(Vec::len);
@@ -112,6 +116,11 @@ impl Info {
             bytes,
             bpp: bits_per_pixel(bytes, header.width, header.height),
             version: header.version,
+            coding: match header.coding {
+                Coding::Fixed => "fixed",
+                Coding::Set => "set",
+                _ => "unknown",
+            },
             width: header.width,
             height: header.height,
             color: match header.color {
@@ -144,6 +153,7 @@ impl Info {
                 .collect(),
             bits_per_gaussian,
             components,
+            steps: stream.steps(),
             metadata: Metadata {
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
@@ -208,13 +218,20 @@ impl Display for Info {
         row("kernel", &format_args!("{kernel}, cut-off {cutoff}"))?;
         row("chart", &self.chart)?;
         row("base colour", &format_args!("{:?} / 65535", self.base_color))?;
-        let BitsPerGaussian { total, position, shape, color, .. } = bits;
+        row("coding", &self.coding)?;
+        let BitsPerGaussian { total, position, precision, shape, color, .. } = bits;
         row(
             "bits per Gaussian",
-            &format_args!("{total}: position {position}, shape {shape}, colour {color}"),
+            &format_args!(
+                "{total:.2}: position {position:.2}, precision {precision:.2}, shape {shape:.2}, \
+                 colour {color:.2}"
+            ),
         )?;
         if let Some(coded) = bits.coded {
             row("  as coded", &format_args!("{coded:.2} with all framing"))?;
+        }
+        if !self.steps.is_empty() {
+            row("  steps", &format_args!("{:?}", self.steps))?;
         }
         for component in &self.components {
             let Component { attribute, name, kind, bits, scale, offset } = component;
