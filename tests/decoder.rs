@@ -382,7 +382,7 @@ fn errors_name_the_chunk_and_the_rule() {
 
     let changes: [Change<'_, Ghdr>; 20] = [
         (&|h| h.version = 1, "GHDR: unsupported: version 1"),
-        (&|h| h.coding = 1, "GHDR: unsupported: coding 1"),
+        (&|h| h.coding = 2, "GHDR: unsupported: coding 2"),
         (&|h| h.color = 4, "GHDR: unsupported: colour model 4"),
         (&|h| h.depth = 10, "GHDR: unsupported: sample depth 10"),
         (&|h| h.kernel = 2, "GHDR: unsupported: kernel 2"),
