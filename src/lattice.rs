@@ -137,6 +137,14 @@ impl Lattice {
 }
 
 #[cfg(feature = "encode")]
+impl Code {
+    /// What the Gaussian adds to the picture: the sum of its squares, in steps of colour.
+    pub(crate) fn strength(&self) -> i64 {
+        self.color.iter().map(|&code| i64::from(code) * i64::from(code)).sum()
+    }
+}
+
+#[cfg(feature = "encode")]
 impl Lattice {
     /// The code nearest to a Gaussian, with the precision of a class.
     ///

@@ -263,7 +263,7 @@ fn one_bright_pixel_is_found() {
 fn a_prefix_of_the_file_already_shows_the_picture() {
     let samples = scene(128, 96, 3);
     let source = Source::new_u8(128, 96, ColorModel::Rgb, &samples).expect("sizes agree");
-    let encoder = Encoder::new().with_effort(2).with_target(Target::Gaussians(800));
+    let encoder = Encoder::new().with_effort(2).with_target(Target::Gaussians(1200));
     let encoded = encoder.encode(&source).expect("it encodes");
     let shown = |bytes: usize| {
         let mut stream = StreamDecoder::new();

@@ -24,12 +24,15 @@ pub(crate) const SHARE_OF_FIT: f64 = 0.84;
 /// How often every code is looked at, when the steps are being sought and for the file.
 const SCOUTING_PASSES: u32 = 2;
 const PASSES: u32 = 8;
+/// The first layers of a file, as shares of its Gaussians: a tenth of the file already shows the
+/// picture.
+const LAYERS: [f64; 2] = [0.08, 0.24];
+/// Fewest Gaussians that are worth layers.
+const LEAST_LAYERED: usize = 1000;
 /// How often steps are tried.
 const MAX_TRIES: u32 = 5;
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
-/// The share of a size that is aimed at.
-const SIZE_AIMED: f64 = 0.996;
 /// What is aimed at beyond a PSNR, in dB.
 const PSNR_AIMED: f64 = 0.02;
 /// Steps that a lattice may have.
@@ -110,6 +113,45 @@ impl Coded {
     }
 }
 
+/// Layers of coded Gaussians.
+#[derive(Debug)]
+pub(crate) struct Written {
+    pub(crate) payloads: Vec<Vec<u8>>,
+    /// Of the cell of each Gaussian.
+    levels: Vec<u32>,
+    /// As they are after the last layer.
+    models: Models,
+}
+
+/// Codes Gaussians in layers, the strongest first; sorts and rounds them as a file has them.
+pub(crate) fn write_layers(coding: &SetCoding<'_>, codes: &mut [Code]) -> Written {
+    let mut written =
+        Written { payloads: Vec::new(), levels: Vec::new(), models: Models::default() };
+    codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    let mut rest = codes;
+    for count in layer_sizes(rest.len()) {
+        let (layer, later) = rest.split_at_mut(count);
+        rest = later;
+        let payload = coding.write(layer, &mut written.levels, &mut written.models);
+        written.payloads.push(payload);
+    }
+    written
+}
+
+/// The sizes of the layers of a file.
+fn layer_sizes(count: usize) -> Vec<usize> {
+    let mut sizes: Vec<usize> = if count < LEAST_LAYERED {
+        Vec::new()
+    } else {
+        LAYERS.iter().map(|share| (share * count as f64) as usize).collect()
+    };
+    let last = count - sizes.iter().sum::<usize>();
+    if last > 0 {
+        sizes.push(last);
+    }
+    sizes
+}
+
 /// The lattice of a step of colour.
 fn lattice(step: f32, model: ColorModel) -> Lattice {
     Lattice {
@@ -124,11 +166,14 @@ fn lattice(step: f32, model: ColorModel) -> Lattice {
 /// How a trial went.
 #[derive(Clone, Copy, Debug)]
 struct Judgement {
+    /// Bytes, or dB.
+    reached: f64,
+    aimed: f64,
+    /// What doubling the step should change.
+    slope: f64,
     /// 0 if the target is met; the less the better, and large where it is passed on the wrong
     /// side.
     miss: f64,
-    /// What to multiply the step by.
-    factor: f64,
 }
 
 /// What fitted Gaussians are coded for.
@@ -155,23 +200,29 @@ impl<'a> Coder<'a> {
         target: Target,
         observer: &mut Observer<'_>,
     ) -> Result<Coded, EncodeError> {
-        let mut step = (STEP * error / gaussians.len().max(1) as f64).sqrt();
+        // Steps are sought by their logarithms to base 2.
+        let mut octave = 0.5 * (STEP * error / gaussians.len().max(1) as f64).log2();
         let steered = matches!(target, Target::Psnr(_)) || target.bytes(self.pixels()).is_some();
-        if steered {
-            let scout = self.coded(gaussians, step, SCOUTING_PASSES, observer)?;
-            step *= self.judged(&scout, target, error).factor;
-        }
+        let mut before: Option<(f64, f64)> = None;
         let mut best: Option<(Coded, f64)> = None;
-        for _ in 0..MAX_TRIES {
-            let coded = self.coded(gaussians, step, PASSES, observer)?;
+        for trial in 0..MAX_TRIES {
+            let scouting = steered && trial == 0;
+            let passes = if scouting { SCOUTING_PASSES } else { PASSES };
+            let coded = self.coded(gaussians, octave.exp2(), passes, observer)?;
             let judgement = self.judged(&coded, target, error);
-            if best.as_ref().is_none_or(|(_, miss)| judgement.miss < *miss) {
-                best = Some((coded, judgement.miss));
+            let Judgement { reached, aimed, slope, miss } = judgement;
+            if !scouting && best.as_ref().is_none_or(|(_, least)| miss < *least) {
+                best = Some((coded, miss));
+                if miss == 0.0 {
+                    break;
+                }
             }
-            if judgement.miss == 0.0 {
-                break;
-            }
-            step *= judgement.factor;
+            // What was seen between the last two trials, if it is not far from what is expected.
+            let seen = before.filter(|(there, _)| trial > 1 && (octave - there).abs() > 1e-3);
+            let seen = seen.map(|(there, then)| (reached - then) / (octave - there));
+            let slope = seen.filter(|seen| (0.2..5.0).contains(&(seen / slope))).unwrap_or(slope);
+            before = Some((octave, reached));
+            octave += ((aimed - reached) / slope).clamp(-1.0, 1.0);
         }
         let (mut coded, _) = best.expect("at least one was tried");
         if let Some(bytes) = target.bytes(self.pixels()) {
@@ -180,26 +231,26 @@ impl<'a> Coder<'a> {
         Ok(coded)
     }
 
-    /// How far a trial is from the target, and by what to change its step.
+    /// How far a trial is from the target.
     fn judged(&self, coded: &Coded, target: Target, fit: f64) -> Judgement {
         if let Some(bytes) = target.bytes(self.pixels()) {
-            let (size, wanted) = (self.layout.write_set(coded).len() as f64, bytes as f64);
+            let (reached, wanted) = (self.layout.write_set(coded).len() as f64, bytes as f64);
             // Each of eight attributes takes a bit less when the step doubles.
-            let gaussians = coded.codes.len().max(1) as f64;
-            let factor = ((size - SIZE_AIMED * wanted) / gaussians).clamp(-1.0, 1.0).exp2();
-            let miss = if size > wanted { size } else { (SIZE_TOLERANCE * wanted - size).max(0.0) };
-            return Judgement { miss, factor };
+            let slope = -(coded.codes.len().max(1) as f64);
+            // What is a little too long will be shortened.
+            let off = (reached - wanted).abs() - (1.0 - SIZE_TOLERANCE) * wanted;
+            return Judgement { reached, aimed: wanted, slope, miss: off.max(0.0) };
         }
-        let Target::Psnr(psnr) = target else { return Judgement { miss: 0.0, factor: 1.0 } };
+        let Target::Psnr(psnr) = target else {
+            return Judgement { reached: 0.0, aimed: 0.0, slope: -1.0, miss: 0.0 };
+        };
         let error = self.rendered(coded).error();
         let reached = 10.0 * (self.raster.error_of(0.0) / error).log10();
-        // What rounding adds grows with the square of the step.
-        let wanted = self.raster.error_of(psnr + PSNR_AIMED);
-        let least = 0.01 * wanted;
-        let factor = ((wanted - fit).max(least) / (error - fit).max(least)).sqrt();
+        // What rounding adds to the error quadruples when the step doubles.
+        let slope = -(6.0 * (error - fit) / error).clamp(0.3, 6.0);
         let above = reached - psnr;
         let miss = if above < 0.0 { 1e3 - above } else { (above - PSNR_TOLERANCE).max(0.0) };
-        Judgement { miss, factor: factor.clamp(0.25, 4.0) }
+        Judgement { reached, aimed: psnr + PSNR_AIMED, slope, miss }
     }
 
     /// Removes the weakest Gaussians until the file has at most `bytes`.
@@ -207,13 +258,9 @@ impl<'a> Coder<'a> {
         loop {
             let size = self.layout.write_set(coded).len() as u64;
             let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else { break };
-            let strength = |code: &Code| {
-                let squares = code.color.iter().map(|&c| i64::from(c) * i64::from(c));
-                squares.sum::<i64>()
-            };
             // Four bytes a Gaussian, and at least one.
             let count = excess.div_ceil(4).min(coded.codes.len() as u64) as usize;
-            coded.codes.sort_by_key(|code| core::cmp::Reverse(strength(code)));
+            coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
             coded.codes.truncate(coded.codes.len() - count);
         }
     }
@@ -263,10 +310,10 @@ impl<'a> Coder<'a> {
     /// Sorts and rounds the codes as the file has them; what symbols cost then, the levels of the
     /// cells, and the bits of all.
     fn walked(&self, coded: &mut Coded) -> (Costs, Vec<u32>, f32) {
-        let (mut models, mut levels) = (Models::default(), Vec::new());
         let coding = self.coding(&coded.lattice);
-        let payload = coding.write(&mut coded.codes, &mut levels, &mut models);
-        (models.costs(), levels, 8.0 * payload.len() as f32)
+        let written = write_layers(&coding, &mut coded.codes);
+        let bytes = written.payloads.iter().map(Vec::len).sum::<usize>();
+        (written.models.costs(), written.levels, 8.0 * bytes as f32)
     }
 
     /// The picture of the codes, as the decoder makes it.

@@ -1,12 +1,12 @@
 //! Fitted Gaussians to a file: order, layers, chunks (spec, sections 4 to 7).
 
 use super::EncodeError;
-use super::coded::Coded;
+use super::coded::{Coded, write_layers};
 use super::fit::Fitted;
 use super::source::Source;
 use super::training::Training;
 use crate::coding::fixed;
-use crate::coding::set::{Models, SetCoding};
+use crate::coding::set::SetCoding;
 use crate::container::{ChunkType, Coding, Header, Metadata, SIGNATURE, write_chunk};
 use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
 use crate::lattice::Grid;
@@ -88,11 +88,15 @@ impl<'a> Layout<'a> {
 
     /// The file of coded Gaussians.
     pub(crate) fn write_set(&self, coded: &Coded) -> Vec<u8> {
+        let grid = Grid::new(self.header.width, self.header.height);
+        let channels = self.header.color.channels();
+        let coding = SetCoding { lattice: &coded.lattice, grid, channels };
+        let payloads = write_layers(&coding, &mut coded.codes.clone()).payloads;
         let header = Header {
             coding: Coding::Set,
             chart: Chart::Cholesky,
             gaussians: coded.codes.len() as u32,
-            layers: u16::from(!coded.codes.is_empty()),
+            layers: payloads.len() as u16,
             ..self.header.clone()
         };
         let mut file = SIGNATURE.to_vec();
@@ -101,12 +105,7 @@ impl<'a> Layout<'a> {
         for (kind, payload) in self.metadata.chunks() {
             write_chunk(&mut file, kind, &payload);
         }
-        if !coded.codes.is_empty() {
-            let grid = Grid::new(header.width, header.height);
-            let channels = header.color.channels();
-            let coding = SetCoding { lattice: &coded.lattice, grid, channels };
-            let mut codes = coded.codes.clone();
-            let payload = coding.write(&mut codes, &mut Vec::new(), &mut Models::default());
+        for payload in payloads {
             write_chunk(&mut file, ChunkType::GAUS, &payload);
         }
         write_chunk(&mut file, ChunkType::GEND, &[]);
