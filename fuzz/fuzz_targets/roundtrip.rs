@@ -66,7 +66,11 @@ fuzz_target!(|case: Case| {
     let encoded = match Encoder::new()
         .with_target(target)
         .with_effort(1 + case.effort % 3)
-        .with_precision(if case.float { Precision::Float } else { Precision::Packed })
+        .with_precision(match (case.float, case.effort & 4) {
+            (true, _) => Precision::Float,
+            (false, 0) => Precision::Coded,
+            (false, _) => Precision::Packed,
+        })
         .with_seed(case.seed)
         .with_threads(Some(1))
         .encode(&source)

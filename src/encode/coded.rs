@@ -28,7 +28,7 @@ const PASSES: u32 = 8;
 /// picture.
 const LAYERS: [f64; 2] = [0.08, 0.24];
 /// Fewest Gaussians that are worth layers.
-const LEAST_LAYERED: usize = 1000;
+const LEAST_LAYERED: usize = 250;
 /// How often steps are tried.
 const MAX_TRIES: u32 = 5;
 /// How often a finished fit may be extended.

@@ -33,6 +33,7 @@ pub use source::Source;
 use training::Training;
 
 use crate::container::Metadata;
+use crate::render::Kernel;
 
 /// Iterations by effort, from 1 to 9.
 const ITERATIONS: [u32; 9] = [60, 90, 150, 300, 600, 1200, 2400, 4800, 9600];
@@ -97,7 +98,7 @@ impl Encoder {
         self
     }
 
-    /// Whether attributes are quantized. Default [`Precision::Packed`].
+    /// Whether attributes are quantized. Default [`Precision::Coded`].
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
         self
@@ -182,6 +183,9 @@ impl Encoder {
         self.metadata.check().map_err(EncodeError::Option)?;
         let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
         training.check().map_err(|rule| EncodeError::Option(format!("training: {rule}")))?;
+        if self.precision == Precision::Coded && training.kernel != Kernel::Quartic {
+            return wrong("training: coded Gaussians need the quartic kernel".into());
+        }
         Ok(training)
     }
 }

@@ -180,6 +180,7 @@ impl Ablation<'_> {
             let mut outcomes = Vec::new();
             for &count in counts {
                 let encoder = Encoder::new().with_seed(gip::SEED).with_training(training.clone());
+                let encoder = encoder.with_precision(Precision::Packed);
                 outcomes.push(self.outcome(&variant, self.own_iterations, count, &encoder)?);
             }
             rows.push((variant, outcomes));
@@ -219,6 +220,7 @@ impl Ablation<'_> {
         for seed in 0..SEEDS {
             let training = Training::fast(self.own_iterations);
             let encoder = Encoder::new().with_seed(seed).with_training(training);
+            let encoder = encoder.with_precision(Precision::Packed);
             let variant = format!("seed {seed}");
             outcomes.push(self.outcome(&variant, self.own_iterations, self.gaussians, &encoder)?);
         }

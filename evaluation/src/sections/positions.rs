@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use half::f16;
-use image_gip::Target;
+use image_gip::{Precision, Target};
 
 use super::handmade::Handmade;
 use super::methods;
@@ -142,7 +142,8 @@ fn stored(
     let fit = |bits: u8| {
         let training = methods::ours(iterations, [bits, SHAPE, COLOR]);
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::Gaussians(count));
-        gip::code(encoder.with_training(training), picture, None)
+        let encoder = encoder.with_training(training).with_precision(Precision::Packed);
+        gip::code(encoder, picture, None)
     };
     let paper;
     let coded = match storage {
