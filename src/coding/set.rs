@@ -173,6 +173,14 @@ impl SetCoding<'_> {
         cost.bits + bits.sum::<i32>() as f32
     }
 
+    /// The bits that the colours of a code take.
+    #[cfg(feature = "encode")]
+    pub(crate) fn color_cost(&self, code: &Code, costs: &Costs) -> f32 {
+        let mut cost = Cost { costs, bits: 0.0 };
+        self.color(&mut cost, code.class as usize, code.color);
+        cost.bits
+    }
+
     /// Walks through the tree of cells, first parts first, and codes every Gaussian in the cell
     /// that it has for itself.
     fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {

@@ -4,17 +4,26 @@
 
 use rayon::prelude::*;
 
+use super::displacement::Displacement;
 use super::error::EncodeError;
-use super::patch::{Patch, Picture};
+use super::patch::{Change, Patch, Picture, Slopes};
 use super::progress::Observer;
 use crate::coding::set::{Costs, SetCoding};
 use crate::color::ColorModel;
+use crate::gaussian::Gaussian;
 use crate::lattice::{Code, MAX_CLASS};
 
 /// Side of the blocks by which Gaussians that do not touch are told apart, in pixels.
 const BLOCK: usize = 16;
 /// Gaussians between two polls.
 const POLL_INTERVAL: usize = 256;
+
+/// How far the best way along the slopes is followed.
+const REACH: f32 = 0.5;
+/// How much worse than the present code, in bits, a candidate may look that is tried.
+const SLACK: f32 = 0.0;
+/// Most candidates that are tried.
+const MOST_TRIED: usize = 3;
 
 /// What codes are chosen by.
 #[derive(Clone, Copy, Debug)]
@@ -60,21 +69,22 @@ impl Descent<'_> {
                         self.choose(shared, patch, codes[index], levels[index])
                     })
                     .collect();
+                let mut changes = Vec::new();
                 for (&index, choice) in part.iter().zip(chosen) {
-                    let before = codes[index];
-                    if choice == Some(before) {
+                    if choice == Some(codes[index]) {
                         continue;
                     }
                     changed += 1;
-                    picture.add(&self.gaussian(&before), -1.0);
+                    changes.push((self.gaussian(&codes[index]), -1.0));
                     match choice {
                         Some(code) => {
-                            picture.add(&self.gaussian(&code), 1.0);
+                            changes.push((self.gaussian(&code), 1.0));
                             codes[index] = code;
                         }
                         None => kept[index] = false,
                     }
                 }
+                picture.add(&changes);
             }
         }
         let mut kept = kept.into_iter();
@@ -82,50 +92,56 @@ impl Descent<'_> {
         Ok(changed)
     }
 
-    fn gaussian(&self, code: &Code) -> crate::gaussian::Gaussian {
+    fn gaussian(&self, code: &Code) -> Gaussian {
         let SetCoding { lattice, grid, .. } = &self.coding;
         lattice.gaussian(code, &lattice.shape(code), grid, self.model)
     }
 
-    /// Indices in rounds: within one, no two patches touch; of two that touch, the first in order
-    /// is in the earlier round.
+    /// Indices in rounds: within one, no two patches touch.
+    ///
+    /// Large ones, which touch many, come first. Neighbours in the order of the codes are mostly
+    /// neighbours in the picture, so the others are taken far from each other.
     fn rounds(&self, picture: &Picture, codes: &[Code]) -> Vec<Vec<usize>> {
         let columns = picture.width().div_ceil(BLOCK);
-        let rows = picture.height().div_ceil(BLOCK);
-        let mut next = vec![0; columns * rows];
+        let mut patches: Vec<_> = (codes.iter().enumerate())
+            .map(|(index, code)| {
+                let blocks = picture
+                    .bounds(&self.gaussian(code))
+                    .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
+                // Those that are not seen at all go into the first round, to be removed.
+                let [x, y] = blocks.unwrap_or_default();
+                let area = (x.len() * y.len()) as u32;
+                (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
+            })
+            .collect();
+        patches.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
+        let mut next = vec![0; columns * picture.height().div_ceil(BLOCK)];
         let mut rounds: Vec<Vec<usize>> = Vec::new();
-        for (index, code) in codes.iter().enumerate() {
-            let Some([x, y]) = picture.bounds(&self.gaussian(code)) else {
-                // Not seen at all: any round will remove it.
-                if rounds.is_empty() {
-                    rounds.push(Vec::new());
-                }
-                rounds[0].push(index);
-                continue;
-            };
-            let blocks = (y.start / BLOCK..y.end.div_ceil(BLOCK)).flat_map(|row| {
-                (x.start / BLOCK..x.end.div_ceil(BLOCK)).map(move |c| row * columns + c)
-            });
+        for (_, order, x, y) in patches {
+            let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
             let round = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
             blocks.for_each(|block| next[block] = round + 1);
             if round == rounds.len() {
                 rounds.push(Vec::new());
             }
-            rounds[round].push(index);
+            rounds[round].push(order.reverse_bits() as usize);
         }
         rounds
     }
 
     /// The best of a code and its neighbours; `None` if the picture is better off without.
     fn choose(&self, picture: &Picture, patch: &mut Patch, code: Code, level: u32) -> Option<Code> {
-        patch.load(picture, &self.gaussian(&code)).then_some(())?;
-        let mut best = self.judged(patch, code, level);
-        if let Some(better) = self.recolored(patch, code, level)
-            && better.value < best.value
-        {
-            best = better;
+        let here = self.gaussian(&code);
+        patch.load(picture, &here).then_some(())?;
+        let slopes = patch.slopes(&here, self.model);
+        let present = slopes.change.error + self.lambda * self.bits(code, level);
+        let promising = self.promising(&slopes, code, &here, level, present);
+        if promising.is_empty() && present < 0.0 {
+            return Some(code);
         }
-        for candidate in self.neighbours(best.code) {
+        patch.remove(&here);
+        let mut best = self.judged(patch, code, level);
+        for candidate in promising {
             if let Some(other) = self.recolored(patch, candidate, level)
                 && other.value < best.value
             {
@@ -135,59 +151,98 @@ impl Descent<'_> {
         (best.value < 0.0).then_some(best.code)
     }
 
+    /// The neighbours that may well be better than the code as it is, by what its slopes say.
+    fn promising(
+        &self,
+        slopes: &Slopes,
+        code: Code,
+        here: &Gaussian,
+        level: u32,
+        present: f32,
+    ) -> Vec<Code> {
+        let (lattice, model) = (self.coding.lattice, self.model);
+        let [_, l21, l22] = here.cholesky;
+        let slant = l21 / l22;
+        let amplitudes = code.color.iter().zip(&lattice.color);
+        let strength: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
+        let recolored = self.with_best_colors(&slopes.change, code);
+        let error = slopes.change.with(recolored.color, lattice.color_units(&recolored));
+        let mut found = Vec::new();
+        if recolored != code {
+            found.push((error + self.lambda * self.bits(recolored, level), recolored));
+        }
+        if strength > 0.0 {
+            let best = slopes.by_displacement.best(slant, strength, REACH);
+            let target = best.applied(&self.gaussian(&recolored));
+            let classes = code.class.saturating_sub(1)..=(code.class + 1).min(MAX_CLASS);
+            let targeted =
+                classes.map(|class| lattice.code(&target, class, &self.coding.grid, model));
+            for candidate in self.steps(recolored).chain(targeted) {
+                let way = Displacement::between(here, &self.gaussian(&candidate));
+                let change = slopes.by_displacement.change(&way, slant, strength);
+                found.push((error + change + self.lambda * self.bits(candidate, level), candidate));
+            }
+        }
+        found.retain(|(value, _)| *value < present + self.lambda * SLACK);
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(MOST_TRIED);
+        found.into_iter().map(|(_, code)| code).collect()
+    }
+
     /// What a code is worth as it is.
-    fn judged(&self, patch: &mut Patch, code: Code, level: u32) -> Choice {
+    fn judged(&self, patch: &Patch, code: Code, level: u32) -> Choice {
         let change = patch.change(&self.gaussian(&code), self.model);
         Choice { code, value: change.error + self.lambda * self.bits(code, level) }
     }
 
     /// What a code is worth with the best colours for its geometry.
-    fn recolored(&self, patch: &mut Patch, mut code: Code, level: u32) -> Option<Choice> {
-        let lattice = self.coding.lattice;
+    fn recolored(&self, patch: &Patch, code: Code, level: u32) -> Option<Choice> {
         let change = patch.change(&self.gaussian(&code), self.model);
         if change.weight <= 0.0 {
             return None;
         }
-        let units = lattice.color_units(&code);
-        for (axis, &unit) in units.iter().enumerate().take(self.coding.channels) {
-            let best = code.color[axis] as f32 - change.by_axis[axis] / (change.weight * unit);
-            let best = best.clamp(-30_000.0, 30_000.0);
-            // By what the error grows for a unit beside the best value.
-            let growth = change.weight * unit * unit;
-            let rounded = best.round() as i32;
-            let candidates = [
-                rounded,
-                rounded - rounded.signum(),
-                rounded + 1,
-                rounded - 1,
-                code.color[axis],
-                0,
-            ];
-            let cost = |value: i32| {
-                let mut candidate = code;
-                candidate.color[axis] = value;
-                let off = value as f32 - best;
-                growth * off * off + self.lambda * self.bits(candidate, level)
-            };
-            let costs = candidates.map(|value| (cost(value), value));
-            let (_, value) = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-            code.color[axis] = value;
-        }
+        let code = self.with_best_colors(&change, code);
         if patch.is_clamped() {
             return Some(self.judged(patch, code, level));
         }
-        let error = change.with(code.color, units, self.coding.channels);
+        let error = change.with(code.color, self.coding.lattice.color_units(&code));
         Some(Choice { code, value: error + self.lambda * self.bits(code, level) })
+    }
+
+    /// A code with the best colours for its geometry, one axis after the other.
+    fn with_best_colors(&self, change: &Change, mut code: Code) -> Code {
+        let units = self.coding.lattice.color_units(&code);
+        for (axis, &unit) in units.iter().enumerate().take(self.coding.channels) {
+            // By what the error grows for a unit beside the best value.
+            let growth = change.weight * unit * unit;
+            if growth <= 0.0 {
+                continue;
+            }
+            let present = code.color[axis];
+            let best = present as f32 - change.by_axis[axis] * unit / growth;
+            let best = best.clamp(-30_000.0, 30_000.0);
+            let rounded = best.round() as i32;
+            let nearer = rounded - rounded.signum();
+            let candidates = [rounded, nearer, rounded + 1, rounded - 1, present, 0];
+            let costs = candidates.map(|value| {
+                code.color[axis] = value;
+                let off = value as f32 - best;
+                growth * off * off + self.lambda * self.coding.color_cost(&code, self.costs)
+            });
+            let least = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            code.color[axis] = candidates[least.expect("there are some")];
+        }
+        code
     }
 
     fn bits(&self, code: Code, level: u32) -> f32 {
         self.tree + self.coding.cost(code, level, self.costs)
     }
 
-    /// A step in each component, and a class up and down.
-    fn neighbours(&self, code: Code) -> impl Iterator<Item = Code> {
+    /// A step up and down in each component of the geometry.
+    fn steps(&self, code: Code) -> impl Iterator<Item = Code> {
         let (lattice, grid) = (self.coding.lattice, self.coding.grid);
-        let here = self.gaussian(&code);
+        let center = grid.center(code.center);
         let shapes = [-1, 1].into_iter().flat_map(move |step| {
             (0..3).map(move |component| {
                 let mut code = code;
@@ -196,7 +251,7 @@ impl Descent<'_> {
                     1 => code.ratio += step,
                     _ => code.slant += step,
                 }
-                code.center = lattice.placed(&code, here.center, &grid);
+                code.center = lattice.placed(&code, center, &grid);
                 code
             })
         });
@@ -204,10 +259,6 @@ impl Descent<'_> {
         let moves = moves
             .into_iter()
             .filter_map(move |(axis, forward)| lattice.moved(&code, axis, forward, &grid));
-        let model = self.model;
-        let classes = [code.class.checked_sub(1), Some(code.class + 1)];
-        let classes = classes.into_iter().flatten().filter(|&class| class <= MAX_CLASS);
-        let classes = classes.map(move |class| lattice.code(&here, class, &grid, model));
-        shapes.chain(moves).chain(classes)
+        shapes.chain(moves)
     }
 }

@@ -6,6 +6,7 @@ mod coded;
 mod control;
 mod densify;
 mod descent;
+mod displacement;
 mod error;
 mod fit;
 mod gradient;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
+use super::displacement::{Displacement, Moments};
 use super::raster::Raster;
 use crate::color::ColorModel;
 use crate::gaussian::{Gaussian, inverse_cholesky};
@@ -13,6 +14,9 @@ use crate::lattice;
 use crate::render::centers;
 
 const LANES: usize = 16;
+type Lanes = [f32; LANES];
+/// Rows of a picture that one thread changes at a time.
+const BAND: usize = 64;
 /// How much larger than its Gaussian a patch is, for candidates to lie within, and in pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
 /// Mahalanobis distance at which the quartic kernel ends.
@@ -24,7 +28,8 @@ pub(crate) struct Picture {
     width: usize,
     height: usize,
     channels: usize,
-    /// Rendering minus source, channel after channel; rows are padded for whole vectors.
+    /// Rendering minus source, row after row, in each channel after channel; padded for whole
+    /// vectors.
     errors: Vec<f32>,
     /// Which errors are clamped; in the layout of `errors`.
     marks: Vec<u8>,
@@ -32,7 +37,7 @@ pub(crate) struct Picture {
     level: Level,
 }
 
-/// The surroundings of one Gaussian, without it.
+/// The surroundings of one Gaussian.
 #[derive(Debug, Default)]
 pub(crate) struct Patch {
     /// First column and row, in pixels.
@@ -40,13 +45,10 @@ pub(crate) struct Patch {
     /// Vectors in a row, and rows.
     size: [usize; 2],
     channels: usize,
-    /// Channel after channel, row after row.
-    errors: Vec<f32>,
-    marks: Vec<u8>,
-    is_clamped: bool,
-    /// The range that errors are clamped to, if any are.
-    low: Vec<f32>,
-    high: Vec<f32>,
+    /// Row after row; the channels of a vector side by side.
+    errors: Vec<Lanes>,
+    /// The ranges that errors are clamped to, as the errors are; empty if none are.
+    ranges: Vec<[Lanes; 2]>,
     level: Option<Level>,
 }
 
@@ -65,15 +67,15 @@ pub(crate) struct Change {
 
 impl Change {
     /// The change of error for other amplitudes, where nothing is clamped: `codes` in `units`.
-    pub(crate) fn with(&self, codes: [i32; 4], units: [f32; 4], channels: usize) -> f32 {
-        (0..channels)
-            .map(|axis| {
-                let amplitude = codes[axis] as f32 * units[axis];
-                // At amplitude 0 the derivative is what the errors alone say.
-                let alone = self.by_axis[axis] - self.axes[axis] * self.weight;
-                amplitude * (amplitude * self.weight + 2.0 * alone)
-            })
-            .sum()
+    pub(crate) fn with(&self, codes: [i32; 4], units: [f32; 4]) -> f32 {
+        let axes = codes.iter().zip(units).zip(self.by_axis).zip(self.axes);
+        axes.map(|(((&code, unit), by_axis), present)| {
+            let amplitude = code as f32 * unit;
+            // At amplitude 0 the derivative is what the errors alone say.
+            let alone = by_axis - present * self.weight;
+            amplitude * (amplitude * self.weight + 2.0 * alone)
+        })
+        .sum()
     }
 }
 
@@ -88,13 +90,15 @@ impl Picture {
         let stride = width + LANES;
         let mut errors = vec![0.0; stride * height * channels];
         let mut marks = vec![NOT_BELOW | NOT_ABOVE; errors.len()];
-        for (index, rendered) in rendering.chunks_exact(width).enumerate() {
-            let (channel, y) = (index / height, index % height);
+        let lines = errors.par_chunks_mut(stride).zip(marks.par_chunks_mut(stride));
+        lines.enumerate().for_each(|(index, (errors, marks))| {
+            let (y, channel) = (index / channels, index % channels);
+            let rendered = &rendering[(channel * height + y) * width..][..width];
             for (x, value) in rendered.iter().enumerate() {
                 let sample = raster.sample(x, y)[channel];
-                errors[index * stride + x] = value - sample;
+                errors[x] = value - sample;
                 // Output is clamped: beyond white or black where the source is so, all is well.
-                marks[index * stride + x] = if sample <= 0.0 {
+                marks[x] = if sample <= 0.0 {
                     NOT_BELOW
                 } else if sample >= 1.0 {
                     NOT_ABOVE
@@ -102,7 +106,7 @@ impl Picture {
                     0
                 };
             }
-        }
+        });
         Self { width, height, channels, errors, marks, stride, level: Level::new() }
     }
 
@@ -118,7 +122,10 @@ impl Picture {
     pub(crate) fn error(&self) -> f64 {
         let lines = self.errors.par_chunks(self.stride).zip(self.marks.par_chunks(self.stride));
         let sums = lines.map(|(errors, marks)| {
-            let clamped = errors.iter().zip(marks).map(|(&error, &mark)| clamped(error, mark));
+            let clamped = errors.iter().zip(marks).map(|(&error, &mark)| {
+                let (low, high) = range(mark);
+                error.clamp(low, high)
+            });
             clamped.map(|error| f64::from(error * error)).sum()
         });
         sums.collect::<Vec<f64>>().iter().sum()
@@ -142,210 +149,400 @@ impl Picture {
         Some(bounds)
     }
 
-    /// Adds a Gaussian to the rendering, `factor` times.
-    pub(crate) fn add(&mut self, gaussian: &Gaussian, factor: f32) {
-        let Some([columns, rows]) = self.bounds(gaussian) else { return };
-        let level = self.level;
-        dispatch!(level, simd => self.add_with(simd, gaussian, factor, columns, rows));
-    }
-
-    #[inline(always)]
-    fn add_with<S: Simd>(
-        &mut self,
-        simd: S,
-        gaussian: &Gaussian,
-        factor: f32,
-        columns: Range<usize>,
-        rows: Range<usize>,
-    ) {
-        let weights = Weights::new(gaussian);
-        for y in rows {
-            for x in columns.clone().step_by(LANES) {
-                let weight = weights.at(simd, x, y);
-                // The padding takes what lies beyond the last column.
-                for channel in 0..self.channels {
-                    let at = (channel * self.height + y) * self.stride + x;
-                    let errors: &mut [f32; LANES] =
-                        (&mut self.errors[at..at + LANES]).try_into().expect("whole vectors");
-                    let sum = f32x16::load_array_ref(simd, errors)
-                        + weight * (factor * gaussian.color[channel]);
-                    sum.store_array(errors);
+    /// Adds Gaussians to the rendering, each as often as its factor says.
+    pub(crate) fn add(&mut self, gaussians: &[(Gaussian, f32)]) {
+        let (level, stride, channels) = (self.level, self.stride, self.channels);
+        let added: Vec<_> = gaussians
+            .iter()
+            .filter_map(|(gaussian, factor)| {
+                let color = gaussian.color.map(|color| color * factor);
+                self.bounds(gaussian).map(|bounds| (Weights::new(gaussian), color, bounds))
+            })
+            .collect();
+        // Whatever thread takes a band, everything comes in the same order.
+        let bands = self.errors.par_chunks_mut(stride * channels * BAND);
+        bands.enumerate().for_each(|(band, errors)| {
+            for (weights, color, [columns, rows]) in &added {
+                let first = band * BAND;
+                let rows = rows.start.max(first)..rows.end.min(first + BAND);
+                for y in rows {
+                    let rows = errors.chunks_exact_mut(stride).skip((y - first) * channels);
+                    let start = columns.start;
+                    let span = weights.span(start, y, columns.len().div_ceil(LANES));
+                    for (row, &color) in rows.take(channels).zip(color) {
+                        let span = span.clone();
+                        dispatch!(level, simd => weights.draw(simd, color, start, y, span, row));
+                    }
                 }
             }
-        }
+        });
+    }
+
+    /// Where the error of a sample is.
+    fn at(&self, x: usize, y: usize, channel: usize) -> usize {
+        (y * self.channels + channel) * self.stride + x
     }
 }
 
-/// What an error counts as.
-fn clamped(error: f32, mark: u8) -> f32 {
+/// What errors are clamped to.
+fn range(mark: u8) -> (f32, f32) {
     let low = if mark & NOT_BELOW != 0 { 0.0 } else { f32::MIN };
     let high = if mark & NOT_ABOVE != 0 { 0.0 } else { f32::MAX };
-    error.clamp(low, high)
+    (low, high)
 }
 
-/// The quartic kernel of one Gaussian.
+/// Where a Gaussian shows, and how strongly.
 #[derive(Clone, Copy, Debug)]
 struct Weights {
     center: [f32; 2],
     inverse: [f32; 3],
+    /// Of a row by its distance from the centre: how far its middle is moved along x for every
+    /// pixel, the squared half of its length at the centre, and how that falls with the squared
+    /// distance.
+    middle: f32,
+    half: f32,
+    fall: f32,
 }
 
 impl Weights {
     fn new(gaussian: &Gaussian) -> Self {
-        Self { center: gaussian.center, inverse: inverse_cholesky(gaussian.cholesky) }
+        let inverse = inverse_cholesky(gaussian.cholesky);
+        let [i11, w, i22] = inverse;
+        let a = i11 * i11 + w * w;
+        let ratio = i11 * i22 / a;
+        Self {
+            center: gaussian.center,
+            inverse,
+            middle: -w * i22 / a,
+            half: RADIUS * RADIUS / a,
+            fall: ratio * ratio,
+        }
     }
 
-    /// The weights of sixteen pixels from (x, y) on.
+    /// The vectors of a row, counted from a column, that the Gaussian shows in.
     #[inline(always)]
-    fn at<S: Simd>(&self, simd: S, x: usize, y: usize) -> f32x16<S> {
+    fn span(&self, corner: usize, y: usize, vectors: usize) -> Range<usize> {
+        let dy = y as f32 + 0.5 - self.center[1];
+        let squared = self.half - self.fall * dy * dy;
+        if squared <= 0.0 {
+            return 0..0;
+        }
+        let half = squared.sqrt();
+        let middle = self.center[0] + self.middle * dy - 0.5 - corner as f32;
+        // Casts saturate.
+        let first = ((middle - half) * (1.0 / LANES as f32)) as usize;
+        let last = ((middle + half) * (1.0 / LANES as f32)) as usize;
+        first..(last + 1).min(vectors)
+    }
+
+    /// Adds a colour to a part of a row of one channel.
+    #[inline(always)]
+    fn draw<S: Simd>(
+        &self,
+        simd: S,
+        color: f32,
+        start: usize,
+        y: usize,
+        span: Range<usize>,
+        errors: &mut [f32],
+    ) {
+        for vector in span {
+            let x = start + vector * LANES;
+            let weight = weight(root(simd, self.place(simd, x, y)));
+            // The padding takes what lies beyond the last column.
+            let errors: &mut Lanes = (&mut errors[x..x + LANES]).try_into().expect("whole vectors");
+            (f32x16::load_array_ref(simd, errors) + weight * color).store_array(errors);
+        }
+    }
+
+    /// The place of sixteen pixels from (x, y) on in the Gaussian's own frame.
+    #[inline(always)]
+    fn place<S: Simd>(&self, simd: S, x: usize, y: usize) -> [f32x16<S>; 2] {
         let [i11, w, i22] = self.inverse;
         let dx = centers(simd, x as u32) - self.center[0];
-        let u = dx * i11;
-        let v = dx * w + i22 * (y as f32 + 0.5 - self.center[1]);
-        let t = (f32x16::splat(simd, 1.0) - (u * u + v * v) * 0.125).max(0.0);
-        let t2 = t * t;
-        t2 * t2
+        [dx * i11, dx * w + i22 * (y as f32 + 0.5 - self.center[1])]
     }
 }
 
+/// 1 - q / 8, the fourth power of which is the quartic kernel.
+#[inline(always)]
+fn root<S: Simd>(simd: S, [u, v]: [f32x16<S>; 2]) -> f32x16<S> {
+    (f32x16::splat(simd, 1.0) - (u * u + v * v) * 0.125).max(0.0)
+}
+
+#[inline(always)]
+fn weight<S: Simd>(root: f32x16<S>) -> f32x16<S> {
+    let squared = root * root;
+    squared * squared
+}
+
+/// How squared errors change with what a Gaussian is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slopes {
+    /// What the Gaussian does as it is.
+    pub(crate) change: Change,
+    /// Derivatives by a [`Displacement`].
+    pub(crate) by_displacement: Displacement,
+}
+
 impl Patch {
-    /// Cuts out the surroundings of a Gaussian, and takes it away. Whether there are any.
+    /// Cuts out the surroundings of a Gaussian. Whether there are any.
     pub(crate) fn load(&mut self, picture: &Picture, gaussian: &Gaussian) -> bool {
         let Some([columns, rows]) = picture.bounds(gaussian) else { return false };
-        let width = columns.len().next_multiple_of(LANES);
+        let vectors = columns.len().div_ceil(LANES);
         self.corner = [columns.start, rows.start];
-        self.size = [width / LANES, rows.len()];
+        self.size = [vectors, rows.len()];
         self.channels = picture.channels;
+        self.level = Some(picture.level);
         self.errors.clear();
-        self.marks.clear();
-        for channel in 0..picture.channels {
-            for y in rows.clone() {
-                let at = (channel * picture.height + y) * picture.stride + columns.start;
-                // Of the padding, one vector lies beyond the last column at most.
-                self.errors.extend_from_slice(&picture.errors[at..at + width]);
-                self.marks.extend_from_slice(&picture.marks[at..at + width]);
+        self.ranges.clear();
+        let at = |y, channel, vector| picture.at(columns.start + vector * LANES, y, channel);
+        let mut is_clamped = false;
+        for y in rows.clone() {
+            for vector in 0..vectors {
+                for channel in 0..picture.channels {
+                    // Of the padding, one vector lies beyond the last column at most.
+                    let at = at(y, channel, vector)..at(y, channel, vector + 1);
+                    let errors = picture.errors[at.clone()].try_into();
+                    self.errors.push(errors.expect("whole vectors"));
+                    is_clamped |= picture.marks[at] != [0; LANES];
+                }
             }
         }
-        self.is_clamped = self.marks.iter().any(|&mark| mark != 0);
-        if self.is_clamped {
-            let bound =
-                |bit: u8, free: f32| move |&mark: &u8| if mark & bit != 0 { 0.0 } else { free };
-            self.low.clear();
-            self.low.extend(self.marks.iter().map(bound(NOT_BELOW, f32::MIN)));
-            self.high.clear();
-            self.high.extend(self.marks.iter().map(bound(NOT_ABOVE, f32::MAX)));
+        if is_clamped {
+            for y in rows {
+                for vector in 0..vectors {
+                    for channel in 0..picture.channels {
+                        let at = at(y, channel, vector)..at(y, channel, vector + 1);
+                        let marks = &picture.marks[at];
+                        let range = |lane: usize| range(marks[lane]);
+                        self.ranges.push([
+                            core::array::from_fn(|lane| range(lane).0),
+                            core::array::from_fn(|lane| range(lane).1),
+                        ]);
+                    }
+                }
+            }
         }
-        let level = picture.level;
-        self.level = Some(level);
-        dispatch!(level, simd => self.remove(simd, gaussian));
         true
     }
 
     /// Whether some of the errors count on one side only.
     pub(crate) fn is_clamped(&self) -> bool {
-        self.is_clamped
+        !self.ranges.is_empty()
+    }
+
+    /// Takes a Gaussian away.
+    pub(crate) fn remove(&mut self, gaussian: &Gaussian) {
+        let level = self.level.unwrap_or_else(Level::new);
+        match self.channels {
+            1 => dispatch!(level, simd => self.remove_with::<_, 1>(simd, gaussian)),
+            2 => dispatch!(level, simd => self.remove_with::<_, 2>(simd, gaussian)),
+            3 => dispatch!(level, simd => self.remove_with::<_, 3>(simd, gaussian)),
+            _ => dispatch!(level, simd => self.remove_with::<_, 4>(simd, gaussian)),
+        }
     }
 
     #[inline(always)]
-    fn remove<S: Simd>(&mut self, simd: S, gaussian: &Gaussian) {
+    fn remove_with<S: Simd, const CHANNELS: usize>(&mut self, simd: S, gaussian: &Gaussian) {
         let weights = Weights::new(gaussian);
         let [vectors, rows] = self.size;
         for row in 0..rows {
-            for vector in 0..vectors {
-                let weight =
-                    weights.at(simd, self.corner[0] + vector * LANES, self.corner[1] + row);
-                for channel in 0..self.channels {
-                    let at = ((channel * rows + row) * vectors + vector) * LANES;
-                    let errors: &mut [f32; LANES] =
-                        (&mut self.errors[at..at + LANES]).try_into().expect("whole vectors");
-                    let rest =
-                        f32x16::load_array_ref(simd, errors) - weight * gaussian.color[channel];
-                    rest.store_array(errors);
+            let y = self.corner[1] + row;
+            let span = weights.span(self.corner[0], y, vectors);
+            let x = self.corner[0] + span.start * LANES;
+            let line = &mut self.errors.as_chunks_mut::<CHANNELS>().0[row * vectors..][..vectors];
+            let line = line.get_mut(span).unwrap_or_default();
+            for (index, errors) in line.iter_mut().enumerate() {
+                let weight = weight(root(simd, weights.place(simd, x + index * LANES, y)));
+                for (errors, color) in errors.iter_mut().zip(gaussian.color) {
+                    (f32x16::load_array_ref(simd, errors) - weight * color).store_array(errors);
                 }
             }
         }
     }
 
-    /// What a Gaussian does here.
+    /// What a Gaussian does here that was taken away before.
     pub(crate) fn change(&self, gaussian: &Gaussian, model: ColorModel) -> Change {
         let level = self.level.unwrap_or_else(Level::new);
-        let (error, by_channel, weight) = if self.is_clamped {
-            dispatch!(level, simd => self.clamped_change(simd, gaussian))
-        } else {
-            dispatch!(level, simd => self.plain_change(simd, gaussian))
+        let sums = match self.channels {
+            1 => dispatch!(level, simd => self.sums::<_, 1>(simd, gaussian)),
+            2 => dispatch!(level, simd => self.sums::<_, 2>(simd, gaussian)),
+            3 => dispatch!(level, simd => self.sums::<_, 3>(simd, gaussian)),
+            _ => dispatch!(level, simd => self.sums::<_, 4>(simd, gaussian)),
         };
-        let by_axis = lattice::to_axes(by_channel, model);
-        Change { error, by_axis, weight, axes: lattice::to_axes(gaussian.color, model) }
+        let by_axis = lattice::to_axes(sums.by_channel, model);
+        let axes = lattice::to_axes(gaussian.color, model);
+        Change { error: sums.error, by_axis, weight: sums.weight, axes }
     }
 
     #[inline(always)]
-    fn plain_change<S: Simd>(&self, simd: S, gaussian: &Gaussian) -> (f32, [f32; 4], f32) {
+    fn sums<S: Simd, const CHANNELS: usize>(&self, simd: S, gaussian: &Gaussian) -> Sums {
+        if self.is_clamped() {
+            return self.clamped_sums::<S, CHANNELS>(simd, gaussian);
+        }
         let weights = Weights::new(gaussian);
         let [vectors, rows] = self.size;
         let mut squares = f32x16::splat(simd, 0.0);
-        let mut products = [squares; 4];
+        let mut products = [squares; CHANNELS];
         for row in 0..rows {
-            for vector in 0..vectors {
-                let weight =
-                    weights.at(simd, self.corner[0] + vector * LANES, self.corner[1] + row);
+            let y = self.corner[1] + row;
+            let span = weights.span(self.corner[0], y, vectors);
+            let x = self.corner[0] + span.start * LANES;
+            for (index, errors) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
+                let weight = weight(root(simd, weights.place(simd, x + index * LANES, y)));
                 squares += weight * weight;
-                for (channel, product) in products[..self.channels].iter_mut().enumerate() {
-                    *product += weight * self.vector(simd, &self.errors, channel, row, vector);
+                for (product, errors) in products.iter_mut().zip(errors) {
+                    *product += weight * f32x16::load_array_ref(simd, errors);
                 }
             }
         }
         let weight = total(squares);
-        let (mut error, mut by_channel) = (0.0, [0.0; 4]);
-        for channel in 0..self.channels {
-            let (color, product) = (gaussian.color[channel], total(products[channel]));
-            error += color * (color * weight + 2.0 * product);
-            by_channel[channel] = color * weight + product;
+        let mut sums = Sums { error: 0.0, by_channel: [0.0; 4], weight };
+        for (channel, &product) in products.iter().enumerate() {
+            let (color, product) = (gaussian.color[channel], total(product));
+            sums.error += color * (color * weight + 2.0 * product);
+            sums.by_channel[channel] = color * weight + product;
         }
-        (error, by_channel, weight)
+        sums
     }
 
     #[inline(always)]
-    fn clamped_change<S: Simd>(&self, simd: S, gaussian: &Gaussian) -> (f32, [f32; 4], f32) {
+    fn clamped_sums<S: Simd, const CHANNELS: usize>(&self, simd: S, gaussian: &Gaussian) -> Sums {
         let weights = Weights::new(gaussian);
         let [vectors, rows] = self.size;
         let zero = f32x16::splat(simd, 0.0);
-        let (mut change, mut squares, mut products) = (zero, zero, [zero; 4]);
+        let (mut change, mut squares, mut products) = (zero, zero, [zero; CHANNELS]);
         for row in 0..rows {
-            for vector in 0..vectors {
-                let weight =
-                    weights.at(simd, self.corner[0] + vector * LANES, self.corner[1] + row);
-                for (channel, product) in products[..self.channels].iter_mut().enumerate() {
-                    let low = self.vector(simd, &self.low, channel, row, vector);
-                    let high = self.vector(simd, &self.high, channel, row, vector);
-                    let without = self.vector(simd, &self.errors, channel, row, vector);
+            let y = self.corner[1] + row;
+            let span = weights.span(self.corner[0], y, vectors);
+            let x = self.corner[0] + span.start * LANES;
+            let lines =
+                self.line::<CHANNELS>(row, &span).iter().zip(self.bounds::<CHANNELS>(row, &span));
+            for (index, (errors, ranges)) in lines.enumerate() {
+                let weight = weight(root(simd, weights.place(simd, x + index * LANES, y)));
+                for channel in 0..CHANNELS {
+                    let [low, high] = &ranges[channel];
+                    let low = f32x16::load_array_ref(simd, low);
+                    let high = f32x16::load_array_ref(simd, high);
+                    let without = f32x16::load_array_ref(simd, &errors[channel]);
                     let with = without + weight * gaussian.color[channel];
                     let clamped = with.max(low).min(high);
                     let before = without.max(low).min(high);
                     change += clamped * clamped - before * before;
-                    *product += weight * clamped;
+                    products[channel] += weight * clamped;
                     let counts = clamped.simd_eq(with);
                     squares += counts.select(weight * weight, zero);
                 }
             }
         }
-        let by_channel = core::array::from_fn(|channel| total(products[channel]));
-        (total(change), by_channel, total(squares) / self.channels as f32)
+        let mut by_channel = [0.0; 4];
+        for (sum, &product) in by_channel.iter_mut().zip(&products) {
+            *sum = total(product);
+        }
+        Sums { error: total(change), by_channel, weight: total(squares) / CHANNELS as f32 }
+    }
+
+    /// What a Gaussian does here that is still part of the errors, and how that changes with it.
+    pub(crate) fn slopes(&self, gaussian: &Gaussian, model: ColorModel) -> Slopes {
+        let level = self.level.unwrap_or_else(Level::new);
+        let (sums, by_displacement) = match self.channels {
+            1 => dispatch!(level, simd => self.slopes_with::<_, 1>(simd, gaussian)),
+            2 => dispatch!(level, simd => self.slopes_with::<_, 2>(simd, gaussian)),
+            3 => dispatch!(level, simd => self.slopes_with::<_, 3>(simd, gaussian)),
+            _ => dispatch!(level, simd => self.slopes_with::<_, 4>(simd, gaussian)),
+        };
+        let by_axis = lattice::to_axes(sums.by_channel, model);
+        let axes = lattice::to_axes(gaussian.color, model);
+        let change = Change { error: sums.error, by_axis, weight: sums.weight, axes };
+        Slopes { change, by_displacement }
     }
 
     #[inline(always)]
-    fn vector<S: Simd>(
+    fn slopes_with<S: Simd, const CHANNELS: usize>(
         &self,
         simd: S,
-        values: &[f32],
-        channel: usize,
-        row: usize,
-        vector: usize,
-    ) -> f32x16<S> {
+        gaussian: &Gaussian,
+    ) -> (Sums, Displacement) {
+        let weights = Weights::new(gaussian);
         let [vectors, rows] = self.size;
-        let at = ((channel * rows + row) * vectors + vector) * LANES;
-        let values: &[f32; LANES] = values[at..at + LANES].try_into().expect("whole vectors");
-        f32x16::load_array_ref(simd, values)
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut squares, mut products) = (zero, [zero; CHANNELS]);
+        let (mut first, mut second) = ([zero; 2], [zero; 3]);
+        for row in 0..rows {
+            let y = self.corner[1] + row;
+            let span = weights.span(self.corner[0], y, vectors);
+            let x = self.corner[0] + span.start * LANES;
+            let ranges = self.bounds::<CHANNELS>(row, &span);
+            for (index, errors) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
+                let [u, v] = weights.place(simd, x + index * LANES, y);
+                let root = root(simd, [u, v]);
+                let cube = root * root * root;
+                let weight = cube * root;
+                let mut square = weight * weight;
+                let mut along = zero;
+                for channel in 0..CHANNELS {
+                    let mut error = f32x16::load_array_ref(simd, &errors[channel]);
+                    if let Some(ranges) = ranges.get(index) {
+                        let [low, high] = &ranges[channel];
+                        let low = f32x16::load_array_ref(simd, low);
+                        let clamped = error.max(low).min(f32x16::load_array_ref(simd, high));
+                        let counts = clamped.simd_eq(error);
+                        square -= counts.select(zero, weight * weight * (1.0 / CHANNELS as f32));
+                        error = clamped;
+                    }
+                    products[channel] += weight * error;
+                    along += error * gaussian.color[channel];
+                }
+                squares += square;
+                // dweight/dq is -cube / 2, and q is u^2 + v^2.
+                let slope = along * cube;
+                let (by_u, by_v) = (slope * u, slope * v);
+                first[0] += by_u;
+                first[1] += by_v;
+                second[0] += by_u * u;
+                second[1] += by_u * v;
+                second[2] += by_v * v;
+            }
+        }
+        let mut sums = Sums { error: 0.0, by_channel: [0.0; 4], weight: total(squares) };
+        for (channel, &product) in products.iter().enumerate() {
+            let (color, product) = (gaussian.color[channel], total(product));
+            sums.error += color * (2.0 * product - color * sums.weight);
+            sums.by_channel[channel] = product;
+        }
+        let along: f32 = sums.by_channel.iter().zip(gaussian.color).map(|(b, c)| b * c).sum();
+        let moments = Moments { first: first.map(total), second: second.map(total), along };
+        (sums, moments.slopes(gaussian))
     }
+
+    /// The errors of a part of a row.
+    #[inline(always)]
+    fn line<const CHANNELS: usize>(&self, row: usize, span: &Range<usize>) -> &[[Lanes; CHANNELS]] {
+        let line = self.errors.as_chunks::<CHANNELS>().0;
+        line[row * self.size[0]..][..self.size[0]].get(span.clone()).unwrap_or_default()
+    }
+
+    /// The ranges of a part of a row; none if nothing is clamped.
+    #[inline(always)]
+    fn bounds<const CHANNELS: usize>(
+        &self,
+        row: usize,
+        span: &Range<usize>,
+    ) -> &[[[Lanes; 2]; CHANNELS]] {
+        let lines = self.ranges.as_chunks::<CHANNELS>().0;
+        let start = row * self.size[0];
+        lines.get(start + span.start..start + span.end).unwrap_or_default()
+    }
+}
+
+/// Sums over a patch.
+#[derive(Clone, Copy, Debug)]
+struct Sums {
+    error: f32,
+    /// Half of the derivative by each channel.
+    by_channel: [f32; 4],
+    weight: f32,
 }
 
 #[inline(always)]
