@@ -7,48 +7,38 @@ use super::descent::Descent;
 use super::fit::Fit;
 use super::layout::Layout;
 use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE, Target};
-use super::patch;
 use super::progress::Observer;
 use super::raster::Raster;
+use super::{patch, rate};
 use crate::coding::set::{Costs, Models, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
-use crate::lattice::{self, Code, Grid, Lattice, MAX_CLASS};
+use crate::lattice::{Code, Grid, Lattice};
 use crate::limits::Limits;
 use crate::render::{Picture, RenderOptions};
 
-/// Bits that a Gaussian takes, about: what decides how many a size holds.
-pub(crate) const BITS_PER_GAUSSIAN: f64 = 31.0;
-/// The share of the error that is there before rounding.
-pub(crate) const SHARE_OF_FIT: f64 = 0.84;
 /// How often every code is looked at, when the steps are being sought and for the file.
 const SCOUTING_PASSES: u32 = 2;
 const PASSES: u32 = 8;
+/// How often steps are sought at most, and how near is near enough, as a logarithm to base 2.
+const SCOUTINGS: u32 = 4;
+const CLOSE: f64 = 0.02;
+/// How much less the size and the error become after scouting, as a logarithm to base 2.
+const SETTLING: f64 = 0.016;
+/// What is aimed at, from 0 for the least that is allowed to 1 for the most.
+const AIMED: f64 = 0.7;
+/// The pass from which on a target is steered to by what a bit is worth, how far as a logarithm to
+/// base 2, and most passes until it is met.
+const STEERED_FROM: u32 = 3;
+const STEERED_BY: f64 = 2.0;
+const MOST_PASSES: u32 = 16;
 /// The first layers of a file, as shares of its Gaussians: a tenth of the file already shows the
 /// picture.
 const LAYERS: [f64; 2] = [0.08, 0.24];
 /// Fewest Gaussians that are worth layers.
 const LEAST_LAYERED: usize = 250;
-/// How often steps are tried.
-const MAX_TRIES: u32 = 5;
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
-/// What is aimed at beyond a PSNR, in dB.
-const PSNR_AIMED: f64 = 0.02;
-/// Steps that a lattice may have.
-const STEPS: (f64, f64) = (1e-4, 16.0);
-/// Steps of geometry that harm as much as a step of colour, for a Gaussian of amplitude 1: from
-/// integrals of the quartic kernel's derivatives.
-const POSITION: f32 = 1.25;
-const SIZE: f32 = 0.66;
-const RATIO: f32 = 0.935;
-const SLANT: f32 = 1.87;
-/// Squared error that a bit is worth, in squared steps of colour: where the error of rounding
-/// falls as fast by finer steps as it grows by their bits.
-const LAMBDA: f32 = 0.322;
-/// The squared step of colour for a squared error of 1 per Gaussian.
-const STEP: f64 = 0.094;
-
 /// How many Gaussians a file of a size holds, about, up to `most`.
 pub(crate) fn count_for_size(
     bytes: u64,
@@ -57,7 +47,7 @@ pub(crate) fn count_for_size(
 ) -> Result<usize, EncodeError> {
     let least = layout.write_set(&Coded::empty(layout.header().color)).len() as u64;
     layout.check_size(bytes, least)?;
-    Ok((((bytes - least) * 8) as f64 / BITS_PER_GAUSSIAN).min(most as f64) as usize)
+    Ok((((bytes - least) * 8) as f64 / rate::BITS_PER_GAUSSIAN).min(most as f64) as usize)
 }
 
 /// The file of a finished fit for the target.
@@ -70,7 +60,7 @@ pub(crate) fn finish(
     observer: &mut Observer<'_>,
 ) -> Result<Finished, EncodeError> {
     if let Target::Psnr(psnr) = target {
-        extend(&mut fit, SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
+        extend(&mut fit, rate::SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
     }
     let (gaussians, error, work) = (fit.gaussians(), fit.best_error(), fit.work());
     // The descent needs the memory.
@@ -109,7 +99,7 @@ pub(crate) struct Coded {
 
 impl Coded {
     fn empty(model: ColorModel) -> Self {
-        Self { lattice: lattice(1.0, model), codes: Vec::new() }
+        Self { lattice: rate::lattice(0.0, model), codes: Vec::new() }
     }
 }
 
@@ -152,28 +142,57 @@ fn layer_sizes(count: usize) -> Vec<usize> {
     sizes
 }
 
-/// The lattice of a step of colour.
-fn lattice(step: f32, model: ColorModel) -> Lattice {
-    Lattice {
-        position: POSITION,
-        size: SIZE,
-        ratio: RATIO,
-        slant: SLANT,
-        color: vec![step; model.channels()],
-    }
+/// What the codes are steered to.
+#[derive(Clone, Copy, Debug)]
+enum Aim {
+    /// Bytes of the file: at most so many, and at least so many.
+    Size { most: f64, least: f64 },
+    /// Squared errors: at most, and at least.
+    Error { most: f64, least: f64 },
 }
 
-/// How a trial went.
-#[derive(Clone, Copy, Debug)]
-struct Judgement {
-    /// Bytes, or dB.
-    reached: f64,
-    aimed: f64,
-    /// What doubling the step should change.
-    slope: f64,
-    /// 0 if the target is met; the less the better, and large where it is passed on the wrong
-    /// side.
-    miss: f64,
+impl Aim {
+    fn new(target: Target, raster: &Raster) -> Option<Self> {
+        if let Target::Psnr(psnr) = target {
+            let [most, least] = [psnr, psnr + PSNR_TOLERANCE].map(|psnr| raster.error_of(psnr));
+            return Some(Self::Error { most, least });
+        }
+        let most = target.bytes(raster.pixels())? as f64;
+        Some(Self::Size { most, least: most * SIZE_TOLERANCE })
+    }
+
+    /// How far a file of a size and a squared error is from what is best to have, as a logarithm
+    /// to base 2.
+    fn off(self, size: f64, error: f64) -> f64 {
+        let (reached, most, least) = match self {
+            Self::Size { most, least } => (size, most, least),
+            Self::Error { most, least } => (error, most, least),
+        };
+        (reached / (AIMED * most + (1.0 - AIMED) * least)).log2()
+    }
+
+    fn is_met(self, size: f64, error: f64) -> bool {
+        match self {
+            Self::Size { most, least } => (least..=most).contains(&size),
+            Self::Error { most, least } => (least..=most).contains(&error),
+        }
+    }
+
+    /// By how much `off` changes when all steps double.
+    fn by_step(self) -> f64 {
+        match self {
+            Self::Size { .. } => -0.38,
+            Self::Error { .. } => 0.36,
+        }
+    }
+
+    /// By how much `off` changes when what a bit is worth doubles.
+    fn by_lambda(self) -> f64 {
+        match self {
+            Self::Size { .. } => -0.04,
+            Self::Error { .. } => 0.08,
+        }
+    }
 }
 
 /// What fitted Gaussians are coded for.
@@ -200,57 +219,51 @@ impl<'a> Coder<'a> {
         target: Target,
         observer: &mut Observer<'_>,
     ) -> Result<Coded, EncodeError> {
-        // Steps are sought by their logarithms to base 2.
-        let mut octave = 0.5 * (STEP * error / gaussians.len().max(1) as f64).log2();
-        let steered = matches!(target, Target::Psnr(_)) || target.bytes(self.pixels()).is_some();
-        let mut before: Option<(f64, f64)> = None;
-        let mut best: Option<(Coded, f64)> = None;
-        for trial in 0..MAX_TRIES {
-            let scouting = steered && trial == 0;
-            let passes = if scouting { SCOUTING_PASSES } else { PASSES };
-            let coded = self.coded(gaussians, octave.exp2(), passes, observer)?;
-            let judgement = self.judged(&coded, target, error);
-            let Judgement { reached, aimed, slope, miss } = judgement;
-            if !scouting && best.as_ref().is_none_or(|(_, least)| miss < *least) {
-                best = Some((coded, miss));
-                if miss == 0.0 {
+        let aim = Aim::new(target, self.raster);
+        // Logarithms to base 2.
+        let mut step = rate::step_for(error, gaussians.len());
+        if let Some(aim) = aim {
+            for _ in 0..SCOUTINGS {
+                let mut coded = self.rounded(gaussians, step);
+                for _ in 0..SCOUTING_PASSES {
+                    self.descend(&mut coded, 0.0, observer)?;
+                }
+                let (size, error) = self.measured(&coded);
+                let off = aim.off(size, error) - SETTLING;
+                step -= (off / aim.by_step()).clamp(-2.0, 2.0);
+                if off.abs() < CLOSE {
                     break;
                 }
             }
-            // What was seen between the last two trials, if it is not far from what is expected.
-            let seen = before.filter(|(there, _)| trial > 1 && (octave - there).abs() > 1e-3);
-            let seen = seen.map(|(there, then)| (reached - then) / (octave - there));
-            let slope = seen.filter(|seen| (0.2..5.0).contains(&(seen / slope))).unwrap_or(slope);
-            before = Some((octave, reached));
-            octave += ((aimed - reached) / slope).clamp(-1.0, 1.0);
         }
-        let (mut coded, _) = best.expect("at least one was tried");
-        if let Some(bytes) = target.bytes(self.pixels()) {
+        let mut coded = self.rounded(gaussians, step);
+        let mut lambda = 0.0;
+        for pass in 1..=MOST_PASSES {
+            let changed = self.descend(&mut coded, lambda, observer)?;
+            let Some(aim) = aim else {
+                if changed == 0 || pass == PASSES {
+                    break;
+                }
+                continue;
+            };
+            let (size, error) = self.measured(&coded);
+            if pass >= PASSES && aim.is_met(size, error) {
+                break;
+            }
+            if pass >= STEERED_FROM {
+                lambda -= (aim.off(size, error) / aim.by_lambda()).clamp(-0.5, 0.5);
+                lambda = lambda.clamp(-STEERED_BY, STEERED_BY);
+            }
+        }
+        if let Some(bytes) = target.bytes(self.raster.pixels()) {
             self.shorten(&mut coded, bytes);
         }
         Ok(coded)
     }
 
-    /// How far a trial is from the target.
-    fn judged(&self, coded: &Coded, target: Target, fit: f64) -> Judgement {
-        if let Some(bytes) = target.bytes(self.pixels()) {
-            let (reached, wanted) = (self.layout.write_set(coded).len() as f64, bytes as f64);
-            // Each of eight attributes takes a bit less when the step doubles.
-            let slope = -(coded.codes.len().max(1) as f64);
-            // What is a little too long will be shortened.
-            let off = (reached - wanted).abs() - (1.0 - SIZE_TOLERANCE) * wanted;
-            return Judgement { reached, aimed: wanted, slope, miss: off.max(0.0) };
-        }
-        let Target::Psnr(psnr) = target else {
-            return Judgement { reached: 0.0, aimed: 0.0, slope: -1.0, miss: 0.0 };
-        };
-        let error = self.rendered(coded).error();
-        let reached = 10.0 * (self.raster.error_of(0.0) / error).log10();
-        // What rounding adds to the error quadruples when the step doubles.
-        let slope = -(6.0 * (error - fit) / error).clamp(0.3, 6.0);
-        let above = reached - psnr;
-        let miss = if above < 0.0 { 1e3 - above } else { (above - PSNR_TOLERANCE).max(0.0) };
-        Judgement { reached, aimed: psnr + PSNR_AIMED, slope, miss }
+    /// The bytes of the file, and the squared error of its picture.
+    fn measured(&self, coded: &Coded) -> (f64, f64) {
+        (self.layout.write_set(coded).len() as f64, self.rendered(coded).error())
     }
 
     /// Removes the weakest Gaussians until the file has at most `bytes`.
@@ -265,42 +278,36 @@ impl<'a> Coder<'a> {
         }
     }
 
-    fn pixels(&self) -> usize {
-        self.raster.pixels()
-    }
-
-    /// Rounds `gaussians` to the lattice of a step, and descends from there.
-    fn coded(
-        &self,
-        gaussians: &[Gaussian],
-        step: f64,
-        passes: u32,
-        observer: &mut Observer<'_>,
-    ) -> Result<Coded, EncodeError> {
-        let step = step.clamp(STEPS.0, STEPS.1) as f32;
-        let lattice = lattice(step, self.model);
+    /// Rounds `gaussians` to the lattice of a step, given by its logarithm to base 2.
+    fn rounded(&self, gaussians: &[Gaussian], step: f64) -> Coded {
+        let lattice = rate::lattice(step, self.model);
         let codes = gaussians.iter().map(|gaussian| {
-            let class = class_of(gaussian, step, self.model);
+            let class = rate::class_of(gaussian, &lattice, self.model);
             lattice.code(gaussian, class, &self.grid, self.model)
         });
-        let mut coded = Coded { codes: codes.collect(), lattice };
-        for _ in 0..passes {
-            let (costs, levels, bits) = self.walked(&mut coded);
-            let mut picture = self.rendered(&coded);
-            let coding = self.coding(&coded.lattice);
-            let codes = coded.codes.iter().zip(&levels);
-            let own: f32 = codes.map(|(code, level)| coding.cost(*code, *level, &costs)).sum();
-            let tree = ((bits - own) / coded.codes.len().max(1) as f32).max(0.0);
-            let lambda = LAMBDA * step * step;
-            let descent = Descent { coding, model: self.model, costs: &costs, tree, lambda };
-            let changed = descent.pass(&mut picture, &mut coded.codes, &levels, observer)?;
-            if changed == 0 {
-                break;
-            }
-        }
+        Coded { codes: codes.collect(), lattice }
+    }
+
+    /// Looks at every code once and chooses the best, a bit being worth 2^`lambda` times as much as
+    /// usual. How many were changed.
+    fn descend(
+        &self,
+        coded: &mut Coded,
+        lambda: f64,
+        observer: &mut Observer<'_>,
+    ) -> Result<usize, EncodeError> {
+        let (costs, levels, bits) = self.walked(coded);
+        let mut picture = self.rendered(coded);
+        let coding = self.coding(&coded.lattice);
+        let codes = coded.codes.iter().zip(&levels);
+        let own: f32 = codes.map(|(code, level)| coding.cost(*code, *level, &costs)).sum();
+        let tree = ((bits - own) / coded.codes.len().max(1) as f32).max(0.0);
+        let lambda = rate::lambda(&coded.lattice) * lambda.exp2() as f32;
+        let descent = Descent { coding, model: self.model, costs: &costs, tree, lambda };
+        let changed = descent.pass(&mut picture, &mut coded.codes, &levels, observer)?;
         // For the file's order and centres.
-        self.walked(&mut coded);
-        Ok(coded)
+        self.walked(coded);
+        Ok(changed)
     }
 
     fn coding<'b>(&self, lattice: &'b Lattice) -> SetCoding<'b> {
@@ -333,12 +340,4 @@ impl<'a> Coder<'a> {
         picture.render_planes(&options, &mut planes).expect("there are no limits");
         patch::Picture::new(self.raster, &planes)
     }
-}
-
-/// The class of precision for a Gaussian's strength.
-fn class_of(gaussian: &Gaussian, step: f32, model: ColorModel) -> u32 {
-    let [l11, _, l22] = gaussian.cholesky;
-    let squared = lattice::to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
-    let steps = (squared * l11 * l22).sqrt() / step;
-    steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
 }

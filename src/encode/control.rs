@@ -8,6 +8,7 @@ use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE};
 use super::packed;
 use super::progress::Observer;
 use super::raster::Raster;
+use super::rate;
 use super::source::Source;
 use super::training::Training;
 use super::verify::{Distortion, Verified};
@@ -91,7 +92,7 @@ fn budget(
     }
     Ok(match target {
         Target::Psnr(psnr) => {
-            let share = if is_coded { coded::SHARE_OF_FIT } else { 1.0 };
+            let share = if is_coded { rate::SHARE_OF_FIT } else { 1.0 };
             Budget::Error(share * raster.error_of(psnr))
         }
         Target::Gaussians(count) => Budget::Count(count as usize),

@@ -13,6 +13,7 @@ use super::options::MAX_GAUSSIANS;
 use super::plan::Plan;
 use super::progress::{Observer, Progress};
 use super::raster::Raster;
+use super::rate::Shrinkage;
 use super::training::{Portion, Training};
 use super::{EncodeError, Precision};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
@@ -271,6 +272,8 @@ impl<'a> Fit<'a> {
         let (chart, channels) = (self.bounds.chart, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let options = &self.training.optimizer;
+        let shrinkage = (self.precision == Precision::Coded)
+            .then(|| Shrinkage::new(self.error, self.len(), channels));
         let by_chunk: Vec<StepGradients> =
             self.parameters.step(options, self.bounds, factor, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
@@ -280,6 +283,11 @@ impl<'a> Fit<'a> {
                 gradient[..2].copy_from_slice(&center.to_array());
                 gradient[2..5].copy_from_slice(&shape.to_array());
                 gradient[5..].copy_from_slice(&by_splat.color);
+                if let Some(shrinkage) = shrinkage {
+                    let gaussian = Gaussian::from_components(&decoded[..5 + channels], chart);
+                    let by_color = shrinkage.gradient(&gaussian);
+                    gradient[5..].iter_mut().zip(by_color).for_each(|(sum, part)| *sum += part);
+                }
                 if let Some(quantizers) = quantizers {
                     add(sum, &quantizers.backward(row, &decoded, &mut gradient));
                 }

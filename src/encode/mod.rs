@@ -19,6 +19,7 @@ mod patch;
 mod plan;
 mod progress;
 mod raster;
+mod rate;
 mod source;
 pub(crate) mod training;
 mod verify;
