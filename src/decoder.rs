@@ -14,7 +14,7 @@ use crate::limits::Limits;
 use crate::quantizer::Quantizer;
 use crate::render::Picture;
 
-/// Most bytes of a header or quantizer chunk of version 0: nine quantizers of twelve bytes.
+/// Most bytes of a header or quantizer chunk of version 1: nine quantizers of twelve bytes.
 const MAX_SMALL_CHUNK: u32 = 108;
 
 /// Most types that [`StreamDecoder::chunks`] tells apart: types are the file's own choice.
@@ -293,7 +293,7 @@ impl StreamDecoder {
             ChunkType::GAUS if self.lattice.is_some() => self.collected(length),
             ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
-            // A later version may add to these; version 0 reads them before any layer only.
+            // A later version may add to these; version 1 reads them before any layer only.
             _ if Metadata::knows(chunk) && self.layers == 0 => self.collected(length),
             ChunkType::GHDR | ChunkType::QNTZ => Ok(collect(length)),
             ChunkType::GEND => Ok(Stage::Skip),

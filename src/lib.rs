@@ -13,8 +13,8 @@
 //! that add up to a picture (the representation of GaussianImage++). It has no pixels until it is
 //! rendered: at any size and in any part, at a cost that follows the output. Any prefix of the
 //! file that reaches beyond its header is a picture already. The decoder's arithmetic is specified
-//! to the last bit, so all machines show the same samples. The format is a draft (version 0) and
-//! may still change.
+//! to the last bit, so all machines show the same samples, and the format (version 1) stays as it
+//! is.
 //!
 //! # Encode and decode
 //!

@@ -103,7 +103,7 @@ proptest! {
             Ghdr { color, depth, width, height, kernel, chart, cutoff, base, ..Ghdr::default() };
         let decoder = decode_valid(&File::of_floats(header, &[]).bytes());
         let found = decoder.header().expect("a complete file");
-        prop_assert_eq!((found.version, found.width, found.height), (0, width, height));
+        prop_assert_eq!((found.version, found.width, found.height), (1, width, height));
         prop_assert_eq!(found.color.channels(), header.channels());
         prop_assert_eq!(found.depth.bits(), depth);
         prop_assert_eq!((found.gaussians, found.layers), (0, 0));
@@ -156,7 +156,7 @@ proptest! {
                 Quantizer::Log(steps) => {
                     prop_assert_eq!((2, steps.scale, steps.offset), (entry.kind, entry.scale, entry.offset));
                 }
-                _ => prop_assert!(false, "a kind that version 0 does not have"),
+                _ => prop_assert!(false, "a kind that version 1 does not have"),
             }
         }
     }
@@ -381,7 +381,7 @@ fn errors_name_the_chunk_and_the_rule() {
     decode(&of_chunks(&after(sound.clone()))).1.expect("sound until it is changed");
 
     let changes: [Change<'_, Ghdr>; 20] = [
-        (&|h| h.version = 1, "GHDR: unsupported: version 1"),
+        (&|h| h.version = 2, "GHDR: unsupported: version 2"),
         (&|h| h.coding = 2, "GHDR: unsupported: coding 2"),
         (&|h| h.color = 4, "GHDR: unsupported: colour model 4"),
         (&|h| h.depth = 10, "GHDR: unsupported: sample depth 10"),
@@ -464,11 +464,11 @@ fn errors_name_the_chunk_and_the_rule() {
         (vec![s.clone(), other(b"ABCD", &[])], "ABCD: unsupported: critical chunk"),
         (vec![s.clone(), other(b"ab1d", &[])], "ab1d: the type is not four letters"),
         (vec![s.clone(), other(b"a\xFF\0d", &[])], "the type is not four letters"),
-        (vec![other(b"GHDR", &[0; 35])], "GHDR: the length is not 36 bytes"),
-        (vec![other(b"GHDR", &[0; 37])], "GHDR: the length is not 36 bytes"),
+        (vec![other(b"GHDR", &[1; 35])], "GHDR: the length is not 36 bytes"),
+        (vec![other(b"GHDR", &[1; 37])], "GHDR: the length is not 36 bytes"),
         (vec![other(b"GHDR", &[])], "GHDR: the length is not 36 bytes"),
-        (vec![other(b"GHDR", &[1; 108])], "GHDR: unsupported: version 1"),
-        (vec![other(b"GHDR", &[0; 109])], "GHDR: is too long"),
+        (vec![other(b"GHDR", &[2; 108])], "GHDR: unsupported: version 2"),
+        (vec![other(b"GHDR", &[1; 109])], "GHDR: is too long"),
         (vec![s.clone(), other(b"QNTZ", &[0; 83])], "QNTZ: the length is not 12 bytes"),
         (vec![s.clone(), other(b"QNTZ", &[0; 96])], "QNTZ: the length is not 12 bytes"),
         (vec![s.clone(), q.clone(), other(b"GAUS", &[])], "GAUS: too short"),

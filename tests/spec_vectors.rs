@@ -599,7 +599,7 @@ fn invalid_vectors() -> Vec<Vector> {
             replaced(3, chunk(b"GAUS", &payload))
         }),
         Vector::invalid("xlength-end", "GEND with a payload", replaced(5, chunk(b"GEND", &[0]))),
-        Vector::invalid("xversion", "version 1", with_header(&|h| h.version = 1)),
+        Vector::invalid("xversion", "version 2", with_header(&|h| h.version = 2)),
         Vector::invalid("xcoding", "an unknown coding", with_header(&|h| h.coding = 2)),
         Vector::invalid("xcolor", "an unknown colour model", with_header(&|h| h.color = 4)),
         Vector::invalid("xdepth", "a sample depth of 12", with_header(&|h| h.depth = 12)),

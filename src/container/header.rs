@@ -8,8 +8,8 @@ use crate::error::DecodeError;
 use crate::gaussian::Chart;
 use crate::render::Kernel;
 
-/// The version that this crate reads and writes. 0 is a draft: files may become unreadable.
-pub(crate) const VERSION: u8 = 0;
+/// The version that this crate reads and writes; 0 was a draft.
+pub(crate) const VERSION: u8 = 1;
 /// Largest width and height.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;
 /// Bytes in the payload of `GHDR`.
@@ -47,7 +47,7 @@ impl Coding {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Header {
-    /// Version of the format; 0 is a draft.
+    /// Version of the format: 1.
     pub version: u8,
     /// How the Gaussians are stored.
     pub coding: Coding,

@@ -49,7 +49,7 @@ impl Default for Ghdr {
     /// Gray, 8 bits, 16x16, no Gaussians, quartic kernel, Cholesky chart, black.
     fn default() -> Self {
         Self {
-            version: 0,
+            version: 1,
             coding: 0,
             color: GRAY,
             depth: 8,
