@@ -62,7 +62,10 @@ pub(crate) fn finish(
     if let Target::Psnr(psnr) = target {
         extend(&mut fit, rate::SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
     }
-    let (gaussians, error, work) = (fit.gaussians(), fit.best_error(), fit.work());
+    let (gaussians, error, mut work) = (fit.gaussians(), fit.best_error(), fit.work());
+    let codes = gaussians.len() * (size_of::<Gaussian>() + 2 * size_of::<Code>());
+    let memory = raster.memory() + patch::Picture::memory(raster) + codes;
+    work.peak_memory = work.peak_memory.max(memory);
     // The descent needs the memory.
     drop(fit);
     let coded = Coder::new(raster, layout).encode(&gaussians, error, target, observer)?;

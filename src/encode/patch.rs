@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use rayon::prelude::*;
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::displacement::{Displacement, Moments};
 use super::raster::Raster;
@@ -47,8 +47,8 @@ pub(crate) struct Patch {
     channels: usize,
     /// Row after row; the channels of a vector side by side.
     errors: Vec<Lanes>,
-    /// The ranges that errors are clamped to, as the errors are; empty if none are.
-    ranges: Vec<[Lanes; 2]>,
+    /// One for each vector of the errors; empty if all count.
+    marks: Vec<Marks>,
     level: Option<Level>,
 }
 
@@ -79,9 +79,34 @@ impl Change {
     }
 }
 
-/// Marks of samples whose errors count on one side only, or not at all.
+/// Bits of samples whose errors count on one side only, or not at all.
 const NOT_BELOW: u8 = 1;
 const NOT_ABOVE: u8 = 2;
+
+/// The same for sixteen samples, a bit for each.
+#[derive(Clone, Copy, Debug)]
+struct Marks {
+    not_below: u16,
+    not_above: u16,
+}
+
+impl Marks {
+    fn new(marks: &[u8]) -> Self {
+        let bits = |bit: u8| {
+            let lanes = (0..).zip(marks);
+            lanes.map(|(lane, mark)| u16::from(mark & bit != 0) << lane).sum()
+        };
+        Self { not_below: bits(NOT_BELOW), not_above: bits(NOT_ABOVE) }
+    }
+
+    /// What errors count as.
+    #[inline(always)]
+    fn clamped<S: Simd>(self, simd: S, errors: f32x16<S>) -> f32x16<S> {
+        let mask = |bits: u16| mask32x16::from_bitmask(simd, bits.into());
+        let errors = mask(self.not_below).select(errors.max(0.0), errors);
+        mask(self.not_above).select(errors.min(0.0), errors)
+    }
+}
 
 impl Picture {
     /// From a rendering, plane after plane.
@@ -110,6 +135,12 @@ impl Picture {
         Self { width, height, channels, errors, marks, stride, level: Level::new() }
     }
 
+    /// Bytes that the picture of a source takes, with patches that do not touch.
+    pub(crate) fn memory(raster: &Raster) -> usize {
+        let samples = (raster.width + LANES) * raster.height * raster.channels;
+        samples * (2 * size_of::<f32>() + size_of::<u8>())
+    }
+
     pub(crate) fn width(&self) -> usize {
         self.width
     }
@@ -122,11 +153,12 @@ impl Picture {
     pub(crate) fn error(&self) -> f64 {
         let lines = self.errors.par_chunks(self.stride).zip(self.marks.par_chunks(self.stride));
         let sums = lines.map(|(errors, marks)| {
-            let clamped = errors.iter().zip(marks).map(|(&error, &mark)| {
-                let (low, high) = range(mark);
+            let counted = errors.iter().zip(marks).map(|(&error, &mark)| {
+                let low = if mark & NOT_BELOW != 0 { 0.0 } else { f32::MIN };
+                let high = if mark & NOT_ABOVE != 0 { 0.0 } else { f32::MAX };
                 error.clamp(low, high)
             });
-            clamped.map(|error| f64::from(error * error)).sum()
+            counted.map(|error| f64::from(error * error)).sum()
         });
         sums.collect::<Vec<f64>>().iter().sum()
     }
@@ -182,13 +214,6 @@ impl Picture {
     fn at(&self, x: usize, y: usize, channel: usize) -> usize {
         (y * self.channels + channel) * self.stride + x
     }
-}
-
-/// What errors are clamped to.
-fn range(mark: u8) -> (f32, f32) {
-    let low = if mark & NOT_BELOW != 0 { 0.0 } else { f32::MIN };
-    let high = if mark & NOT_ABOVE != 0 { 0.0 } else { f32::MAX };
-    (low, high)
 }
 
 /// Where a Gaussian shows, and how strongly.
@@ -294,42 +319,32 @@ impl Patch {
         self.size = [vectors, rows.len()];
         self.channels = picture.channels;
         self.level = Some(picture.level);
+        let length = vectors * rows.len() * picture.channels;
         self.errors.clear();
-        self.ranges.clear();
-        let at = |y, channel, vector| picture.at(columns.start + vector * LANES, y, channel);
+        self.errors.reserve_exact(length);
+        self.marks.clear();
+        let lines = rows.flat_map(|y| (0..vectors).map(move |vector| (y, vector)));
+        let places = lines.flat_map(|(y, vector)| {
+            let x = columns.start + vector * LANES;
+            (0..picture.channels).map(move |channel| picture.at(x, y, channel))
+        });
         let mut is_clamped = false;
-        for y in rows.clone() {
-            for vector in 0..vectors {
-                for channel in 0..picture.channels {
-                    // Of the padding, one vector lies beyond the last column at most.
-                    let at = at(y, channel, vector)..at(y, channel, vector + 1);
-                    let errors = picture.errors[at.clone()].try_into();
-                    self.errors.push(errors.expect("whole vectors"));
-                    is_clamped |= picture.marks[at] != [0; LANES];
-                }
-            }
+        for at in places.clone() {
+            // Of the padding, one vector lies beyond the last column at most.
+            let errors = picture.errors[at..at + LANES].try_into();
+            self.errors.push(errors.expect("whole vectors"));
+            is_clamped |= picture.marks[at..at + LANES] != [0; LANES];
         }
         if is_clamped {
-            for y in rows {
-                for vector in 0..vectors {
-                    for channel in 0..picture.channels {
-                        let at = at(y, channel, vector)..at(y, channel, vector + 1);
-                        let marks = &picture.marks[at];
-                        let range = |lane: usize| range(marks[lane]);
-                        self.ranges.push([
-                            core::array::from_fn(|lane| range(lane).0),
-                            core::array::from_fn(|lane| range(lane).1),
-                        ]);
-                    }
-                }
-            }
+            self.marks.reserve_exact(length);
+            self.marks.extend(places.map(|at| Marks::new(&picture.marks[at..at + LANES])));
         }
         true
     }
 
     /// Whether some of the errors count on one side only.
     pub(crate) fn is_clamped(&self) -> bool {
-        !self.ranges.is_empty()
+        !self.marks.is_empty()
     }
 
     /// Takes a Gaussian away.
@@ -418,17 +433,14 @@ impl Patch {
             let span = weights.span(self.corner[0], y, vectors);
             let x = self.corner[0] + span.start * LANES;
             let lines =
-                self.line::<CHANNELS>(row, &span).iter().zip(self.bounds::<CHANNELS>(row, &span));
-            for (index, (errors, ranges)) in lines.enumerate() {
+                self.line::<CHANNELS>(row, &span).iter().zip(self.marks::<CHANNELS>(row, &span));
+            for (index, (errors, marks)) in lines.enumerate() {
                 let weight = weight(root(simd, weights.place(simd, x + index * LANES, y)));
                 for channel in 0..CHANNELS {
-                    let [low, high] = &ranges[channel];
-                    let low = f32x16::load_array_ref(simd, low);
-                    let high = f32x16::load_array_ref(simd, high);
                     let without = f32x16::load_array_ref(simd, &errors[channel]);
                     let with = without + weight * gaussian.color[channel];
-                    let clamped = with.max(low).min(high);
-                    let before = without.max(low).min(high);
+                    let clamped = marks[channel].clamped(simd, with);
+                    let before = marks[channel].clamped(simd, without);
                     change += clamped * clamped - before * before;
                     products[channel] += weight * clamped;
                     let counts = clamped.simd_eq(with);
@@ -473,7 +485,7 @@ impl Patch {
             let y = self.corner[1] + row;
             let span = weights.span(self.corner[0], y, vectors);
             let x = self.corner[0] + span.start * LANES;
-            let ranges = self.bounds::<CHANNELS>(row, &span);
+            let marks = self.marks::<CHANNELS>(row, &span);
             for (index, errors) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
                 let [u, v] = weights.place(simd, x + index * LANES, y);
                 let root = root(simd, [u, v]);
@@ -483,10 +495,8 @@ impl Patch {
                 let mut along = zero;
                 for channel in 0..CHANNELS {
                     let mut error = f32x16::load_array_ref(simd, &errors[channel]);
-                    if let Some(ranges) = ranges.get(index) {
-                        let [low, high] = &ranges[channel];
-                        let low = f32x16::load_array_ref(simd, low);
-                        let clamped = error.max(low).min(f32x16::load_array_ref(simd, high));
+                    if let Some(marks) = marks.get(index) {
+                        let clamped = marks[channel].clamped(simd, error);
                         let counts = clamped.simd_eq(error);
                         square -= counts.select(zero, weight * weight * (1.0 / CHANNELS as f32));
                         error = clamped;
@@ -523,14 +533,14 @@ impl Patch {
         line[row * self.size[0]..][..self.size[0]].get(span.clone()).unwrap_or_default()
     }
 
-    /// The ranges of a part of a row; none if nothing is clamped.
+    /// The marks of a part of a row; none if all errors count.
     #[inline(always)]
-    fn bounds<const CHANNELS: usize>(
+    fn marks<const CHANNELS: usize>(
         &self,
         row: usize,
         span: &Range<usize>,
-    ) -> &[[[Lanes; 2]; CHANNELS]] {
-        let lines = self.ranges.as_chunks::<CHANNELS>().0;
+    ) -> &[[Marks; CHANNELS]] {
+        let lines = self.marks.as_chunks::<CHANNELS>().0;
         let start = row * self.size[0];
         lines.get(start + span.start..start + span.end).unwrap_or_default()
     }
