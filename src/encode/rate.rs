@@ -8,7 +8,7 @@ use crate::lattice::{self, Lattice, MAX_CLASS};
 /// Bits that a Gaussian takes, about: what decides how many a size holds.
 pub(crate) const BITS_PER_GAUSSIAN: f64 = 29.0;
 /// The share of the error that is there before rounding.
-pub(crate) const SHARE_OF_FIT: f64 = 0.84;
+pub(crate) const SHARE_OF_FIT: f64 = 0.8;
 /// The squared step of colour for a squared error of 1 per Gaussian: what gives Gaussians of
 /// [`BITS_PER_GAUSSIAN`].
 const STEP: f64 = 0.22;
