@@ -9,6 +9,8 @@ use super::layout::Layout;
 use super::options::Target;
 use super::progress::Observer;
 use super::raster::Raster;
+use super::source::Source;
+use super::verify::Verified;
 use super::{patch, rate};
 use crate::coding::set::{Costs, Models, SetCoding};
 use crate::color::ColorModel;
@@ -28,6 +30,8 @@ const SETTLING: f64 = 0.016;
 /// What is aimed at: this share of a size, and beyond a PSNR, in dB.
 const SIZE_AIMED: f64 = 0.997;
 const PSNR_AIMED: f64 = 0.02;
+/// More than anything is off, as a logarithm to base 2.
+const LARGEST_OFF: f64 = 10.0;
 /// How much worse it is to miss a target on the wrong side.
 const WRONG: f64 = 1e3;
 /// Passes until a target is steered to by what a bit is worth, how far that may change, as a
@@ -58,6 +62,7 @@ pub(crate) fn count_for_size(
 /// The file of a finished fit for the target.
 pub(crate) fn finish(
     mut fit: Fit<'_>,
+    source: &Source<'_>,
     raster: &Raster,
     layout: &Layout<'_>,
     target: Target,
@@ -73,7 +78,7 @@ pub(crate) fn finish(
     work.peak_memory = work.peak_memory.max(memory);
     // The descent needs the memory.
     drop(fit);
-    let coded = Coder::new(raster, layout).encode(&gaussians, error, target, observer)?;
+    let coded = Coder::new(source, raster, layout).encode(&gaussians, error, target, observer)?;
     Ok(Finished { file: layout.write_set(&coded), work })
 }
 
@@ -155,20 +160,17 @@ fn layer_sizes(count: usize) -> Vec<usize> {
 enum Aim {
     /// Most bytes of the file.
     Size { most: f64 },
-    /// Largest squared error.
-    Error { most: f64 },
+    /// PSNR of the decoded file in dB.
+    Psnr(f64),
 }
 
 impl Aim {
     /// Aims within what is allowed, for there is some play.
-    fn new(target: Target, raster: &Raster) -> Option<Self> {
+    fn new(target: Target, pixels: usize) -> Option<Self> {
         if let Target::Psnr(psnr) = target {
-            let error = raster.error_of(psnr + PSNR_AIMED);
-            // Rounding to samples adds its own, which is more than a picture may get near a copy.
-            let rounding = (raster.pixels() * raster.channels) as f64 * raster.rounding();
-            return Some(Self::Error { most: (error - rounding).max(0.01 * error) });
+            return Some(Self::Psnr(psnr + PSNR_AIMED));
         }
-        target.bytes(raster.pixels()).map(|bytes| Self::Size { most: SIZE_AIMED * bytes as f64 })
+        target.bytes(pixels).map(|bytes| Self::Size { most: SIZE_AIMED * bytes as f64 })
     }
 
     /// By how much something is off that misses its target, and 0 for what meets it.
@@ -176,7 +178,7 @@ impl Aim {
         let (below, above) = match self {
             // What is a little too long will be shortened.
             Self::Size { .. } => (-0.011, 0.011),
-            Self::Error { .. } => (-0.006, 0.005),
+            Self::Psnr(_) => (-0.009, 0.006),
         };
         if off > above {
             // What is on the wrong side counts for more than anything on the right one.
@@ -189,7 +191,7 @@ impl Aim {
     fn by_step(self) -> f64 {
         match self {
             Self::Size { .. } => -0.38,
-            Self::Error { .. } => 0.36,
+            Self::Psnr(_) => 0.36,
         }
     }
 
@@ -197,7 +199,7 @@ impl Aim {
     fn by_lambda(self) -> f64 {
         match self {
             Self::Size { .. } => -0.04,
-            Self::Error { .. } => 0.08,
+            Self::Psnr(_) => 0.08,
         }
     }
 }
@@ -235,6 +237,7 @@ impl Search {
 /// What fitted Gaussians are coded for.
 #[derive(Debug)]
 pub(crate) struct Coder<'a> {
+    source: &'a Source<'a>,
     raster: &'a Raster,
     layout: &'a Layout<'a>,
     grid: Grid,
@@ -242,10 +245,10 @@ pub(crate) struct Coder<'a> {
 }
 
 impl<'a> Coder<'a> {
-    pub(crate) fn new(raster: &'a Raster, layout: &'a Layout<'a>) -> Self {
+    pub(crate) fn new(source: &'a Source<'a>, raster: &'a Raster, layout: &'a Layout<'a>) -> Self {
         let header = layout.header();
         let grid = Grid::new(header.width, header.height);
-        Self { raster, layout, grid, model: header.color }
+        Self { source, raster, layout, grid, model: header.color }
     }
 
     /// Codes `gaussians`, whose picture has the squared error `error`, for a target.
@@ -257,7 +260,7 @@ impl<'a> Coder<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Coded, EncodeError> {
         let step = rate::step_for(error, gaussians.len());
-        let Some(aim) = Aim::new(target, self.raster) else {
+        let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let mut coded = self.rounded(gaussians, step);
             self.descend(&mut coded, 0.0, PASSES, observer)?;
             return Ok(coded);
@@ -266,7 +269,7 @@ impl<'a> Coder<'a> {
         for _ in 0..SCOUTINGS {
             let mut coded = self.rounded(gaussians, search.at);
             self.descend(&mut coded, 0.0, SCOUTING_PASSES, observer)?;
-            let off = self.off(&coded, aim) - SETTLING;
+            let off = self.off(&coded, aim, observer)? - SETTLING;
             search.tell(off);
             if off.abs() < CLOSE {
                 break;
@@ -303,7 +306,7 @@ impl<'a> Coder<'a> {
         let mut coded = self.rounded(gaussians, step);
         let mut lambda = 0.0;
         self.descend(&mut coded, lambda, UNSTEERED_PASSES, observer)?;
-        let mut off = self.off(&coded, aim);
+        let mut off = self.off(&coded, aim, observer)?;
         for pass in UNSTEERED_PASSES..MOST_PASSES {
             if pass >= PASSES && aim.miss(off) == 0.0 {
                 break;
@@ -311,17 +314,28 @@ impl<'a> Coder<'a> {
             lambda -= (off / aim.by_lambda()).clamp(-0.5, 0.5);
             lambda = lambda.clamp(-STEERED_BY, STEERED_BY);
             self.descend(&mut coded, lambda, 1, observer)?;
-            off = self.off(&coded, aim);
+            off = self.off(&coded, aim, observer)?;
         }
         Ok((coded, off))
     }
 
     /// How far from an aim.
-    fn off(&self, coded: &Coded, aim: Aim) -> f64 {
-        match aim {
-            Aim::Size { most } => (self.layout.write_set(coded).len() as f64 / most).log2(),
-            Aim::Error { most } => (self.rendered(coded).error() / most).log2(),
-        }
+    fn off(
+        &self,
+        coded: &Coded,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<f64, EncodeError> {
+        let file = self.layout.write_set(coded);
+        Ok(match aim {
+            Aim::Size { most } => (file.len() as f64 / most).log2(),
+            Aim::Psnr(psnr) => {
+                let verified = Verified::new(&file, self.source);
+                let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
+                // An exact copy is off by no number.
+                ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_OFF)
+            }
+        })
     }
 
     /// Removes the weakest Gaussians until the file has at most `bytes`.

@@ -56,7 +56,9 @@ pub(crate) fn encode(
     // An extension takes a quarter of the time.
     let extension = training.iterations.div_ceil(4);
     let Finished { file, work } = match precision {
-        Precision::Coded => coded::finish(fit, &raster, &layout, target, extension, observer),
+        Precision::Coded => {
+            coded::finish(fit, source, &raster, &layout, target, extension, observer)
+        }
         _ => packed::finish(fit, &layout, target, budget, extension, source, observer),
     }?;
     let pixels = raster.pixels();

@@ -149,20 +149,6 @@ impl Picture {
         self.height
     }
 
-    /// Sum of squared errors, as output has them.
-    pub(crate) fn error(&self) -> f64 {
-        let lines = self.errors.par_chunks(self.stride).zip(self.marks.par_chunks(self.stride));
-        let sums = lines.map(|(errors, marks)| {
-            let counted = errors.iter().zip(marks).map(|(&error, &mark)| {
-                let low = if mark & NOT_BELOW != 0 { 0.0 } else { f32::MIN };
-                let high = if mark & NOT_ABOVE != 0 { 0.0 } else { f32::MAX };
-                error.clamp(low, high)
-            });
-            counted.map(|error| f64::from(error * error)).sum()
-        });
-        sums.collect::<Vec<f64>>().iter().sum()
-    }
-
     /// The columns and rows in which a Gaussian and its like may show; `None` outside the picture.
     pub(crate) fn bounds(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
         let [l11, l21, l22] = gaussian.cholesky;

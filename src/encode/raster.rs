@@ -77,11 +77,6 @@ impl Raster {
         (self.pixels() * self.channels) as f64 * 10_f64.powf(-psnr / 10.0)
     }
 
-    /// The squared error that rounding to the source's depth adds to a sample.
-    pub(crate) fn rounding(&self) -> f64 {
-        f64::from(self.half_step).powi(2) / 3.0
-    }
-
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
     }
