@@ -104,7 +104,7 @@ mod tests {
             let squared = color.iter().map(|color| color * color).sum::<f64>() * 2.0 * 1.5;
             let steps = squared / f64::from(lattice.color[0]).powi(2);
             let bits = 8.0 * 0.5 * (1.0 + steps).log2();
-            f64::from(SHRINKAGE) * f64::from(self::lambda(&lattice)) * bits
+            f64::from(SHRINKAGE) * f64::from(lambda(&lattice)) * bits
         };
         let gradient = Shrinkage::new(error, count, 3).gradient(&gaussian);
         for channel in 0..3 {
