@@ -1,5 +1,7 @@
 //! From fitted Gaussians to a file of coding 1 that meets its target.
 
+use rayon::prelude::*;
+
 use super::EncodeError;
 use super::budget::Budget;
 use super::control::Finished;
@@ -10,7 +12,7 @@ use super::options::Target;
 use super::progress::Observer;
 use super::raster::Raster;
 use super::source::Source;
-use super::verify::Verified;
+use super::verify::{Verified, strips};
 use super::{patch, rate};
 use crate::coding::set::{Costs, Models, SetCoding};
 use crate::color::ColorModel;
@@ -79,6 +81,7 @@ pub(crate) fn finish(
     // The descent needs the memory.
     drop(fit);
     let coded = Coder::new(source, raster, layout).encode(&gaussians, error, target, observer)?;
+    observer.poll()?;
     Ok(Finished { file: layout.write_set(&coded), work })
 }
 
@@ -353,11 +356,12 @@ impl<'a> Coder<'a> {
     /// Rounds `gaussians` to the lattice of a step, given by its logarithm to base 2.
     fn rounded(&self, gaussians: &[Gaussian], step: f64) -> Coded {
         let lattice = rate::lattice(step, self.model);
-        let codes = gaussians.iter().map(|gaussian| {
+        let codes = gaussians.par_iter().map(|gaussian| {
             let class = rate::class_of(gaussian, &lattice, self.model);
             lattice.code(gaussian, class, &self.grid, self.model)
         });
-        Coded { codes: codes.collect(), lattice }
+        let codes = codes.collect();
+        Coded { lattice, codes }
     }
 
     /// Looks at every code `passes` times and chooses the best, a bit being worth 2^`lambda` times
@@ -370,9 +374,11 @@ impl<'a> Coder<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let lambda = rate::lambda(&coded.lattice) * lambda.exp2() as f32;
+        let mut picture = patch::Picture::new(self.raster);
         for _ in 0..passes {
+            observer.poll()?;
             let (costs, levels, bits) = self.walked(coded);
-            let mut picture = self.rendered(coded);
+            self.render(coded, &mut picture, observer)?;
             let coding = self.coding(&coded.lattice);
             let codes = coded.codes.iter().zip(&levels);
             let own: f32 = codes.map(|(code, level)| coding.cost(*code, *level, &costs)).sum();
@@ -400,21 +406,27 @@ impl<'a> Coder<'a> {
         (written.models.costs(), written.levels, 8.0 * bytes as f32)
     }
 
-    /// The picture of the codes, as the decoder makes it.
-    fn rendered(&self, coded: &Coded) -> patch::Picture {
-        let gaussians: Vec<Gaussian> = coded
-            .codes
-            .iter()
-            .map(|code| {
-                let shape = coded.lattice.shape(code);
-                coded.lattice.gaussian(code, &shape, &self.grid, self.model)
-            })
-            .collect();
+    /// Sets `picture` to that of the codes, as the decoder makes it.
+    fn render(
+        &self,
+        coded: &Coded,
+        picture: &mut patch::Picture,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let Coded { lattice, codes } = coded;
+        let gaussian = |code| lattice.gaussian(code, &lattice.shape(code), &self.grid, self.model);
+        let gaussians: Vec<Gaussian> = codes.iter().map(gaussian).collect();
+        let header = self.layout.header();
         let limits = Limits::none();
-        let picture = Picture::new(self.layout.header(), &gaussians, &limits, 0);
-        let options = RenderOptions::new();
-        let mut planes = vec![0.0; self.raster.pixels() * self.raster.channels];
-        picture.render_planes(&options, &mut planes).expect("there are no limits");
-        patch::Picture::new(self.raster, &planes)
+        let mut planes = Vec::new();
+        for region in strips(header.width, header.height) {
+            observer.poll()?;
+            planes.resize(region.pixels() as usize * self.raster.channels, 0.0);
+            let options = RenderOptions::new().region(region);
+            let rendering = Picture::new(header, &gaussians, &limits, 0);
+            rendering.render_planes(&options, &mut planes).expect("there are no limits");
+            picture.set(self.raster, region.y as usize, &planes);
+        }
+        observer.poll()
     }
 }

@@ -64,6 +64,7 @@ pub(crate) fn encode(
     let pixels = raster.pixels();
     // The decoder needs memory, too.
     drop(raster);
+    observer.poll()?;
     let verified = Verified::new(&file, source);
     let gaussians = verified.gaussians();
     let distortion = verified.distortion(gaussians, observer)?;

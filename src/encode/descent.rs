@@ -59,6 +59,7 @@ impl Descent<'_> {
     ) -> Result<usize, EncodeError> {
         let mut kept = vec![true; codes.len()];
         let mut changed = 0;
+        observer.poll()?;
         for round in self.rounds(picture, codes) {
             for part in round.chunks(POLL_INTERVAL) {
                 observer.poll()?;

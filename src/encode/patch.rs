@@ -109,21 +109,16 @@ impl Marks {
 }
 
 impl Picture {
-    /// From a rendering, plane after plane.
-    pub(crate) fn new(raster: &Raster, rendering: &[f32]) -> Self {
+    /// Of nothing, until lines are set.
+    pub(crate) fn new(raster: &Raster) -> Self {
         let (width, height, channels) = (raster.width, raster.height, raster.channels);
         let stride = width + LANES;
-        let mut errors = vec![0.0; stride * height * channels];
-        let mut marks = vec![NOT_BELOW | NOT_ABOVE; errors.len()];
-        let lines = errors.par_chunks_mut(stride).zip(marks.par_chunks_mut(stride));
-        lines.enumerate().for_each(|(index, (errors, marks))| {
-            let (y, channel) = (index / channels, index % channels);
-            let rendered = &rendering[(channel * height + y) * width..][..width];
-            for (x, value) in rendered.iter().enumerate() {
-                let sample = raster.sample(x, y)[channel];
-                errors[x] = value - sample;
+        let mut marks = vec![NOT_BELOW | NOT_ABOVE; stride * height * channels];
+        marks.par_chunks_mut(stride).enumerate().for_each(|(line, marks)| {
+            let samples = raster.line(line / channels, line % channels);
+            for (mark, sample) in marks.iter_mut().zip(samples) {
                 // Output is clamped: beyond white or black where the source is so, all is well.
-                marks[x] = if sample <= 0.0 {
+                *mark = if sample <= 0.0 {
                     NOT_BELOW
                 } else if sample >= 1.0 {
                     NOT_ABOVE
@@ -132,7 +127,23 @@ impl Picture {
                 };
             }
         });
+        let errors = vec![0.0; marks.len()];
         Self { width, height, channels, errors, marks, stride, level: Level::new() }
+    }
+
+    /// Sets rows from `first` on to a rendering, plane after plane.
+    pub(crate) fn set(&mut self, raster: &Raster, first: usize, rendering: &[f32]) {
+        let (width, channels) = (self.width, self.channels);
+        let rows = rendering.len() / (width * channels);
+        let lines = self.errors.par_chunks_mut(self.stride).skip(first * channels);
+        lines.take(rows * channels).enumerate().for_each(|(line, errors)| {
+            let (row, channel) = (line / channels, line % channels);
+            let rendered = &rendering[(channel * rows + row) * width..][..width];
+            let samples = raster.line(first + row, channel);
+            for ((error, value), sample) in errors.iter_mut().zip(rendered).zip(samples) {
+                *error = value - sample;
+            }
+        });
     }
 
     /// Bytes that the picture of a source takes, with patches that do not touch.

@@ -61,6 +61,16 @@ impl Raster {
         sample
     }
 
+    /// A row of one channel, 1.0 being a full sample.
+    pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = f32> {
+        let columns = self.width.div_ceil(TILE_WIDTH);
+        let tiles = self.planes[y / TILE_HEIGHT * columns * self.channels..]
+            .chunks_exact(self.channels)
+            .take(columns);
+        let samples = tiles.flat_map(move |planes| &planes[channel][y % TILE_HEIGHT]);
+        samples.take(self.width).map(|&sample| f32::from(sample) / FULL_SCALE)
+    }
+
     /// The mean of each channel over the picture; 0 for absent channels.
     pub(crate) fn mean(&self) -> [f32; 4] {
         let mut sums = [0_u64; 4];

@@ -13,6 +13,13 @@ use crate::render::{Region, RenderOptions, Sample};
 /// the observer does not wait.
 const STRIP_PIXELS: u32 = 1 << 20;
 
+/// A picture in strips of whole rows, which are rendered and compared one by one.
+pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
+    let rows = (STRIP_PIXELS / width).max(1);
+    let region = move |y| Region { x: 0, y, width, height: rows.min(height - y) };
+    (0..height).step_by(rows as usize).map(region)
+}
+
 /// A file, decoded again.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
@@ -64,19 +71,17 @@ impl<'a> Verified<'a> {
         let channels = self.source.color().channels();
         let stride = width as usize * channels;
         let full_scale: f64 = T::OPAQUE.into();
-        let rows = (STRIP_PIXELS / width).max(1);
         let mut planes = Vec::new();
         let (mut rounded, mut exact) = (0.0, 0.0);
-        for y in (0..height).step_by(rows as usize) {
+        for region in strips(width, height) {
             observer.poll()?;
-            let region = Region { x: 0, y, width, height: rows.min(height - y) };
             let options = RenderOptions::new().region(region).prefix(count);
             let pixels = region.pixels() as usize;
             planes.resize(pixels * channels, 0.0);
             let picture = self.stream.picture().expect("the header was read");
             picture.render_planes(&options, &mut planes).expect("there are no limits");
             observer.poll()?;
-            let source = &samples[y as usize * stride..][..pixels * channels];
+            let source = &samples[region.y as usize * stride..][..pixels * channels];
             let errors = source.par_chunks_exact(stride).enumerate().map(|(row, source)| {
                 let mut errors = [0.0; 2];
                 for (index, &source) in source.iter().enumerate() {
