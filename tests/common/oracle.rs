@@ -23,7 +23,7 @@ impl Request {
 }
 
 /// Section 3.1.
-fn exp(x: f32) -> f32 {
+pub(crate) fn exp(x: f32) -> f32 {
     const COEFFICIENTS: [u32; 7] =
         [0x3921_8489, 0x3AAE_C3FF, 0x3C1D_955B, 0x3D63_5847, 0x3E75_FDF0, 0x3F31_7218, 0x3F80_0000];
     let y = (x * f32::from_bits(0x3FB8_AA3B)).clamp(-126.0, 126.0);
@@ -100,9 +100,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let mut planes: Vec<Vec<f32>> = (0..header.channels())
         .map(|c| vec![f32::from(header.base[c]) / 65535.0; width as usize * height as usize])
         .collect();
-    let codes: Vec<u32> = file.layers.concat();
-    for codes in codes.chunks(file.entries.len()).take(request.prefix) {
-        let values: Vec<f32> = file.entries.iter().zip(codes).map(|(e, &c)| value(e, c)).collect();
+    for values in file.components().into_iter().take(request.prefix) {
         let center = [values[0], values[1]];
         let stored = cholesky(header.chart, [values[2], values[3], values[4]]);
         if !is_drawable(center, stored, &values[5..]) {
