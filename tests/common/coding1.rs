@@ -58,9 +58,15 @@ impl Models {
 /// What is coded, in the order in which it is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Op {
-    Symbol { context: u32, symbol: u32 },
+    Symbol {
+        context: u32,
+        symbol: u32,
+    },
     /// At most 16 plain bits.
-    Bits { count: u32, value: u32 },
+    Bits {
+        count: u32,
+        value: u32,
+    },
 }
 
 /// The bytes from which a decoder reads `ops`.
@@ -270,11 +276,8 @@ impl Cell {
     fn parts(&self, grid: &Grid) -> [Self; 2] {
         let axis = usize::from(self.sides[1] > self.sides[0]);
         let side = self.sides[axis];
-        let half = if side > grid.root {
-            (side / grid.root).div_ceil(2) * grid.root
-        } else {
-            side / 2
-        };
+        let half =
+            if side > grid.root { (side / grid.root).div_ceil(2) * grid.root } else { side / 2 };
         let (mut first, mut second) = (*self, *self);
         first.sides[axis] = half;
         second.corner[axis] += half;
