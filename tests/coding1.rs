@@ -22,7 +22,7 @@ fn number(random: &mut Random, bits: u64) -> i32 {
 
 /// Codes of all classes, mostly small, some beyond the symbols, anywhere in the grid.
 fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
-    let grid = Grid::new(header);
+    let grid = Grid::new(header.sides());
     let class = (random.next() % 8) as u32;
     let long = if random.next().is_multiple_of(8) { 15 } else { 5 };
     let place = grid.roots.map(|roots| {
@@ -90,7 +90,7 @@ fn compare(header: &Ghdr, steps: &[f32], payload: &[u8]) {
     let count = payload.first_chunk().map_or(1, |count| u32::from_le_bytes(*count));
     let header = Ghdr { coding: 1, gaussians: count.max(1), layers: 1, ..*header };
     let (decoder, result) = decode(&with_payload(&header, steps, payload));
-    match (coding1::read(&header, steps, &mut Models::new(), payload), result) {
+    match (coding1::read(header.sides(), steps, &mut Models::new(), payload), result) {
         (Ok(layer), Ok(())) => {
             assert_eq!(oracle_bits(&layer.values), bits(decoder.gaussians()));
         }
@@ -104,7 +104,7 @@ fn layer(seed: u64) -> (Ghdr, Vec<f32>, u32, Vec<Op>) {
     let file = random_file(seed);
     let sets = file.sets.expect("coding 1");
     let mut codes = sets.layers[0].clone();
-    let ops = coding1::write(&file.header, &sets.steps, &mut codes);
+    let ops = coding1::write(file.header.sides(), &sets.steps, &mut codes);
     (file.header, sets.steps, codes.len() as u32, ops)
 }
 
@@ -122,10 +122,10 @@ proptest! {
         let mut values = Vec::new();
         for layer in &sets.layers {
             let mut codes = layer.clone();
-            let ops = coding1::write(&file.header, &sets.steps, &mut codes);
+            let ops = coding1::write(file.header.sides(), &sets.steps, &mut codes);
             let count = (codes.len() as u32).to_le_bytes();
             let payload = [&count[..], &coding1::encode(&mut written, &ops)].concat();
-            let layer = coding1::read(&file.header, &sets.steps, &mut read, &payload);
+            let layer = coding1::read(file.header.sides(), &sets.steps, &mut read, &payload);
             let layer = layer.expect("what the oracle wrote");
             prop_assert_eq!(layer.ops, ops);
             prop_assert_eq!(layer.codes, codes);

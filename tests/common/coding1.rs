@@ -1,8 +1,7 @@
 //! Coding 1 (sections 7.3 to 7.5), written from `spec/gip.md` alone: a writer that turns codes into
 //! symbols and bits and those into bytes, and a reader that gives the codes and their values.
 
-use super::Ghdr;
-use super::oracle::exp;
+use super::exp::exp;
 
 /// The steps of `QNTZ` (section 5.3): position, size, ratio, slant, then the colour axes.
 pub(crate) type Steps = [f32];
@@ -108,6 +107,7 @@ struct Decoder<'a> {
     state: u32,
     words: &'a [u8],
     ops: Vec<Op>,
+    states: Vec<u32>,
 }
 
 /// What is wrong with a layer.
@@ -120,15 +120,17 @@ impl<'a> Decoder<'a> {
         if state < 1 << 16 {
             return Err("the state begins below 2^16");
         }
-        Ok(Self { models, state, words, ops: Vec::new() })
+        Ok(Self { models, state, words, ops: Vec::new(), states: vec![state] })
     }
 
+    /// After every symbol and every number of bits.
     fn refill(&mut self) -> Result<(), Flaw> {
         if self.state < 1 << 16 {
             let (word, rest) = self.words.split_first_chunk().ok_or("no word left")?;
             self.state = self.state << 16 | u32::from(u16::from_le_bytes(*word));
             self.words = rest;
         }
+        self.states.push(self.state);
         Ok(())
     }
 
@@ -243,10 +245,11 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    pub(crate) fn new(header: &Ghdr) -> Self {
-        let longer = header.width.max(header.height);
+    /// For the width and the height of a picture.
+    pub(crate) fn new(sides: [u32; 2]) -> Self {
+        let longer = sides[0].max(sides[1]);
         let root = longer.div_ceil(16).max(8).next_power_of_two();
-        Self { root, roots: [header.width, header.height].map(|side| side.div_ceil(root) + 2) }
+        Self { root, roots: sides.map(|side| side.div_ceil(root) + 2) }
     }
 
     /// A point of the picture in units.
@@ -373,8 +376,8 @@ fn part(cell: &Cell, axis: usize, bits: u32) -> u32 {
 
 /// The symbols and bits of a layer; brings `layer` into the order of the tree and its places to
 /// where a decoder finds them.
-pub(crate) fn write(header: &Ghdr, steps: &Steps, layer: &mut Vec<Code>) -> Vec<Op> {
-    let grid = Grid::new(header);
+pub(crate) fn write(sides: [u32; 2], steps: &Steps, layer: &mut Vec<Code>) -> Vec<Op> {
+    let grid = Grid::new(sides);
     let (mut encoder, mut done) = (Encoder::default(), Vec::new());
     write_cell(&mut encoder, &grid, steps, grid.whole(), core::mem::take(layer), &mut done);
     *layer = done;
@@ -460,14 +463,16 @@ fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Layer {
     pub(crate) ops: Vec<Op>,
+    /// The state before each of them, and after the last.
+    pub(crate) states: Vec<u32>,
     pub(crate) codes: Vec<Code>,
     /// x, y, l11, l21, l22 and the amplitudes of each Gaussian.
     pub(crate) values: Vec<Vec<f32>>,
 }
 
-/// Reads the payload of a `GAUS`, in a header that leaves room for any number of Gaussians.
+/// Reads the payload of a `GAUS`, as if the header left room for any number of Gaussians.
 pub(crate) fn read(
-    header: &Ghdr,
+    sides: [u32; 2],
     steps: &Steps,
     models: &mut Models,
     payload: &[u8],
@@ -481,11 +486,11 @@ pub(crate) fn read(
         return Err("more than four Gaussians for each byte");
     }
     let mut decoder = Decoder::new(models, bytes)?;
-    let grid = Grid::new(header);
+    let grid = Grid::new(sides);
     let mut layer = Layer::default();
     read_cell(&mut decoder, &grid, steps, grid.whole(), count, &mut layer)?;
     decoder.end()?;
-    layer.ops = decoder.ops;
+    (layer.ops, layer.states) = (decoder.ops, decoder.states);
     Ok(layer)
 }
 

@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
 pub(crate) mod coding1;
+mod exp;
 pub(crate) mod oracle;
 
 use coding1::{Code, Models};
@@ -98,6 +99,10 @@ impl Ghdr {
         usize::from(self.color) + 1
     }
 
+    pub(crate) fn sides(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     pub(crate) fn components(&self) -> usize {
         5 + self.channels()
     }
@@ -183,7 +188,7 @@ impl Sets {
     fn payloads(&self, header: &Ghdr) -> Vec<Vec<u8>> {
         let mut models = Models::new();
         let payload = |layer: &Vec<Code>| {
-            let ops = coding1::write(header, &self.steps, &mut layer.clone());
+            let ops = coding1::write(header.sides(), &self.steps, &mut layer.clone());
             let count = (layer.len() as u32).to_le_bytes();
             [&count[..], &coding1::encode(&mut models, &ops)].concat()
         };
@@ -193,7 +198,7 @@ impl Sets {
     fn components(&self, header: &Ghdr) -> Vec<Vec<f32>> {
         let mut models = Models::new();
         let values = |payload: Vec<u8>| {
-            let layer = coding1::read(header, &self.steps, &mut models, &payload);
+            let layer = coding1::read(header.sides(), &self.steps, &mut models, &payload);
             layer.expect("what was just written").values
         };
         self.payloads(header).into_iter().flat_map(values).collect()

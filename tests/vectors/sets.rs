@@ -21,13 +21,13 @@ const MOST_STEP: f32 = 1024.0;
 fn at(header: &Ghdr, point: [f32; 2], first: i32) -> Code {
     let mut axes = vec![0; header.channels()];
     axes[0] = first;
-    Code { class: 2, axes, place: Grid::new(header).units(point), ..Code::default() }
+    Code { class: 2, axes, place: Grid::new(header.sides()).units(point), ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the picture.
 fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
     let mut random = Random(seed);
-    let grid = Grid::new(header);
+    let grid = Grid::new(header.sides());
     let sides = [header.width as f32, header.height as f32];
     let one = |_| {
         let class = 1 + (random.next() % 5) as u32;
@@ -308,8 +308,8 @@ pub(super) fn invalid() -> Vec<Vector> {
     let refused = |name, shows, payload: &[u8], flaw: &str| {
         let mut models = Models::new();
         let first = &chunks[2][8..chunks[2].len() - 4];
-        coding1::read(&gray, &usual_steps, &mut models, first).expect("a sound layer");
-        let found = coding1::read(&gray, &usual_steps, &mut models, payload);
+        coding1::read(gray.sides(), &usual_steps, &mut models, first).expect("a sound layer");
+        let found = coding1::read(gray.sides(), &usual_steps, &mut models, payload);
         assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
         Vector::invalid(name, shows, replaced(3, chunk(b"GAUS", payload)))
     };
@@ -332,9 +332,9 @@ pub(super) fn invalid() -> Vec<Vector> {
     // The second layer of other symbols.
     let with_ops = |change: &dyn Fn(&mut Vec<Op>)| {
         let mut models = Models::new();
-        let ops = coding1::write(&gray, &usual_steps, &mut first.clone());
+        let ops = coding1::write(gray.sides(), &usual_steps, &mut first.clone());
         coding1::encode(&mut models, &ops);
-        let mut ops = coding1::write(&gray, &usual_steps, &mut second.clone());
+        let mut ops = coding1::write(gray.sides(), &usual_steps, &mut second.clone());
         change(&mut ops);
         let count = (second.len() as u32).to_le_bytes();
         [&count[..], &coding1::encode(&mut models, &ops)].concat()
