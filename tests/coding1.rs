@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::coding1::{self, Code, Grid, Models, Op};
+use common::coding1::{self, Code, Grid};
+use common::entropy::{self, Models, Op};
 use common::{File, Ghdr, Random, bits, cases, chunk, decode_pieces, of_chunks, steps};
 use image_gip::{ChunkType, DecodeError, Limits, StreamDecoder};
 use proptest::prelude::*;
@@ -109,7 +110,7 @@ fn layer(seed: u64) -> (Ghdr, Vec<f32>, u32, Vec<Op>) {
 }
 
 fn payload(count: u32, ops: &[Op]) -> Vec<u8> {
-    [&count.to_le_bytes()[..], &coding1::encode(&mut Models::new(), ops)].concat()
+    [&count.to_le_bytes()[..], &entropy::encode(&mut Models::new(), ops)].concat()
 }
 
 proptest! {
@@ -124,7 +125,7 @@ proptest! {
             let mut codes = layer.clone();
             let ops = coding1::write(file.header.sides(), &sets.steps, &mut codes);
             let count = (codes.len() as u32).to_le_bytes();
-            let payload = [&count[..], &coding1::encode(&mut written, &ops)].concat();
+            let payload = [&count[..], &entropy::encode(&mut written, &ops)].concat();
             let layer = coding1::read(file.header.sides(), &sets.steps, &mut read, &payload);
             let layer = layer.expect("what the oracle wrote");
             prop_assert_eq!(layer.ops, ops);

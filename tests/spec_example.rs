@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::coding1::{self, Models, Op};
-use common::decode_valid;
+use common::entropy::{Models, Op};
+use common::{coding1, decode_valid};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
 const SPECIFICATION: &str = include_str!("../spec/gip.md");

@@ -17,6 +17,8 @@ pub struct File {
     height: Side,
     color: Color,
     sixteen_bit: bool,
+    /// Of coding 1, which leaves chart, quantizers and packed codes unused.
+    sets: Option<Sets>,
     kernel: Kernel,
     chart: Chart,
     base_color: [u16; 4],
@@ -25,8 +27,6 @@ pub struct File {
     channels: [Quantizer; 4],
     /// The packed codes of each layer.
     layers: Vec<Vec<u8>>,
-    /// Of coding 1, which leaves chart, quantizers and packed codes unused.
-    sets: Option<Sets>,
     extras: Vec<Extra>,
     flaw: Option<Flaw>,
 }

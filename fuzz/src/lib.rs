@@ -4,6 +4,8 @@
 #[path = "../../tests/common/coding1.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod coding1;
+#[path = "../../tests/common/entropy.rs"]
+mod entropy;
 #[path = "../../tests/common/exp.rs"]
 mod exp;
 pub mod file;

@@ -3,7 +3,8 @@
 use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
-use crate::coding1::{self, Code, Grid, Models};
+use crate::coding1::{self, Code, Grid};
+use crate::entropy::{self, Models};
 
 /// What a file of coding 1 has in place of quantizers and fixed codes.
 #[derive(Arbitrary, Debug)]
@@ -25,6 +26,7 @@ enum Layer {
     Bytes(u8, Vec<u8>),
 }
 
+/// Few bytes, so that many come together.
 #[derive(Arbitrary, Debug)]
 struct Gaussian {
     class: u8,
@@ -32,14 +34,13 @@ struct Gaussian {
     size: Number,
     ratio: Number,
     slant: Number,
-    place: [u32; 2],
+    /// In 2^-16 of the sides of the grid.
+    place: [u16; 2],
 }
 
+/// Small or large.
 #[derive(Arbitrary, Debug)]
-enum Number {
-    Small(i8),
-    Large(i32),
-}
+struct Number(i8);
 
 impl Sets {
     /// The payload of `QNTZ`.
@@ -58,7 +59,7 @@ impl Sets {
                     let code = |gaussian: &Gaussian| gaussian.code(sides, channels);
                     let mut codes: Vec<Code> = gaussians.iter().map(code).collect();
                     let ops = coding1::write(sides, &steps, &mut codes);
-                    (codes.len() as u32, coding1::encode(&mut models, &ops))
+                    (codes.len() as u32, entropy::encode(&mut models, &ops))
                 }
             };
             (count, [&count.to_le_bytes()[..], &bytes].concat())
@@ -114,24 +115,25 @@ impl Step {
 impl Gaussian {
     fn code(&self, sides: [u32; 2], channels: usize) -> Code {
         let grid = Grid::new(sides);
-        let [x, y] = grid.roots.map(|roots| roots * grid.root * 128);
+        let place = |axis: usize| {
+            let side = u64::from(grid.roots[axis] * grid.root * 128);
+            (side * u64::from(self.place[axis]) >> 16) as u32
+        };
         Code {
             class: u32::from(self.class % 8),
             axes: self.axes[..channels].iter().map(Number::value).collect(),
             size: self.size.value(),
             ratio: self.ratio.value(),
             slant: self.slant.value(),
-            place: [self.place[0] % x, self.place[1] % y],
+            place: [place(0), place(1)],
         }
     }
 }
 
 impl Number {
-    /// Within what symbols and their excess can say in every class.
+    /// Within the 65,542 that symbols and their excess can say in every class.
     fn value(&self) -> i32 {
-        match *self {
-            Self::Small(value) => value.into(),
-            Self::Large(value) => value % 65_543,
-        }
+        let value = i32::from(self.0);
+        if value.abs() < 64 { value } else { value * value * value / 32 }
     }
 }

@@ -4,10 +4,12 @@
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
 pub(crate) mod coding1;
+pub(crate) mod entropy;
 mod exp;
 pub(crate) mod oracle;
 
-use coding1::{Code, Models};
+use coding1::Code;
+use entropy::Models;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
 
 /// Section 4.1.
@@ -190,7 +192,7 @@ impl Sets {
         let payload = |layer: &Vec<Code>| {
             let ops = coding1::write(header.sides(), &self.steps, &mut layer.clone());
             let count = (layer.len() as u32).to_le_bytes();
-            [&count[..], &coding1::encode(&mut models, &ops)].concat()
+            [&count[..], &entropy::encode(&mut models, &ops)].concat()
         };
         self.layers.iter().map(payload).collect()
     }

@@ -1,6 +1,7 @@
 //! The test vectors of coding 1.
 
-use super::common::coding1::{self, Code, Grid, Models, Op};
+use super::common::coding1::{self, Code, Grid};
+use super::common::entropy::{self, Models, Op};
 use super::common::{
     COVARIANCE, EXPONENTIAL, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks,
     steps,
@@ -333,11 +334,11 @@ pub(super) fn invalid() -> Vec<Vector> {
     let with_ops = |change: &dyn Fn(&mut Vec<Op>)| {
         let mut models = Models::new();
         let ops = coding1::write(gray.sides(), &usual_steps, &mut first.clone());
-        coding1::encode(&mut models, &ops);
+        entropy::encode(&mut models, &ops);
         let mut ops = coding1::write(gray.sides(), &usual_steps, &mut second.clone());
         change(&mut ops);
         let count = (second.len() as u32).to_le_bytes();
-        [&count[..], &coding1::encode(&mut models, &ops)].concat()
+        [&count[..], &entropy::encode(&mut models, &ops)].concat()
     };
     let with_symbol = |found: &dyn Fn(u32) -> bool, wrong: u32| {
         with_ops(&|ops| {
