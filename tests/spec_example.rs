@@ -1,5 +1,5 @@
-//! The worked examples of the specification: their own hex, decoded, gives the values and the pixels
-//! that they print.
+//! The worked examples of the specification: their own hex, decoded, gives the values and the
+//! pixels that they print.
 
 mod common;
 
