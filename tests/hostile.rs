@@ -112,6 +112,20 @@ fn declared_lengths_take_no_memory() {
 }
 
 #[test]
+fn a_layer_of_coding_1_takes_memory_as_it_arrives() {
+    let _alone = alone();
+    let start = header(|h| (h.coding, h.gaussians, h.layers) = (1, 1 << 22, 1));
+    let start = [start, chunk(b"QNTZ", &common::steps(&[1.0; 5]))].concat();
+    let most = (1_u32 << 31) - 1;
+    let layer = [&most.to_le_bytes()[..], b"GAUS", &(1_u32 << 22).to_le_bytes(), &[7; 5000]];
+    let bytes = [start.as_slice(), &layer.concat()].concat();
+    let ((_, result), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::none()));
+    assert!(result.expect_err("incomplete").is_unexpected_end());
+    assert!(peak < 16_000, "{peak} bytes held");
+    assert_eq!(refusal(&bytes, Limits::default()).0, LimitKind::Memory);
+}
+
+#[test]
 fn a_small_file_of_large_gaussians_is_refused_by_its_work() {
     let _alone = alone();
     // 10 kB: one bit per component, all of them at the centre and as wide as can be.

@@ -1,42 +1,67 @@
-//! The worked example of the specification: its own hex, decoded, gives the values and the pixels
-//! that it prints.
+//! The worked examples of the specification: their own hex, decoded, gives the values and the
+//! pixels that they print.
 
 mod common;
 
-use common::decode_valid;
-use image_gip::{Picture, RenderOptions};
+use common::entropy::{Models, Op};
+use common::{coding1, decode_valid};
+use image_gip::{Gaussian, Picture, RenderOptions};
 
 const SPECIFICATION: &str = include_str!("../spec/gip.md");
 
-/// The worked example's section.
-fn section() -> &'static str {
-    SPECIFICATION.split_once("\n## 14 ").expect("section 14").1
+/// One worked example.
+#[derive(Clone, Copy)]
+struct Example(&'static str);
+
+/// Of coding 0.
+fn fixed() -> Example {
+    let (_, text) = SPECIFICATION.split_once("\n### 14.1 ").expect("section 14.1");
+    Example(text.split_once("\n### ").expect("another section").0)
 }
 
-/// The contents of the fenced blocks of this kind.
-fn blocks(kind: &str) -> Vec<&'static str> {
-    let fence = format!("```{kind}\n");
-    let after = section().split(&fence[..]).skip(1);
-    after.map(|text| text.split_once("```").expect("the block ends").0).collect()
+/// Of coding 1.
+fn sets() -> Example {
+    Example(SPECIFICATION.split_once("\n### 14.2 ").expect("section 14.2").1)
 }
 
-/// The rows of the table whose heading begins like this, cell by cell.
-fn table(heading: &str) -> Vec<Vec<&'static str>> {
-    let start = section().find(heading).expect("the table");
-    let rows = section()[start..].lines().skip(2).take_while(|line| line.starts_with('|'));
-    rows.map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect()
+impl Example {
+    /// The contents of the fenced blocks of this kind.
+    fn blocks(self, kind: &str) -> Vec<&'static str> {
+        let fence = format!("```{kind}\n");
+        let after = self.0.split(&fence[..]).skip(1);
+        after.map(|text| text.split_once("```").expect("the block ends").0).collect()
+    }
+
+    /// The rows of the table whose heading begins like this, cell by cell.
+    fn table(self, heading: &str) -> Vec<Vec<&'static str>> {
+        let start = self.0.find(heading).expect("the table");
+        let rows = self.0[start..].lines().skip(2).take_while(|line| line.starts_with('|'));
+        rows.map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect()
+    }
+
+    fn file(self) -> Vec<u8> {
+        let hex = self.blocks("hex").concat();
+        let bytes = hex
+            .lines()
+            .flat_map(|line| line.split(';').next().unwrap_or_default().split_ascii_whitespace());
+        bytes.map(|byte| u8::from_str_radix(byte, 16).expect("a byte in hex")).collect()
+    }
+
+    /// Checks that these are the Gaussians whose values are printed.
+    fn check_values(self, gaussians: &[Gaussian]) {
+        let values = self.table("| x | y |");
+        assert_eq!(values.len(), gaussians.len());
+        for (row, gaussian) in values.iter().zip(gaussians) {
+            let found = gaussian.center.iter().chain(&gaussian.cholesky);
+            let found = found.chain(&gaussian.color[..3]);
+            let printed: Vec<f32> = row.iter().map(|cell| number(cell)).collect();
+            assert!(found.eq(&printed), "{gaussian:?} is not {printed:?}");
+        }
+    }
 }
 
 fn number(text: &str) -> f32 {
     text.parse().expect("a number")
-}
-
-fn file() -> Vec<u8> {
-    let hex = blocks("hex").concat();
-    let bytes = hex
-        .lines()
-        .flat_map(|line| line.split(';').next().unwrap_or_default().split_ascii_whitespace());
-    bytes.map(|byte| u8::from_str_radix(byte, 16).expect("a byte in hex")).collect()
 }
 
 fn pixels(block: &str) -> Vec<u8> {
@@ -55,48 +80,43 @@ fn render(picture: &Picture<'_>, options: &RenderOptions) -> Vec<u8> {
 
 #[test]
 fn the_hex_decodes_to_the_values_and_pixels_that_are_printed() {
-    let decoder = decode_valid(&file());
+    let decoder = decode_valid(&fixed().file());
     let picture = decoder.picture().expect("a complete file");
     assert_eq!((picture.header().width, picture.header().height), (6, 4));
     assert_eq!(decoder.metadata().texts[0].text, "Three blobs");
 
-    let values = table("| x | y |");
-    assert_eq!(values.len(), decoder.gaussians().len());
-    for (row, gaussian) in values.iter().zip(decoder.gaussians()) {
-        let found = gaussian.center.iter().chain(&gaussian.cholesky).chain(&gaussian.color[..3]);
-        let printed: Vec<f32> = row.iter().map(|cell| number(cell)).collect();
-        assert!(found.eq(&printed), "{gaussian:?} is not {printed:?}");
-    }
+    fixed().check_values(decoder.gaussians());
     // The codes of the first layer give the first row.
-    let codes = table("| bits | component |");
-    assert!(codes.iter().map(|row| row[3]).eq(values[0].iter().copied()));
+    let codes = fixed().table("| bits | component |");
+    let values = &fixed().table("| x | y |")[0];
+    assert!(codes.iter().map(|row| row[3]).eq(values.iter().copied()));
 
-    let printed = blocks("pixels");
+    let printed = fixed().blocks("pixels");
     assert_eq!(render(&picture, &RenderOptions::new()), pixels(printed[0]));
     assert_eq!(render(&picture, &RenderOptions::new().prefix(1)), pixels(printed[1]));
 }
 
 #[test]
 fn the_integer_holds_the_codes() {
-    let (_, rest) = section().split_once("little-endian integer, are 0x").expect("the integer");
+    let (_, rest) = fixed().0.split_once("little-endian integer, are 0x").expect("the integer");
     let integer: String = rest.chars().take_while(char::is_ascii_hexdigit).collect();
     let integer = u128::from_str_radix(&integer, 16).expect("hexadecimal");
-    for row in table("| bits | component |") {
+    for row in fixed().table("| bits | component |") {
         let (first, last) = row[0].split_once(" to ").expect("a range");
         let [first, last, code] =
             [first, last, row[2]].map(|n| n.parse::<u32>().expect("a number"));
         assert_eq!(integer >> first & ((1 << (last - first + 1)) - 1), code.into(), "{row:?}");
     }
-    let start = file().len() - 12 - (12 + 22) - 4 - 9;
+    let start = fixed().file().len() - 12 - (12 + 22) - 4 - 9;
     let bytes = integer.to_le_bytes();
-    assert_eq!(file()[start..start + 9], bytes[..9]);
+    assert_eq!(fixed().file()[start..start + 9], bytes[..9]);
 }
 
 #[test]
 fn the_trace_of_one_pixel_is_what_prefixes_give() {
-    let decoder = decode_valid(&file());
+    let decoder = decode_valid(&fixed().file());
     let picture = decoder.picture().expect("a complete file");
-    let trace = table("| Gaussian | q |");
+    let trace = fixed().table("| Gaussian | q |");
     assert_eq!(trace.len(), 3);
     for (index, (row, gaussian)) in trace.iter().zip(decoder.gaussians()).enumerate() {
         let mut planes = [0.0; 6 * 4 * 3];
@@ -112,4 +132,41 @@ fn the_trace_of_one_pixel_is_what_prefixes_give() {
         let weight = (1.0 - q / 8.0).max(0.0).powi(4);
         assert!((number(row[2]) - weight).abs() < 1e-5, "the weight is {weight}");
     }
+}
+
+#[test]
+fn the_hex_of_coding_1_decodes_to_the_values_and_pixels_that_are_printed() {
+    let decoder = decode_valid(&sets().file());
+    sets().check_values(decoder.gaussians());
+    let picture = decoder.picture().expect("a complete file");
+    assert_eq!(render(&picture, &RenderOptions::new()), pixels(sets().blocks("pixels")[0]));
+}
+
+#[test]
+fn the_symbols_of_coding_1_are_those_in_the_bytes() {
+    let file = sets().file();
+    let (quantizers, layer) = (8 + 48 + 8, 8 + 48 + 40 + 8);
+    let steps = file[quantizers..quantizers + 28].as_chunks().0;
+    let steps: Vec<f32> = steps.iter().map(|step| f32::from_le_bytes(*step)).collect();
+    let layer = coding1::read([6, 4], &steps, &mut Models::new(), &file[layer..layer + 20]);
+    let layer = layer.expect("a sound layer");
+    let found = layer.ops.iter().zip(&layer.states[1..]).filter_map(|(op, state)| {
+        let (read, value) = match op {
+            Op::Symbol { context, symbol } => (format!("context {context}"), symbol),
+            Op::Bits { count: 0, .. } => return None,
+            Op::Bits { count: 1, value } => ("1 bit".into(), value),
+            Op::Bits { count, value } => (format!("{count} bits"), value),
+        };
+        Some([read, value.to_string(), format!("`{state:08X}`")])
+    });
+    let printed = sets().table("| read | value |");
+    assert!(found.eq(printed.iter().map(|row| [0, 1, 2].map(|cell| row[cell].to_string()))));
+    assert!(sets().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
+    // The values with which the first codes end.
+    let first = &layer.codes[0];
+    assert_eq!((first.class, &first.axes[..], first.ratio), (2, &[7, 1, -2][..], 1));
+    let second = &layer.codes[1];
+    assert_eq!((second.class, &second.axes[..], second.ratio), (4, &[-11, 3, 5][..], -3));
+    assert_eq!((first.slant, second.slant), (0, 41));
+    assert_eq!((first.size, second.size), (0, 31 - 33));
 }

@@ -4,6 +4,8 @@
 //! `BLESS=1 cargo test --test spec_vectors` writes the folder anew.
 
 mod common;
+#[path = "vectors/sets.rs"]
+mod sets;
 
 use core::fmt::Write as _;
 use std::fs;
@@ -789,7 +791,8 @@ fn lines(vector: &Vector) -> String {
 #[test]
 fn the_folder_holds_what_the_specification_describes() {
     let folder = Path::new(FOLDER);
-    let vectors: Vec<Vector> = valid_vectors().into_iter().chain(invalid_vectors()).collect();
+    let vectors = [valid_vectors(), sets::valid(), invalid_vectors(), sets::invalid()];
+    let vectors = vectors.into_iter().flatten().collect::<Vec<Vector>>();
     let mut index = String::from("file\trendering\tresult\tshows\n");
     for vector in &vectors {
         assert_eq!(vector.name.starts_with('x'), vector.file.is_none(), "{}", vector.name);

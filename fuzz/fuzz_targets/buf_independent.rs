@@ -4,7 +4,9 @@
 
 use std::io::{self, Read};
 
+use arbitrary::{Arbitrary, Unstructured};
 use image_gip::{Decoder, StreamDecoder};
+use image_gip_fuzz::file::File;
 use libfuzzer_sys::fuzz_target;
 
 /// All that a caller can learn from a decoder, floats by their bits.
@@ -113,7 +115,17 @@ impl Read for Pieces<'_> {
     }
 }
 
-fuzz_target!(|bytes: &[u8]| {
+/// The bytes of a file; what does not begin as one is taken for the description of one.
+fn file(input: &[u8]) -> Vec<u8> {
+    if input.starts_with(&[0xC7]) {
+        return input.to_vec();
+    }
+    let described = File::arbitrary(&mut Unstructured::new(input));
+    described.map_or_else(|_| input.to_vec(), |file| file.to_bytes())
+}
+
+fuzz_target!(|input: &[u8]| {
+    let bytes = &*file(input);
     let whole = outcome(std::iter::once(bytes));
     assert_eq!(outcome(bytes.chunks(1)), whole, "byte by byte");
     assert_eq!(outcome(Pieces::of(bytes)), whole, "in pieces");

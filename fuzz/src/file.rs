@@ -4,6 +4,9 @@
 //! what the encoder never chooses, and a mistake in it would pass unnoticed.
 
 use arbitrary::Arbitrary;
+use image_gip::{DecodeError, StreamDecoder};
+
+use crate::sets::Sets;
 
 const SIGNATURE: &[u8] = b"\xC7GIP\r\n\x1A\n";
 
@@ -14,6 +17,8 @@ pub struct File {
     height: Side,
     color: Color,
     sixteen_bit: bool,
+    /// Of coding 1, which leaves chart, quantizers and packed codes unused.
+    sets: Option<Sets>,
     kernel: Kernel,
     chart: Chart,
     base_color: [u16; 4],
@@ -100,18 +105,12 @@ struct Flaw {
 impl File {
     /// The bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let quantizers = self.quantizers();
-        let bits: usize = quantizers.iter().map(|quantizer| usize::from(quantizer.bits())).sum();
-        let layers: Vec<(u32, Vec<u8>)> = self
-            .layers
-            .iter()
-            .map(|codes| layer(codes, bits))
-            .filter(|&(count, _)| count > 0)
-            .collect();
-        let mut chunks = vec![
-            (*b"GHDR", self.header(&layers)),
-            (*b"QNTZ", quantizers.iter().flat_map(|quantizer| quantizer.entry()).collect()),
-        ];
+        let layers = self.layers();
+        let quantizers = match &self.sets {
+            None => self.quantizers().iter().flat_map(|quantizer| quantizer.entry()).collect(),
+            Some(sets) => sets.quantizers(self.channels()),
+        };
+        let mut chunks = vec![(*b"GHDR", self.header(&layers)), (*b"QNTZ", quantizers)];
         chunks.extend(layers.into_iter().map(|(_, payload)| (*b"GAUS", payload)));
         chunks.push((*b"GEND", Vec::new()));
         for extra in &self.extras {
@@ -130,11 +129,39 @@ impl File {
         file
     }
 
-    /// Whether a decoder has no reason to refuse this file but its limits. (Floats are not
-    /// promised to be finite.)
-    pub fn is_sound(&self) -> bool {
-        let finite = !self.quantizers().iter().any(|q| matches!(q, Quantizer::Float));
-        finite && self.extras.is_empty() && self.flaw.is_none()
+    /// Checks that a decoder refused this file only where it had a reason, and that it found what
+    /// the file says. (Floats are not promised to be finite.)
+    pub fn check(&self, decoder: &StreamDecoder, error: Option<&DecodeError>) {
+        if !self.extras.is_empty() || self.flaw.is_some() {
+            return;
+        }
+        assert_eq!(error.is_none(), decoder.is_complete());
+        if let Some(sets) = &self.sets {
+            sets.check(self.sides(), self.channels(), decoder, error);
+        } else if !self.quantizers().iter().any(|q| matches!(q, Quantizer::Float)) {
+            match error {
+                None | Some(DecodeError::Limit { .. }) => {}
+                Some(error) => panic!("a sound file was refused: {error}"),
+            }
+        }
+    }
+
+    /// The payloads of layers that are not empty, each with its number of Gaussians.
+    fn layers(&self) -> Vec<(u32, Vec<u8>)> {
+        if let Some(sets) = &self.sets {
+            return sets.layers(self.sides(), self.channels());
+        }
+        let bits = self.quantizers().iter().map(|quantizer| usize::from(quantizer.bits())).sum();
+        let layers = self.layers.iter().map(|codes| layer(codes, bits));
+        layers.filter(|&(count, _)| count > 0).collect()
+    }
+
+    fn sides(&self) -> [u32; 2] {
+        [self.width.pixels(), self.height.pixels()]
+    }
+
+    fn channels(&self) -> usize {
+        self.color as usize + 1
     }
 
     fn quantizers(&self) -> Vec<&Quantizer> {
@@ -149,12 +176,15 @@ impl File {
         };
         let gaussians: u32 = layers.iter().map(|&(count, _)| count).sum();
         let depth = if self.sixteen_bit { 16 } else { 8 };
-        let mut payload = vec![0, 0, self.color as u8, depth];
-        payload.extend(self.width.pixels().to_le_bytes());
-        payload.extend(self.height.pixels().to_le_bytes());
+        let (coding, chart) = match self.sets {
+            None => (0, self.chart),
+            Some(_) => (1, Chart::Cholesky),
+        };
+        let mut payload = vec![1, coding, self.color as u8, depth];
+        payload.extend(self.sides().into_iter().flat_map(u32::to_le_bytes));
         payload.extend(gaussians.to_le_bytes());
         payload.extend((layers.len() as u16).to_le_bytes());
-        payload.extend([kernel, self.chart as u8]);
+        payload.extend([kernel, chart as u8]);
         payload.extend(cutoff.to_le_bytes());
         payload.extend([0; 4]);
         for (channel, value) in self.base_color.iter().enumerate() {

@@ -1,7 +1,15 @@
 //! What the fuzz targets share: tight limits, the checks on whatever was decoded, and a generator
 //! of files that look valid.
 
+#[path = "../../tests/common/coding1.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod coding1;
+#[path = "../../tests/common/entropy.rs"]
+mod entropy;
+#[path = "../../tests/common/exp.rs"]
+mod exp;
 pub mod file;
+mod sets;
 
 use image_gip::{DecodeError, Limits, Picture, Region, RenderOptions, StreamDecoder};
 

@@ -3,8 +3,13 @@
 
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
+pub(crate) mod coding1;
+pub(crate) mod entropy;
+mod exp;
 pub(crate) mod oracle;
 
+use coding1::Code;
+use entropy::Models;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
 
 /// Section 4.1.
@@ -96,6 +101,10 @@ impl Ghdr {
         usize::from(self.color) + 1
     }
 
+    pub(crate) fn sides(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     pub(crate) fn components(&self) -> usize {
         5 + self.channels()
     }
@@ -160,6 +169,42 @@ pub(crate) struct File {
     pub(crate) extra: Vec<([u8; 4], Vec<u8>)>,
     /// Codes of each layer.
     pub(crate) layers: Vec<Vec<u32>>,
+    /// What a file of coding 1 has in place of entries and layers.
+    pub(crate) sets: Option<Sets>,
+}
+
+/// The content of a file of coding 1.
+#[derive(Clone, Debug)]
+pub(crate) struct Sets {
+    pub(crate) steps: Vec<f32>,
+    pub(crate) layers: Vec<Vec<Code>>,
+}
+
+/// The payload of `QNTZ` of coding 1.
+pub(crate) fn steps(steps: &[f32]) -> Vec<u8> {
+    steps.iter().flat_map(|step| step.to_le_bytes()).collect()
+}
+
+impl Sets {
+    /// The payloads of `GAUS`; the models learn from one to the next.
+    fn payloads(&self, header: &Ghdr) -> Vec<Vec<u8>> {
+        let mut models = Models::new();
+        let payload = |layer: &Vec<Code>| {
+            let ops = coding1::write(header.sides(), &self.steps, &mut layer.clone());
+            let count = (layer.len() as u32).to_le_bytes();
+            [&count[..], &entropy::encode(&mut models, &ops)].concat()
+        };
+        self.layers.iter().map(payload).collect()
+    }
+
+    fn components(&self, header: &Ghdr) -> Vec<Vec<f32>> {
+        let mut models = Models::new();
+        let values = |payload: Vec<u8>| {
+            let layer = coding1::read(header.sides(), &self.steps, &mut models, &payload);
+            layer.expect("what was just written").values
+        };
+        self.payloads(header).into_iter().flat_map(values).collect()
+    }
 }
 
 impl File {
@@ -175,7 +220,21 @@ impl File {
         header.layers = layers.len() as u16;
         let codes: usize = layers.iter().map(Vec::len).sum();
         header.gaussians = (codes / entries.len()) as u32;
-        Self { header, entries, extra: Vec::new(), layers }
+        Self { header, entries, extra: Vec::new(), layers, sets: None }
+    }
+
+    /// A file of coding 1 with these layers; the header's coding and counts are set to match.
+    pub(crate) fn of_sets(header: Ghdr, steps: Vec<f32>, layers: Vec<Vec<Code>>) -> Self {
+        let count: usize = layers.iter().map(Vec::len).sum();
+        let header = Ghdr {
+            coding: 1,
+            chart: CHOLESKY,
+            gaussians: count as u32,
+            layers: layers.len() as u16,
+            ..header
+        };
+        let sets = Some(Sets { steps, layers });
+        Self { header, entries: Vec::new(), extra: Vec::new(), layers: Vec::new(), sets }
     }
 
     pub(crate) fn with(mut self, kind: &[u8; 4], payload: &[u8]) -> Self {
@@ -185,12 +244,29 @@ impl File {
 
     /// The chunks in order.
     pub(crate) fn chunks(&self) -> Vec<Vec<u8>> {
-        let mut chunks =
-            vec![chunk(b"GHDR", &self.header.payload()), chunk(b"QNTZ", &qntz(&self.entries))];
+        let (quantizers, layers) = match &self.sets {
+            None => {
+                let layers = self.layers.iter().map(|codes| gaus(&self.entries, codes));
+                (qntz(&self.entries), layers.collect())
+            }
+            Some(sets) => (steps(&sets.steps), sets.payloads(&self.header)),
+        };
+        let mut chunks = vec![chunk(b"GHDR", &self.header.payload()), chunk(b"QNTZ", &quantizers)];
         chunks.extend(self.extra.iter().map(|(kind, payload)| chunk(kind, payload)));
-        chunks.extend(self.layers.iter().map(|codes| chunk(b"GAUS", &gaus(&self.entries, codes))));
+        chunks.extend(layers.iter().map(|payload| chunk(b"GAUS", payload)));
         chunks.push(chunk(b"GEND", &[]));
         chunks
+    }
+
+    /// The components of every Gaussian (section 8.1).
+    pub(crate) fn components(&self) -> Vec<Vec<f32>> {
+        if let Some(sets) = &self.sets {
+            return sets.components(&self.header);
+        }
+        let values = |codes: &[u32]| {
+            self.entries.iter().zip(codes).map(|(e, &code)| oracle::value(e, code)).collect()
+        };
+        self.layers.concat().chunks(self.entries.len()).map(values).collect()
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {

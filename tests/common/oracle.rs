@@ -1,6 +1,7 @@
 //! A second renderer, written from `spec/gip.md` alone: every Gaussian at every pixel, in `f32`
 //! in the specification's order, without tiles, footprints or vectors.
 
+use super::exp::exp;
 use super::{CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File};
 
 /// What to render (section 9.1).
@@ -20,17 +21,6 @@ impl Request {
     pub(crate) fn at(width: u32, height: u32) -> Self {
         Self { size: (width, height), region: (0, 0, width, height), prefix: usize::MAX }
     }
-}
-
-/// Section 3.1.
-fn exp(x: f32) -> f32 {
-    const COEFFICIENTS: [u32; 7] =
-        [0x3921_8489, 0x3AAE_C3FF, 0x3C1D_955B, 0x3D63_5847, 0x3E75_FDF0, 0x3F31_7218, 0x3F80_0000];
-    let y = (x * f32::from_bits(0x3FB8_AA3B)).clamp(-126.0, 126.0);
-    let n = y.round_ties_even();
-    let f = y - n;
-    let p = COEFFICIENTS.into_iter().map(f32::from_bits).reduce(|p, c| p * f + c);
-    p.unwrap_or_default() * f32::from_bits(((n as i32 + 127) as u32) << 23)
 }
 
 /// Section 3.2.
@@ -100,9 +90,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let mut planes: Vec<Vec<f32>> = (0..header.channels())
         .map(|c| vec![f32::from(header.base[c]) / 65535.0; width as usize * height as usize])
         .collect();
-    let codes: Vec<u32> = file.layers.concat();
-    for codes in codes.chunks(file.entries.len()).take(request.prefix) {
-        let values: Vec<f32> = file.entries.iter().zip(codes).map(|(e, &c)| value(e, c)).collect();
+    for values in file.components().into_iter().take(request.prefix) {
         let center = [values[0], values[1]];
         let stored = cholesky(header.chart, [values[2], values[3], values[4]]);
         if !is_drawable(center, stored, &values[5..]) {
