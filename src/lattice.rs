@@ -1,5 +1,5 @@
 //! The lattice of Gaussians that coding 1 can store: codes to values, with steps as fine as a
-//! Gaussian is strong (spec, section 8.2).
+//! Gaussian is strong (spec, sections 7.4 and 7.5).
 
 use alloc::vec::Vec;
 
