@@ -82,6 +82,7 @@ mod gaussian;
 mod image;
 #[cfg(feature = "decode")]
 mod lattice;
+#[cfg(feature = "decode")]
 mod limits;
 #[cfg(feature = "decode")]
 mod math;
@@ -102,6 +103,7 @@ pub use crate::image::{GipDecoder, register};
 pub use coding::account::AttributeBits;
 #[cfg(feature = "decode")]
 pub use color::{ColorModel, SampleDepth};
+#[cfg(feature = "decode")]
 pub use container::{ChunkType, Coding, Header, Metadata, Text};
 #[cfg(all(feature = "decode", feature = "std"))]
 pub use decoder::Decoder;

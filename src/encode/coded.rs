@@ -11,9 +11,11 @@ use super::layout::Layout;
 use super::options::Target;
 use super::progress::Observer;
 use super::raster::Raster;
+use super::rate;
+use super::residuals::Residuals;
 use super::source::Source;
+use super::steering::{Aim, Search};
 use super::verify::{Verified, strips};
-use super::{patch, rate};
 use crate::coding::set::{Costs, Models, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
@@ -29,13 +31,8 @@ const SCOUTINGS: u32 = 4;
 const CLOSE: f64 = 0.02;
 /// How much less the size and the error become after scouting, as a logarithm to base 2.
 const SETTLING: f64 = 0.016;
-/// What is aimed at: this share of a size, and beyond a PSNR, in dB.
-const SIZE_AIMED: f64 = 0.997;
-const PSNR_AIMED: f64 = 0.02;
 /// More than anything is off, as a logarithm to base 2.
 const LARGEST_OFF: f64 = 10.0;
-/// How much worse it is to miss a target on the wrong side.
-const WRONG: f64 = 1e3;
 /// Passes until a target is steered to by what a bit is worth, how far that may change, as a
 /// logarithm to base 2, and most passes until the target is met.
 const UNSTEERED_PASSES: u32 = 3;
@@ -76,7 +73,7 @@ pub(crate) fn finish(
     }
     let (gaussians, error, mut work) = (fit.gaussians(), fit.best_error(), fit.work());
     let codes = gaussians.len() * (size_of::<Gaussian>() + 2 * size_of::<Code>());
-    let memory = raster.memory() + patch::Picture::memory(raster) + codes;
+    let memory = raster.memory() + Residuals::memory(raster) + codes;
     work.peak_memory = work.peak_memory.max(memory);
     // The descent needs the memory.
     drop(fit);
@@ -156,85 +153,6 @@ fn layer_sizes(count: usize) -> Vec<usize> {
         sizes.push(last);
     }
     sizes
-}
-
-/// What the codes are steered to. How far they are from it is a logarithm to base 2.
-#[derive(Clone, Copy, Debug)]
-enum Aim {
-    /// Most bytes of the file.
-    Size { most: f64 },
-    /// PSNR of the decoded file in dB.
-    Psnr(f64),
-}
-
-impl Aim {
-    /// Aims within what is allowed, for there is some play.
-    fn new(target: Target, pixels: usize) -> Option<Self> {
-        if let Target::Psnr(psnr) = target {
-            return Some(Self::Psnr(psnr + PSNR_AIMED));
-        }
-        target.bytes(pixels).map(|bytes| Self::Size { most: SIZE_AIMED * bytes as f64 })
-    }
-
-    /// By how much something is off that misses its target, and 0 for what meets it.
-    fn miss(self, off: f64) -> f64 {
-        let (below, above) = match self {
-            // What is a little too long will be shortened.
-            Self::Size { .. } => (-0.011, 0.011),
-            Self::Psnr(_) => (-0.009, 0.006),
-        };
-        if off > above {
-            // What is on the wrong side counts for more than anything on the right one.
-            return WRONG + off;
-        }
-        (below - off).max(0.0)
-    }
-
-    /// By how much `off` changes when all steps double.
-    fn by_step(self) -> f64 {
-        match self {
-            Self::Size { .. } => -0.38,
-            Self::Psnr(_) => 0.36,
-        }
-    }
-
-    /// By how much `off` changes when what a bit is worth doubles.
-    fn by_lambda(self) -> f64 {
-        match self {
-            Self::Size { .. } => -0.04,
-            Self::Psnr(_) => 0.08,
-        }
-    }
-}
-
-/// The search for the step with which nothing is off, by secants within brackets.
-#[derive(Clone, Copy, Debug)]
-struct Search {
-    at: f64,
-    /// By how much what is off changes with the step.
-    slope: f64,
-    /// The nearest steps with which too much, and too little, is off, and by how much.
-    bracket: [Option<(f64, f64)>; 2],
-}
-
-impl Search {
-    fn new(at: f64, slope: f64) -> Self {
-        Self { at, slope, bracket: [None; 2] }
-    }
-
-    /// Goes on from how much is off with the present step.
-    fn tell(&mut self, off: f64) {
-        let told = (self.at, off);
-        let other = self.bracket[usize::from(off > 0.0)];
-        self.bracket[usize::from(off <= 0.0)] = Some(told);
-        self.at = match other {
-            Some((at, there)) => {
-                let share = (off / (off - there)).clamp(0.1, 0.9);
-                self.at + share * (at - self.at)
-            }
-            None => self.at - (off / self.slope).clamp(-2.0, 2.0),
-        };
-    }
 }
 
 /// What fitted Gaussians are coded for.
@@ -374,17 +292,17 @@ impl<'a> Coder<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let lambda = rate::lambda(&coded.lattice) * lambda.exp2() as f32;
-        let mut picture = patch::Picture::new(self.raster);
+        let mut residuals = Residuals::new(self.raster);
         for _ in 0..passes {
             observer.poll()?;
             let (costs, levels, bits) = self.walked(coded);
-            self.render(coded, &mut picture, observer)?;
+            self.render(coded, &mut residuals, observer)?;
             let coding = self.coding(&coded.lattice);
             let codes = coded.codes.iter().zip(&levels);
             let own: f32 = codes.map(|(code, level)| coding.cost(*code, *level, &costs)).sum();
             let tree = ((bits - own) / coded.codes.len().max(1) as f32).max(0.0);
             let descent = Descent { coding, model: self.model, costs: &costs, tree, lambda };
-            if descent.pass(&mut picture, &mut coded.codes, &levels, observer)? == 0 {
+            if descent.pass(&mut residuals, &mut coded.codes, &levels, observer)? == 0 {
                 break;
             }
         }
@@ -406,11 +324,11 @@ impl<'a> Coder<'a> {
         (written.models.costs(), written.levels, 8.0 * bytes as f32)
     }
 
-    /// Sets `picture` to that of the codes, as the decoder makes it.
+    /// Sets `residuals` to those of the codes, as the decoder renders them.
     fn render(
         &self,
         coded: &Coded,
-        picture: &mut patch::Picture,
+        residuals: &mut Residuals,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let Coded { lattice, codes } = coded;
@@ -425,7 +343,7 @@ impl<'a> Coder<'a> {
             let options = RenderOptions::new().region(region);
             let rendering = Picture::new(header, &gaussians, &limits, 0);
             rendering.render_planes(&options, &mut planes).expect("there are no limits");
-            picture.set(self.raster, region.y as usize, &planes);
+            residuals.set(self.raster, region.y as usize, &planes);
         }
         observer.poll()
     }

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 use super::displacement::Displacement;
 use super::error::EncodeError;
-use super::patch::{Change, Patch, Picture, Slopes};
+use super::patch::{Change, Patch, Slopes};
 use super::progress::Observer;
+use super::residuals::Residuals;
 use crate::coding::set::{Costs, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
@@ -45,14 +46,14 @@ struct Choice {
 }
 
 impl Descent<'_> {
-    /// Looks at every Gaussian once, in `picture`, and improves or removes it. The `levels` are
+    /// Looks at every Gaussian once, by `residuals`, and improves or removes it. The `levels` are
     /// those of the codes' cells. How many were changed.
     ///
     /// Gaussians that do not touch are looked at side by side; the outcome is that of one after
     /// the other.
     pub(crate) fn pass(
         &self,
-        picture: &mut Picture,
+        residuals: &mut Residuals,
         codes: &mut Vec<Code>,
         levels: &[u32],
         observer: &mut Observer<'_>,
@@ -60,10 +61,10 @@ impl Descent<'_> {
         let mut kept = vec![true; codes.len()];
         let mut changed = 0;
         observer.poll()?;
-        for round in self.rounds(picture, codes) {
+        for round in self.rounds(residuals, codes) {
             for part in round.chunks(POLL_INTERVAL) {
                 observer.poll()?;
-                let shared = &*picture;
+                let shared = &*residuals;
                 let chosen: Vec<Option<Code>> = part
                     .par_iter()
                     .map_init(Patch::default, |patch, &index| {
@@ -85,7 +86,7 @@ impl Descent<'_> {
                         None => kept[index] = false,
                     }
                 }
-                picture.add(&changes);
+                residuals.add(&changes);
             }
         }
         let mut kept = kept.into_iter();
@@ -102,11 +103,11 @@ impl Descent<'_> {
     ///
     /// Large ones, which touch many, come first. Neighbours in the order of the codes are mostly
     /// neighbours in the picture, so the others are taken far from each other.
-    fn rounds(&self, picture: &Picture, codes: &[Code]) -> Vec<Vec<usize>> {
-        let columns = picture.width().div_ceil(BLOCK);
+    fn rounds(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
+        let columns = residuals.width().div_ceil(BLOCK);
         let mut patches: Vec<_> = (codes.iter().enumerate())
             .map(|(index, code)| {
-                let blocks = picture
+                let blocks = residuals
                     .bounds(&self.gaussian(code))
                     .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
                 // Those that are not seen at all go into the first round, to be removed.
@@ -116,7 +117,7 @@ impl Descent<'_> {
             })
             .collect();
         patches.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
-        let mut next = vec![0; columns * picture.height().div_ceil(BLOCK)];
+        let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
         let mut rounds: Vec<Vec<usize>> = Vec::new();
         for (_, order, x, y) in patches {
             let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
@@ -131,9 +132,15 @@ impl Descent<'_> {
     }
 
     /// The best of a code and its neighbours; `None` if the picture is better off without.
-    fn choose(&self, picture: &Picture, patch: &mut Patch, code: Code, level: u32) -> Option<Code> {
+    fn choose(
+        &self,
+        residuals: &Residuals,
+        patch: &mut Patch,
+        code: Code,
+        level: u32,
+    ) -> Option<Code> {
         let here = self.gaussian(&code);
-        patch.load(picture, &here).then_some(())?;
+        patch.load(residuals, &here).then_some(())?;
         let slopes = patch.slopes(&here, self.model);
         let present = slopes.change.error + self.lambda * self.bits(code, level);
         let promising = self.promising(&slopes, code, &here, level, present);

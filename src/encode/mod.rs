@@ -20,7 +20,9 @@ mod plan;
 mod progress;
 mod raster;
 mod rate;
+mod residuals;
 mod source;
+mod steering;
 pub(crate) mod training;
 mod verify;
 

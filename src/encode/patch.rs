@@ -2,40 +2,13 @@
 
 use core::ops::Range;
 
-use rayon::prelude::*;
-
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::displacement::{Displacement, Moments};
-use super::raster::Raster;
+use super::residuals::{LANES, Lanes, Marks, Residuals, Weights, root, weight};
 use crate::color::ColorModel;
-use crate::gaussian::{Gaussian, inverse_cholesky};
+use crate::gaussian::Gaussian;
 use crate::lattice;
-use crate::render::centers;
-
-const LANES: usize = 16;
-type Lanes = [f32; LANES];
-/// Rows of a picture that one thread changes at a time.
-const BAND: usize = 64;
-/// How much larger than its Gaussian a patch is, for candidates to lie within, and in pixels.
-const MARGIN: (f32, f32) = (1.2, 1.0);
-/// Mahalanobis distance at which the quartic kernel ends.
-const RADIUS: f32 = 2.828_427;
-
-/// A rendering and its errors, before clamping.
-#[derive(Debug)]
-pub(crate) struct Picture {
-    width: usize,
-    height: usize,
-    channels: usize,
-    /// Rendering minus source, row after row, in each channel after channel; padded for whole
-    /// vectors.
-    errors: Vec<f32>,
-    /// Which errors are clamped; in the layout of `errors`.
-    marks: Vec<u8>,
-    stride: usize,
-    level: Level,
-}
 
 /// The surroundings of one Gaussian.
 #[derive(Debug, Default)]
@@ -79,225 +52,6 @@ impl Change {
     }
 }
 
-/// Bits of samples whose errors count on one side only, or not at all.
-const NOT_BELOW: u8 = 1;
-const NOT_ABOVE: u8 = 2;
-
-/// The same for sixteen samples, a bit for each.
-#[derive(Clone, Copy, Debug)]
-struct Marks {
-    not_below: u16,
-    not_above: u16,
-}
-
-impl Marks {
-    fn new(marks: &[u8]) -> Self {
-        let bits = |bit: u8| {
-            let lanes = (0..).zip(marks);
-            lanes.map(|(lane, mark)| u16::from(mark & bit != 0) << lane).sum()
-        };
-        Self { not_below: bits(NOT_BELOW), not_above: bits(NOT_ABOVE) }
-    }
-
-    /// What errors count as.
-    #[inline(always)]
-    fn clamped<S: Simd>(self, simd: S, errors: f32x16<S>) -> f32x16<S> {
-        let mask = |bits: u16| mask32x16::from_bitmask(simd, bits.into());
-        let errors = mask(self.not_below).select(errors.max(0.0), errors);
-        mask(self.not_above).select(errors.min(0.0), errors)
-    }
-}
-
-impl Picture {
-    /// Of nothing, until lines are set.
-    pub(crate) fn new(raster: &Raster) -> Self {
-        let (width, height, channels) = (raster.width, raster.height, raster.channels);
-        let stride = width + LANES;
-        let mut marks = vec![NOT_BELOW | NOT_ABOVE; stride * height * channels];
-        marks.par_chunks_mut(stride).enumerate().for_each(|(line, marks)| {
-            let samples = raster.line(line / channels, line % channels);
-            for (mark, sample) in marks.iter_mut().zip(samples) {
-                // Output is clamped: beyond white or black where the source is so, all is well.
-                *mark = if sample <= 0.0 {
-                    NOT_BELOW
-                } else if sample >= 1.0 {
-                    NOT_ABOVE
-                } else {
-                    0
-                };
-            }
-        });
-        let errors = vec![0.0; marks.len()];
-        Self { width, height, channels, errors, marks, stride, level: Level::new() }
-    }
-
-    /// Sets rows from `first` on to a rendering, plane after plane.
-    pub(crate) fn set(&mut self, raster: &Raster, first: usize, rendering: &[f32]) {
-        let (width, channels) = (self.width, self.channels);
-        let rows = rendering.len() / (width * channels);
-        let lines = self.errors.par_chunks_mut(self.stride).skip(first * channels);
-        lines.take(rows * channels).enumerate().for_each(|(line, errors)| {
-            let (row, channel) = (line / channels, line % channels);
-            let rendered = &rendering[(channel * rows + row) * width..][..width];
-            let samples = raster.line(first + row, channel);
-            for ((error, value), sample) in errors.iter_mut().zip(rendered).zip(samples) {
-                *error = value - sample;
-            }
-        });
-    }
-
-    /// Bytes that the picture of a source takes, with patches that do not touch.
-    pub(crate) fn memory(raster: &Raster) -> usize {
-        let samples = (raster.width + LANES) * raster.height * raster.channels;
-        samples * (2 * size_of::<f32>() + size_of::<u8>())
-    }
-
-    pub(crate) fn width(&self) -> usize {
-        self.width
-    }
-
-    pub(crate) fn height(&self) -> usize {
-        self.height
-    }
-
-    /// The columns and rows in which a Gaussian and its like may show; `None` outside the picture.
-    pub(crate) fn bounds(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
-        let [l11, l21, l22] = gaussian.cholesky;
-        let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
-        let mut bounds = [0..0, 0..0];
-        for (axis, length) in [self.width, self.height].into_iter().enumerate() {
-            let reach = RADIUS * (MARGIN.0 * extents[axis]) + MARGIN.1;
-            // Casts saturate.
-            let first = (gaussian.center[axis] - reach - 0.5).ceil().max(0.0) as usize;
-            let end = (gaussian.center[axis] + reach + 0.5).floor().max(0.0) as usize;
-            bounds[axis] = first..end.min(length);
-            if bounds[axis].is_empty() {
-                return None;
-            }
-        }
-        Some(bounds)
-    }
-
-    /// Adds Gaussians to the rendering, each as often as its factor says.
-    pub(crate) fn add(&mut self, gaussians: &[(Gaussian, f32)]) {
-        let (level, stride, channels) = (self.level, self.stride, self.channels);
-        let added: Vec<_> = gaussians
-            .iter()
-            .filter_map(|(gaussian, factor)| {
-                let color = gaussian.color.map(|color| color * factor);
-                self.bounds(gaussian).map(|bounds| (Weights::new(gaussian), color, bounds))
-            })
-            .collect();
-        // Whatever thread takes a band, everything comes in the same order.
-        let bands = self.errors.par_chunks_mut(stride * channels * BAND);
-        bands.enumerate().for_each(|(band, errors)| {
-            for (weights, color, [columns, rows]) in &added {
-                let first = band * BAND;
-                let rows = rows.start.max(first)..rows.end.min(first + BAND);
-                for y in rows {
-                    let rows = errors.chunks_exact_mut(stride).skip((y - first) * channels);
-                    let start = columns.start;
-                    let span = weights.span(start, y, columns.len().div_ceil(LANES));
-                    for (row, &color) in rows.take(channels).zip(color) {
-                        let span = span.clone();
-                        dispatch!(level, simd => weights.draw(simd, color, start, y, span, row));
-                    }
-                }
-            }
-        });
-    }
-
-    /// Where the error of a sample is.
-    fn at(&self, x: usize, y: usize, channel: usize) -> usize {
-        (y * self.channels + channel) * self.stride + x
-    }
-}
-
-/// Where a Gaussian shows, and how strongly.
-#[derive(Clone, Copy, Debug)]
-struct Weights {
-    center: [f32; 2],
-    inverse: [f32; 3],
-    /// Of a row by its distance from the centre: how far its middle is moved along x for every
-    /// pixel, the squared half of its length at the centre, and how that falls with the squared
-    /// distance.
-    middle: f32,
-    half: f32,
-    fall: f32,
-}
-
-impl Weights {
-    fn new(gaussian: &Gaussian) -> Self {
-        let inverse = inverse_cholesky(gaussian.cholesky);
-        let [i11, w, i22] = inverse;
-        let a = i11 * i11 + w * w;
-        let ratio = i11 * i22 / a;
-        Self {
-            center: gaussian.center,
-            inverse,
-            middle: -w * i22 / a,
-            half: RADIUS * RADIUS / a,
-            fall: ratio * ratio,
-        }
-    }
-
-    /// The vectors of a row, counted from a column, that the Gaussian shows in.
-    #[inline(always)]
-    fn span(&self, corner: usize, y: usize, vectors: usize) -> Range<usize> {
-        let dy = y as f32 + 0.5 - self.center[1];
-        let squared = self.half - self.fall * dy * dy;
-        if squared <= 0.0 {
-            return 0..0;
-        }
-        let half = squared.sqrt();
-        let middle = self.center[0] + self.middle * dy - 0.5 - corner as f32;
-        // Casts saturate.
-        let first = ((middle - half) * (1.0 / LANES as f32)) as usize;
-        let last = ((middle + half) * (1.0 / LANES as f32)) as usize;
-        first..(last + 1).min(vectors)
-    }
-
-    /// Adds a colour to a part of a row of one channel.
-    #[inline(always)]
-    fn draw<S: Simd>(
-        &self,
-        simd: S,
-        color: f32,
-        start: usize,
-        y: usize,
-        span: Range<usize>,
-        errors: &mut [f32],
-    ) {
-        for vector in span {
-            let x = start + vector * LANES;
-            let weight = weight(root(simd, self.place(simd, x, y)));
-            // The padding takes what lies beyond the last column.
-            let errors: &mut Lanes = (&mut errors[x..x + LANES]).try_into().expect("whole vectors");
-            (f32x16::load_array_ref(simd, errors) + weight * color).store_array(errors);
-        }
-    }
-
-    /// The place of sixteen pixels from (x, y) on in the Gaussian's own frame.
-    #[inline(always)]
-    fn place<S: Simd>(&self, simd: S, x: usize, y: usize) -> [f32x16<S>; 2] {
-        let [i11, w, i22] = self.inverse;
-        let dx = centers(simd, x as u32) - self.center[0];
-        [dx * i11, dx * w + i22 * (y as f32 + 0.5 - self.center[1])]
-    }
-}
-
-/// 1 - q / 8, the fourth power of which is the quartic kernel.
-#[inline(always)]
-fn root<S: Simd>(simd: S, [u, v]: [f32x16<S>; 2]) -> f32x16<S> {
-    (f32x16::splat(simd, 1.0) - (u * u + v * v) * 0.125).max(0.0)
-}
-
-#[inline(always)]
-fn weight<S: Simd>(root: f32x16<S>) -> f32x16<S> {
-    let squared = root * root;
-    squared * squared
-}
-
 /// How squared errors change with what a Gaussian is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slopes {
@@ -309,32 +63,30 @@ pub(crate) struct Slopes {
 
 impl Patch {
     /// Cuts out the surroundings of a Gaussian. Whether there are any.
-    pub(crate) fn load(&mut self, picture: &Picture, gaussian: &Gaussian) -> bool {
-        let Some([columns, rows]) = picture.bounds(gaussian) else { return false };
-        let vectors = columns.len().div_ceil(LANES);
+    pub(crate) fn load(&mut self, residuals: &Residuals, gaussian: &Gaussian) -> bool {
+        let Some([columns, rows]) = residuals.bounds(gaussian) else { return false };
+        let (vectors, channels) = (columns.len().div_ceil(LANES), residuals.channels());
         self.corner = [columns.start, rows.start];
         self.size = [vectors, rows.len()];
-        self.channels = picture.channels;
-        self.level = Some(picture.level);
-        let length = vectors * rows.len() * picture.channels;
+        self.channels = channels;
+        self.level = Some(residuals.level());
+        let length = vectors * rows.len() * channels;
         self.errors.clear();
         self.errors.reserve_exact(length);
         self.marks.clear();
         let lines = rows.flat_map(|y| (0..vectors).map(move |vector| (y, vector)));
-        let places = lines.flat_map(|(y, vector)| {
+        let parts = lines.flat_map(|(y, vector)| {
             let x = columns.start + vector * LANES;
-            (0..picture.channels).map(move |channel| picture.at(x, y, channel))
+            (0..channels).map(move |channel| residuals.vector(x, y, channel))
         });
         let mut is_clamped = false;
-        for at in places.clone() {
-            // Of the padding, one vector lies beyond the last column at most.
-            let errors = picture.errors[at..at + LANES].try_into();
-            self.errors.push(errors.expect("whole vectors"));
-            is_clamped |= picture.marks[at..at + LANES] != [0; LANES];
+        for (errors, marks) in parts.clone() {
+            self.errors.push(*errors);
+            is_clamped |= *marks != [0; LANES];
         }
         if is_clamped {
             self.marks.reserve_exact(length);
-            self.marks.extend(places.map(|at| Marks::new(&picture.marks[at..at + LANES])));
+            self.marks.extend(parts.map(|(_, marks)| Marks::new(marks)));
         }
         true
     }
@@ -555,4 +307,196 @@ struct Sums {
 #[inline(always)]
 fn total<S: Simd>(vector: f32x16<S>) -> f32 {
     vector.to_array().iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::raster::Raster;
+    use crate::encode::source::Source;
+
+    const WIDTH: usize = 45;
+    const HEIGHT: usize = 37;
+
+    /// A source with black and white in it, if wanted, its raster, and a rendering.
+    fn scene(channels: usize, clamped: bool) -> (Vec<u8>, Vec<f32>) {
+        let mut random = fastrand::Rng::with_seed(3);
+        let source = (0..WIDTH * HEIGHT * channels)
+            .map(|_| match random.u8(..) {
+                value @ (0..40 | 216..) if clamped => {
+                    if value < 40 {
+                        0
+                    } else {
+                        255
+                    }
+                }
+                value => value.clamp(1, 254),
+            })
+            .collect();
+        let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
+        (source, rendering)
+    }
+
+    fn gaussians() -> Vec<Gaussian> {
+        let gaussian =
+            |center, cholesky| Gaussian { center, cholesky, color: [0.3, -0.2, 0.1, 0.25] };
+        vec![
+            gaussian([20.3, 17.8], [3.0, 1.0, 2.0]),
+            gaussian([2.0, 36.0], [6.0, -9.0, 0.5]),
+            gaussian([44.6, 10.0], [0.4, 0.0, 0.4]),
+            gaussian([22.0, 18.0], [200.0, 100.0, 90.0]),
+        ]
+    }
+
+    /// The sum of squared errors with a Gaussian added to the rendering `factor` times, in f64.
+    fn plain(
+        (source, rendering): &(Vec<u8>, Vec<f32>),
+        channels: usize,
+        gaussian: &Gaussian,
+        factor: f64,
+    ) -> f64 {
+        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
+        let mut sum = 0.0;
+        for (at, &sample) in source.iter().enumerate() {
+            let (pixel, channel) = (at / channels, at % channels);
+            let (x, y) = (pixel % WIDTH, pixel / WIDTH);
+            let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
+            let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
+            let weight = (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4);
+            let value = f64::from(rendering[channel * WIDTH * HEIGHT + pixel])
+                + factor * weight * f64::from(gaussian.color[channel]);
+            let error = value - f64::from(sample) / 255.0;
+            let counts = match sample {
+                0 => error.max(0.0),
+                255 => error.min(0.0),
+                _ => error,
+            };
+            sum += counts * counts;
+        }
+        sum
+    }
+
+    fn residuals((source, rendering): &(Vec<u8>, Vec<f32>), model: ColorModel) -> Residuals {
+        let source = Source::new_u8(WIDTH as u32, HEIGHT as u32, model, source).expect("sound");
+        let raster = Raster::new(&source);
+        let mut residuals = Residuals::new(&raster);
+        residuals.set(&raster, 0, rendering);
+        residuals
+    }
+
+    const MODELS: [ColorModel; 4] =
+        [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+
+    #[test]
+    fn changes_are_those_of_the_plain_sum() {
+        for model in MODELS {
+            for clamped in [false, true] {
+                let scene = scene(model.channels(), clamped);
+                let residuals = residuals(&scene, model);
+                for gaussian in gaussians() {
+                    let mut patch = Patch::default();
+                    assert!(patch.load(&residuals, &gaussian));
+                    patch.remove(&gaussian);
+                    let found = f64::from(patch.change(&gaussian, model).error);
+                    let channels = model.channels();
+                    let without = plain(&scene, channels, &gaussian, -1.0);
+                    let with = plain(&scene, channels, &gaussian, 0.0);
+                    let off = (found - (with - without)).abs();
+                    assert!(
+                        off < 1e-4 * with,
+                        "{model:?} {clamped} {gaussian:?}: {found}, off {off}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_the_derivatives_of_the_plain_sum() {
+        for model in MODELS {
+            for clamped in [false, true] {
+                let scene = scene(model.channels(), clamped);
+                let residuals = residuals(&scene, model);
+                for gaussian in gaussians() {
+                    let mut patch = Patch::default();
+                    assert!(patch.load(&residuals, &gaussian));
+                    let slopes = patch.slopes(&gaussian, model).by_displacement;
+                    let none = Displacement::default();
+                    let ways = [
+                        (slopes.center[0], Displacement { center: [1.0, 0.0], ..none }),
+                        (slopes.center[1], Displacement { center: [0.0, 1.0], ..none }),
+                        (slopes.size, Displacement { size: 1.0, ..none }),
+                        (slopes.ratio, Displacement { ratio: 1.0, ..none }),
+                        (slopes.slant, Displacement { slant: 1.0, ..none }),
+                    ];
+                    for (slope, way) in ways {
+                        let seen = derivative(&scene, model.channels(), &gaussian, &way);
+                        let off = (f64::from(slope) - seen).abs();
+                        assert!(
+                            off < 2e-2 + 1e-2 * seen.abs(),
+                            "{gaussian:?} {way:?}: {slope}, {seen}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// The derivative of the sum of squared errors along a way, by differences.
+    fn derivative(
+        scene: &(Vec<u8>, Vec<f32>),
+        channels: usize,
+        gaussian: &Gaussian,
+        way: &Displacement,
+    ) -> f64 {
+        const STEP: f32 = 1e-3;
+        // The Gaussian is part of the rendering: it goes, and the moved one comes.
+        let mut without = scene.clone();
+        let present = *gaussian;
+        let at = |step: f32| {
+            let moved = Displacement {
+                center: way.center.map(|part| step * part),
+                size: step * way.size,
+                ratio: step * way.ratio,
+                slant: step * way.slant,
+            };
+            moved.applied(&present)
+        };
+        subtract(&mut without.1, channels, gaussian);
+        let ends = [STEP, -STEP].map(|step| plain(&without, channels, &at(step), 1.0));
+        (ends[0] - ends[1]) / f64::from(2.0 * STEP)
+    }
+
+    fn subtract(rendering: &mut [f32], channels: usize, gaussian: &Gaussian) {
+        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
+        for channel in 0..channels {
+            for pixel in 0..WIDTH * HEIGHT {
+                let (x, y) = (pixel % WIDTH, pixel / WIDTH);
+                let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
+                let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
+                let weight = (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4);
+                rendering[channel * WIDTH * HEIGHT + pixel] -=
+                    weight as f32 * gaussian.color[channel];
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_added_can_be_taken_away() {
+        let scene = scene(3, true);
+        let mut residuals = residuals(&scene, ColorModel::Rgb);
+        for gaussian in gaussians() {
+            residuals.add(&[(gaussian, 1.0)]);
+            let mut patch = Patch::default();
+            assert!(patch.load(&residuals, &gaussian));
+            patch.remove(&gaussian);
+            let found = f64::from(patch.change(&gaussian, ColorModel::Rgb).error);
+            residuals.add(&[(gaussian, -1.0)]);
+            let expected = plain(&scene, 3, &gaussian, 1.0) - plain(&scene, 3, &gaussian, 0.0);
+            assert!((found - expected).abs() < 1e-3, "{gaussian:?}: {found}, {expected}");
+        }
+        let nowhere = Gaussian { center: [-90.0, 3.0], ..gaussians()[0] };
+        assert!(!Patch::default().load(&residuals, &nowhere));
+    }
 }
