@@ -47,6 +47,7 @@ const LAYERS: [f64; 2] = [0.08, 0.24];
 const LEAST_LAYERED: usize = 250;
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
+
 /// How many Gaussians a file of a size holds, about, up to `most`.
 pub(crate) fn count_for_size(
     bytes: u64,

@@ -21,8 +21,6 @@ const POLL_INTERVAL: usize = 256;
 
 /// How far the best way along the slopes is followed.
 const REACH: f32 = 0.5;
-/// How much worse than the present code, in bits, a candidate may look that is tried.
-const SLACK: f32 = 0.0;
 /// Most candidates that are tried.
 const MOST_TRIED: usize = 3;
 
@@ -191,7 +189,7 @@ impl Descent<'_> {
                 found.push((error + change + self.lambda * self.bits(candidate, level), candidate));
             }
         }
-        found.retain(|(value, _)| *value < present + self.lambda * SLACK);
+        found.retain(|(value, _)| *value < present);
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found.truncate(MOST_TRIED);
         found.into_iter().map(|(_, code)| code).collect()

@@ -77,7 +77,7 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder that picks the number of Gaussians by itself, at default effort, packed.
+    /// An encoder that picks the number of Gaussians by itself, at default effort, entropy coded.
     pub fn new() -> Self {
         Self {
             target: Target::default(),
@@ -102,7 +102,7 @@ impl Encoder {
         self
     }
 
-    /// Whether attributes are quantized. Default [`Precision::Coded`].
+    /// How attributes are stored. Default [`Precision::Coded`].
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
         self

@@ -52,7 +52,7 @@ impl Handmade {
         let count = self.gaussians.len() as u32;
         let kernel_code = u8::from(self.kernel == Kernel::Quartic);
         // Version 0, fixed-length coding, RGB, 8 bits.
-        let mut header = vec![0, 0, 2, 8];
+        let mut header = vec![1, 0, 2, 8];
         header.extend([self.size.0, self.size.1, count].map(u32::to_le_bytes).concat());
         header.extend(u16::from(count > 0).to_le_bytes());
         // The Cholesky chart.
