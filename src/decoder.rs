@@ -9,7 +9,7 @@ use crate::coding::set::{Models, SetCoding};
 use crate::container::{ChunkType, Coding, Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
-use crate::lattice::{Grid, Lattice};
+use crate::lattice::Lattice;
 use crate::limits::Limits;
 use crate::quantizer::Quantizer;
 use crate::render::Picture;
@@ -391,15 +391,14 @@ impl StreamDecoder {
         let (Some(header), Some((lattice, models))) = (&self.header, &mut self.lattice) else {
             return Ok(());
         };
-        let grid = Grid::new(header.width, header.height);
-        let coding = SetCoding { lattice, grid, channels: header.color.channels() };
+        let coding = SetCoding::new(lattice, header);
         let before = self.gaussians.len();
         let allowed = header.gaussians - before as u32;
         let gaussians = &mut self.gaussians;
         let outcome =
             coding.read(payload, allowed, models, self.account.as_mut(), |code, shape| {
                 grow(gaussians, 1, header.gaussians as usize);
-                gaussians.push(lattice.gaussian(&code, shape, &grid, header.color));
+                gaussians.push(lattice.gaussian(&code, shape, &coding.grid, header.color));
             });
         if outcome.is_err() {
             self.gaussians.truncate(before);

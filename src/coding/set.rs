@@ -14,7 +14,7 @@ use super::rans::Cost;
 pub(crate) use super::rans::Costs;
 use super::rans::{Attribute, Coder, Decoder, MAX_BITS, Model, SYMBOLS};
 use super::tables;
-use crate::container::ChunkType;
+use crate::container::{ChunkType, Header};
 use crate::error::DecodeError;
 use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS, Shape};
 
@@ -104,7 +104,13 @@ pub(crate) struct SetCoding<'a> {
     pub(crate) channels: usize,
 }
 
-impl SetCoding<'_> {
+impl<'a> SetCoding<'a> {
+    /// For the pictures of a header.
+    pub(crate) fn new(lattice: &'a Lattice, header: &Header) -> Self {
+        let grid = Grid::new(header.width, header.height);
+        Self { lattice, grid, channels: header.color.channels() }
+    }
+
     /// Reads a layer of at most `allowed` Gaussians and hands over their codes in order. Adds to an
     /// account, if there is one.
     #[cfg_attr(not(feature = "std"), expect(clippy::needless_pass_by_value))]
@@ -395,7 +401,6 @@ mod tests {
     use std::fmt::Write;
 
     use super::*;
-    use crate::container::Header;
     use crate::testing::config;
     use proptest::prelude::*;
 
@@ -460,8 +465,7 @@ mod tests {
         let channels = header.color.channels();
         let steps = of(b"QNTZ").next().expect("steps").1;
         let lattice = Lattice::parse(steps, channels).expect("sound");
-        let grid = Grid::new(header.width, header.height);
-        let coding = SetCoding { lattice: &lattice, grid, channels };
+        let coding = SetCoding::new(&lattice, &header);
         let mut models = Models::default();
         let mut counts = vec![[0.0; SYMBOLS]; context::COUNT];
         for (_, payload) in of(b"GAUS") {

@@ -313,7 +313,7 @@ impl<'a> Coder<'a> {
     }
 
     fn coding<'b>(&self, lattice: &'b Lattice) -> SetCoding<'b> {
-        SetCoding { lattice, grid: self.grid, channels: self.model.channels() }
+        SetCoding::new(lattice, self.layout.header())
     }
 
     /// Sorts and rounds the codes as the file has them; what symbols cost then, the levels of the
@@ -337,12 +337,12 @@ impl<'a> Coder<'a> {
         let gaussians: Vec<Gaussian> = codes.iter().map(gaussian).collect();
         let header = self.layout.header();
         let limits = Limits::none();
+        let rendering = Picture::new(header, &gaussians, &limits, 0);
         let mut planes = Vec::new();
         for region in strips(header.width, header.height) {
             observer.poll()?;
             planes.resize(region.pixels() as usize * self.raster.channels, 0.0);
             let options = RenderOptions::new().region(region);
-            let rendering = Picture::new(header, &gaussians, &limits, 0);
             rendering.render_planes(&options, &mut planes).expect("there are no limits");
             residuals.set(self.raster, region.y as usize, &planes);
         }

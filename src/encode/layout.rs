@@ -9,7 +9,6 @@ use crate::coding::fixed;
 use crate::coding::set::SetCoding;
 use crate::container::{ChunkType, Coding, Header, Metadata, SIGNATURE, write_chunk};
 use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
-use crate::lattice::Grid;
 use crate::quantizer::Quantizer;
 
 /// Fewest Gaussians that are worth a layer of their own.
@@ -88,9 +87,7 @@ impl<'a> Layout<'a> {
 
     /// The file of coded Gaussians.
     pub(crate) fn write_set(&self, coded: &Coded) -> Vec<u8> {
-        let grid = Grid::new(self.header.width, self.header.height);
-        let channels = self.header.color.channels();
-        let coding = SetCoding { lattice: &coded.lattice, grid, channels };
+        let coding = SetCoding::new(&coded.lattice, &self.header);
         let payloads = write_layers(&coding, &mut coded.codes.clone()).payloads;
         let header = Header {
             coding: Coding::Set,

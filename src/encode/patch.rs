@@ -135,9 +135,7 @@ impl Patch {
             3 => dispatch!(level, simd => self.sums::<_, 3>(simd, gaussian)),
             _ => dispatch!(level, simd => self.sums::<_, 4>(simd, gaussian)),
         };
-        let by_axis = lattice::to_axes(sums.by_channel, model);
-        let axes = lattice::to_axes(gaussian.color, model);
-        Change { error: sums.error, by_axis, weight: sums.weight, axes }
+        sums.change(gaussian, model)
     }
 
     #[inline(always)]
@@ -213,10 +211,7 @@ impl Patch {
             3 => dispatch!(level, simd => self.slopes_with::<_, 3>(simd, gaussian)),
             _ => dispatch!(level, simd => self.slopes_with::<_, 4>(simd, gaussian)),
         };
-        let by_axis = lattice::to_axes(sums.by_channel, model);
-        let axes = lattice::to_axes(gaussian.color, model);
-        let change = Change { error: sums.error, by_axis, weight: sums.weight, axes };
-        Slopes { change, by_displacement }
+        Slopes { change: sums.change(gaussian, model), by_displacement }
     }
 
     #[inline(always)]
@@ -304,6 +299,14 @@ struct Sums {
     weight: f32,
 }
 
+impl Sums {
+    fn change(&self, gaussian: &Gaussian, model: ColorModel) -> Change {
+        let by_axis = lattice::to_axes(self.by_channel, model);
+        let axes = lattice::to_axes(gaussian.color, model);
+        Change { error: self.error, by_axis, weight: self.weight, axes }
+    }
+}
+
 #[inline(always)]
 fn total<S: Simd>(vector: f32x16<S>) -> f32 {
     vector.to_array().iter().sum()
@@ -349,6 +352,15 @@ mod tests {
         ]
     }
 
+    /// The quartic kernel of a Gaussian at a pixel.
+    fn plain_weight(gaussian: &Gaussian, pixel: usize) -> f64 {
+        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
+        let (x, y) = (pixel % WIDTH, pixel / WIDTH);
+        let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
+        let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
+        (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4)
+    }
+
     /// The sum of squared errors with a Gaussian added to the rendering `factor` times, in f64.
     fn plain(
         (source, rendering): &(Vec<u8>, Vec<f32>),
@@ -356,14 +368,10 @@ mod tests {
         gaussian: &Gaussian,
         factor: f64,
     ) -> f64 {
-        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
         let mut sum = 0.0;
         for (at, &sample) in source.iter().enumerate() {
             let (pixel, channel) = (at / channels, at % channels);
-            let (x, y) = (pixel % WIDTH, pixel / WIDTH);
-            let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
-            let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
-            let weight = (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4);
+            let weight = plain_weight(gaussian, pixel);
             let value = f64::from(rendering[channel * WIDTH * HEIGHT + pixel])
                 + factor * weight * f64::from(gaussian.color[channel]);
             let error = value - f64::from(sample) / 255.0;
@@ -469,13 +477,9 @@ mod tests {
     }
 
     fn subtract(rendering: &mut [f32], channels: usize, gaussian: &Gaussian) {
-        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
         for channel in 0..channels {
             for pixel in 0..WIDTH * HEIGHT {
-                let (x, y) = (pixel % WIDTH, pixel / WIDTH);
-                let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
-                let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
-                let weight = (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4);
+                let weight = plain_weight(gaussian, pixel);
                 rendering[channel * WIDTH * HEIGHT + pixel] -=
                     weight as f32 * gaussian.color[channel];
             }
