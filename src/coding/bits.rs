@@ -46,7 +46,7 @@ pub(crate) struct BitWriter {
 impl BitWriter {
     /// Appends the low `count` <= 32 bits of `value`.
     pub(crate) fn put(&mut self, value: u32, count: u32) {
-        debug_assert!(count == 32 || value >> count == 0, "a code wider than its bit depth");
+        assert!(count == 32 || value >> count == 0, "a code wider than its bit depth");
         self.window |= u64::from(value) << self.pending;
         self.pending += count;
         while self.pending >= 8 {

@@ -235,13 +235,13 @@ impl Coder for Encoder<'_> {
     }
 
     fn bits(&mut self, count: u32, value: u32) -> u32 {
-        debug_assert!(count <= MAX_BITS && value >> count == 0, "a value wider than its bits");
+        assert!(count <= MAX_BITS && value >> count == 0, "a value wider than its bits");
         self.shares.push((value as u16, 1, count as u8));
         value
     }
 
     fn refuse(&mut self) {
-        debug_assert!(false, "an encoder knows what it codes");
+        unreachable!("an encoder knows what it codes")
     }
 }
 

@@ -66,7 +66,7 @@ impl fmt::Debug for ChunkType {
 pub(crate) fn write_chunk(out: &mut Vec<u8>, kind: ChunkType, payload: &[u8]) {
     use byteorder::{ByteOrder, LittleEndian};
 
-    debug_assert!(payload.len() <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
+    assert!(payload.len() <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
     let mut word = [0; 4];
     LittleEndian::write_u32(&mut word, payload.len() as u32);
     out.extend_from_slice(&word);
