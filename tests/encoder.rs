@@ -200,6 +200,26 @@ fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
 }
 
 #[test]
+fn small_ramps_are_not_given_up() {
+    const SIZE: u32 = 32;
+    let ramps: Vec<u8> = (0..SIZE * SIZE)
+        .flat_map(|at| {
+            let [red, green] = [at % SIZE, at / SIZE].map(|place| (255 - 255 * place / 31) as u8);
+            [red, green, (255 - red).saturating_sub(green)]
+        })
+        .collect();
+    let source = Source::new_u8(SIZE, SIZE, ColorModel::Rgb, &ramps).expect("sizes agree");
+    for quality in [25.0, 50.0, 75.0] {
+        for effort in [1, 5] {
+            let encoder = quick(Target::Quality(quality)).with_effort(effort);
+            let encoded = encoder.encode(&source).expect("encodes");
+            let psnr = encoded.report.psnr;
+            assert!(psnr > 30.0, "quality {quality}, effort {effort}: {psnr} dB");
+        }
+    }
+}
+
+#[test]
 fn hard_pictures_become_sound_files() {
     let checkers: Vec<u8> = (0..64 * 64).map(|i| ((i + i / 64) % 2 * 255) as u8).collect();
     let mut impulse = vec![0; 64 * 64];

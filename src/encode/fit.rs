@@ -122,6 +122,8 @@ impl<'a> Fit<'a> {
                 self.grow(portion + replaced, observer)?;
             }
             if let Some(culls_left) = plan.culls_left(done) {
+                // In a simple picture the error may fall much faster with the count than foreseen.
+                kept = kept.max(self.wanted(FORESEEN));
                 // Growth may have ended before the budget, where there is little to correct.
                 let surplus = self.len().saturating_sub(kept);
                 self.cull(surplus / (culls_left as usize + 1));
