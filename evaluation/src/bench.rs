@@ -14,7 +14,7 @@ use crate::{gip, provenance};
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
 /// Iterations of the published methods, if no others are asked for.
-const ITERATIONS: u32 = 5_000;
+const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
 #[derive(Debug)]

@@ -42,7 +42,7 @@ struct Args {
     /// Only these sections [default: all].
     #[arg(long, value_enum, value_name = "SECTION")]
     only: Vec<Section>,
-    /// Iterations of the published methods [default: 5000, quick: 2000; the paper: 50000].
+    /// Iterations of the published methods [default: 3000, quick: 2000; the paper: 50000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
     /// CSV with measurements of the same baselines from elsewhere, to compare ours with; columns
