@@ -80,6 +80,13 @@ impl Models {
     }
 }
 
+#[cfg(all(fuzzing, feature = "encode"))]
+impl Models {
+    pub(super) fn all(&mut self) -> &mut [Model] {
+        &mut self.0
+    }
+}
+
 impl Default for Models {
     fn default() -> Self {
         Self(tables::STARTS.iter().map(|&starts| Model::new(starts)).collect())
@@ -218,6 +225,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes a Gaussian within a cell.
+    #[inline(always)]
     fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> (Code, Shape) {
         let mut code = self.attributes(coder, cell.level(), known);
         let shape = self.lattice.shape(&code);
@@ -233,6 +241,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes all but the centre.
+    #[inline(always)]
     fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
         coder.begin(Attribute::Precision);
         let mut class = coder.symbol(context::CLASS, known.class);
@@ -261,6 +270,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes the colour axes: the first by its magnitude and sign, the others relative to that sign.
+    #[inline(always)]
     fn color(&self, coder: &mut impl Coder, class: usize, known: [i32; 4]) -> [i32; 4] {
         let shift = (class as u32).saturating_sub(COLOR_LEVEL);
         let mut color = [0; 4];
@@ -293,21 +303,23 @@ fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
 }
 
 /// Codes how many of `count` Gaussians are in the first part of a cell.
+#[inline(always)]
 fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
-    let choices = u64::from(count) + 1;
-    let (context, symbols) = if count < FEW as u32 {
-        (context::FEW + count as usize, choices)
-    } else {
-        (context::MANY + count.ilog2() as usize, SYMBOLS as u64)
-    };
-    let symbol = u64::from(coder.symbol(context, (u64::from(first) * symbols / choices) as u32));
-    if symbol >= symbols {
-        coder.refuse();
-        return 0;
+    const SHARES: u64 = SYMBOLS as u64;
+    if count < FEW as u32 {
+        let coded = coder.symbol(context::FEW + count as usize, first);
+        if coded > count {
+            coder.refuse();
+            return 0;
+        }
+        return coded;
     }
-    // The counts that share this symbol.
-    let least = (symbol * choices).div_ceil(symbols) as u32;
-    let most = ((symbol + 1) * choices).div_ceil(symbols) as u32 - 1;
+    let choices = u64::from(count) + 1;
+    let share = (u64::from(first) * SHARES / choices) as u32;
+    let share = coder.symbol(context::MANY + count.ilog2() as usize, share).into();
+    // The counts that make this share.
+    let least_of = |share: u64| (share * choices).div_ceil(SHARES) as u32;
+    let (least, most) = (least_of(share), least_of(share + 1) - 1);
     let rest =
         plain(coder, (most - least + 1).next_power_of_two().ilog2(), first.wrapping_sub(least));
     if rest > most - least {
@@ -318,6 +330,7 @@ fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
 }
 
 /// Codes a signed value, its low `shift` bits plainly.
+#[inline(always)]
 fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32 {
     let high = value >> shift;
     let is_beyond = high.unsigned_abs() > SIGNED as u32;
@@ -333,6 +346,7 @@ fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32
 }
 
 /// Codes a number by its length (Elias, 1975).
+#[inline(always)]
 fn excess(coder: &mut impl Coder, value: u32) -> u32 {
     let length = coder.symbol(context::EXCESS, value.saturating_add(1).ilog2().min(BEYOND));
     let low = plain(coder, length, value.wrapping_add(1) & ((1 << length) - 1));
@@ -340,6 +354,7 @@ fn excess(coder: &mut impl Coder, value: u32) -> u32 {
 }
 
 /// Codes the low `count` bits of a value without a model, however many.
+#[inline(always)]
 fn plain(coder: &mut impl Coder, count: u32, value: u32) -> u32 {
     let low = count.min(MAX_BITS);
     let value = value & ((1_u64 << count) - 1) as u32;
