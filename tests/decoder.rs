@@ -362,7 +362,8 @@ fn layers_are_read_until_there_are_enough_gaussians() {
     let whole = decode_valid(&bytes);
     // Three, one and four, a few bytes at a time.
     for (wanted, arrived) in [(0, 0), (1, 1), (3, 3), (4, 4), (5, 5), (8, 8), (9, 8)] {
-        let mut decoder = Decoder::new(Awkward { bytes: &bytes, calls: 0, fails: false }).expect("it begins well");
+        let mut decoder = Decoder::new(Awkward { bytes: &bytes, calls: 0, fails: false })
+            .expect("it begins well");
         decoder.read_at_least(wanted).expect("it is sound");
         let found = bits(decoder.picture().gaussians());
         assert_eq!(found, bits(&whole.gaussians()[..arrived]), "{wanted}");

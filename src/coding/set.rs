@@ -225,7 +225,6 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes a Gaussian within a cell.
-    #[inline(always)]
     fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> (Code, Shape) {
         let mut code = self.attributes(coder, cell.level(), known);
         let shape = self.lattice.shape(&code);
@@ -241,7 +240,6 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes all but the centre.
-    #[inline(always)]
     fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
         coder.begin(Attribute::Precision);
         let mut class = coder.symbol(context::CLASS, known.class);
@@ -270,7 +268,6 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes the colour axes: the first by its magnitude and sign, the others relative to that sign.
-    #[inline(always)]
     fn color(&self, coder: &mut impl Coder, class: usize, known: [i32; 4]) -> [i32; 4] {
         let shift = (class as u32).saturating_sub(COLOR_LEVEL);
         let mut color = [0; 4];
@@ -303,7 +300,6 @@ fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
 }
 
 /// Codes how many of `count` Gaussians are in the first part of a cell.
-#[inline(always)]
 fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
     const SHARES: u64 = SYMBOLS as u64;
     if count < FEW as u32 {
@@ -330,7 +326,6 @@ fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
 }
 
 /// Codes a signed value, its low `shift` bits plainly.
-#[inline(always)]
 fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32 {
     let high = value >> shift;
     let is_beyond = high.unsigned_abs() > SIGNED as u32;
@@ -346,7 +341,6 @@ fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32
 }
 
 /// Codes a number by its length (Elias, 1975).
-#[inline(always)]
 fn excess(coder: &mut impl Coder, value: u32) -> u32 {
     let length = coder.symbol(context::EXCESS, value.saturating_add(1).ilog2().min(BEYOND));
     let low = plain(coder, length, value.wrapping_add(1) & ((1 << length) - 1));
@@ -354,7 +348,6 @@ fn excess(coder: &mut impl Coder, value: u32) -> u32 {
 }
 
 /// Codes the low `count` bits of a value without a model, however many.
-#[inline(always)]
 fn plain(coder: &mut impl Coder, count: u32, value: u32) -> u32 {
     let low = count.min(MAX_BITS);
     let value = value & ((1_u64 << count) - 1) as u32;
