@@ -537,6 +537,18 @@ impl<R: std::io::Read> Decoder<R> {
         Ok(())
     }
 
+    /// Reads until so many Gaussians have arrived, or all: enough layers for a thumbnail, with
+    /// [`Header::gaussians_for`]. [`Decoder::picture`] renders what is there.
+    ///
+    /// # Errors
+    /// As [`Decoder::read_to_end`].
+    pub fn read_at_least(&mut self, gaussians: u32) -> Result<(), DecodeError> {
+        while self.stream.gaussians().len() < gaussians as usize && !self.stream.is_complete() {
+            self.read_some()?;
+        }
+        Ok(())
+    }
+
     /// The picture so far.
     #[must_use]
     #[expect(clippy::missing_panics_doc, reason = "no decoder exists without a header")]

@@ -122,6 +122,9 @@ pub use quantizer::{Quantizer, Steps};
 #[cfg(feature = "decode")]
 pub use render::{Kernel, Picture, Region, RenderOptions};
 
+#[cfg(all(fuzzing, feature = "encode"))]
+pub use coding::fuzzing;
+
 #[cfg(feature = "encode")]
 pub mod training {
     //! The constants of training, for those who study the method: see [`Training`].

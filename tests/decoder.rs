@@ -355,6 +355,23 @@ fn the_adapter_reads_from_awkward_readers() {
     assert!(error.is_unexpected_end(), "{error}");
 }
 
+#[test]
+fn layers_are_read_until_there_are_enough_gaussians() {
+    let file = sample();
+    let bytes = file.bytes();
+    let whole = decode_valid(&bytes);
+    // Three, one and four, a few bytes at a time.
+    for (wanted, arrived) in [(0, 0), (1, 1), (3, 3), (4, 4), (5, 5), (8, 8), (9, 8)] {
+        let mut decoder = Decoder::new(Awkward { bytes: &bytes, calls: 0, fails: false })
+            .expect("it begins well");
+        decoder.read_at_least(wanted).expect("it is sound");
+        let found = bits(decoder.picture().gaussians());
+        assert_eq!(found, bits(&whole.gaussians()[..arrived]), "{wanted}");
+    }
+    let header = whole.header().expect("read");
+    assert_eq!([header.gaussians_for(4, 4), header.gaussians_for(1 << 20, 1 << 20)], [2, 8]);
+}
+
 /// What to do to a sound field, and what the error then says.
 type Change<'a, T> = (&'a dyn Fn(&mut T), &'a str);
 

@@ -3,10 +3,11 @@
 Prints the versions of the libraries, one per line and an empty line at the end. Then reads one
 request per line, fields separated by tabs:
 
-    codec, quality, threads (0: all), repeats, picture to encode, file for the decoded samples
+    codec, quality, threads (0: all), repeats of encoding, repeats of decoding, picture to encode,
+    file for the decoded samples
 
 and answers each with the number of bytes of the file, the seconds to encode and the seconds to
-decode it, from samples in memory to bytes in memory and back: the median over the repeats.
+decode it, from samples in memory to bytes in memory and back: medians over the repeats.
 The decoded samples are interleaved 8-bit RGB.
 """
 
@@ -67,6 +68,7 @@ CODECS = {
     "jpeg420prog": through_pillow(
         "JPEG", {"subsampling": "4:2:0", "optimize": True, "progressive": True}
     ),
+    "jpeg420": through_pillow("JPEG", {"subsampling": "4:2:0", "optimize": True}),
     "jp2": jpeg_2000(),
     "webp_m6": through_pillow("WEBP", {"method": 6}),
     "avif420_s6": through_pillow("AVIF", AVIF),
@@ -84,16 +86,15 @@ def timed(repeats, work, *arguments):
     return result, statistics.median(seconds)
 
 
-def answer(codec, quality, threads, repeats, source, decoded):
+def answer(codec, quality, threads, encodings, decodings, source, decoded):
     encode, decode = CODECS[codec]
     image = Image.open(source).convert("RGB")
     quality = float(quality)
     if codec not in ("jp2", "jxl_e7"):
         quality = int(quality)
     threads = int(threads) or len(os.sched_getaffinity(0))
-    repeats = int(repeats)
-    data, encode_seconds = timed(repeats, encode, image, quality, threads)
-    result, decode_seconds = timed(repeats, decode, data, threads)
+    data, encode_seconds = timed(int(encodings), encode, image, quality, threads)
+    result, decode_seconds = timed(int(decodings), decode, data, threads)
     with open(decoded, "wb") as out:
         out.write(numpy.asarray(result).tobytes())
     return len(data), encode_seconds, decode_seconds

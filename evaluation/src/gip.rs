@@ -97,7 +97,7 @@ pub(crate) fn decode_memory(file: &[u8]) -> Result<f64> {
 
 /// How long decoding takes, from the file to samples, with all threads or with one.
 pub(crate) fn decode_seconds(file: &[u8], parallel: bool) -> Result<f64> {
-    median_seconds(|| decode(file, parallel).map(|_| ()))
+    median_seconds(REPEATS, || decode(file, parallel).map(|_| ()))
 }
 
 /// How long rendering takes, from the Gaussians to samples, with all threads.
@@ -105,20 +105,23 @@ pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
     let options = RenderOptions::new();
     open(file, |picture| {
         let mut samples = vec![0; picture.output_len(&options)?];
-        median_seconds(|| Ok(picture.render_u8(&options, &mut samples)?))
+        median_seconds(REPEATS, || Ok(picture.render_u8(&options, &mut samples)?))
     })
 }
 
 /// How long something takes: the median of several times.
-fn median_seconds(mut work: impl FnMut() -> Result<()>) -> Result<f64> {
+pub(crate) fn median_seconds(
+    repeats: usize,
+    mut work: impl FnMut() -> Result<()>,
+) -> Result<f64> {
     let mut seconds = Vec::new();
-    for _ in 0..REPEATS {
+    for _ in 0..repeats {
         let start = Instant::now();
         work()?;
         seconds.push(start.elapsed().as_secs_f64());
     }
     seconds.sort_by(f64::total_cmp);
-    Ok(seconds[REPEATS / 2])
+    Ok(seconds[repeats / 2])
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod baselines;
 mod bench;
 mod curve;
 mod gip;
+mod kernel;
 mod memory;
 mod pictures;
 mod plot;

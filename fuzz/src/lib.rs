@@ -1,6 +1,7 @@
 //! What the fuzz targets share: tight limits, the checks on whatever was decoded, and a generator
 //! of files that look valid.
 
+pub mod coder;
 #[path = "../../tests/common/coding1.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod coding1;
@@ -11,6 +12,7 @@ mod exp;
 pub mod file;
 mod sets;
 
+use fearless_simd::Level;
 use image_gip::{DecodeError, Limits, Picture, Region, RenderOptions, StreamDecoder};
 
 /// Bounds that leave room for every branch and keep one input to a few milliseconds.
@@ -24,6 +26,32 @@ pub fn limits() -> Limits {
 
 /// Largest side of what the targets render.
 const MAX_SIDE: u32 = 40;
+
+/// Renders what has arrived with the code of every level of vector instructions, on one thread and
+/// on several, and in parts: all bits are those of the reference code.
+pub fn check_levels(decoder: &StreamDecoder) {
+    let Some(picture) = decoder.picture() else { return };
+    let header = picture.header();
+    let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
+    let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
+    let options = [
+        RenderOptions::new().size(width, height),
+        RenderOptions::new().region(Region { x, y, width, height }),
+    ];
+    for options in options {
+        let reference = bits(&picture, &options.clone().parallel(false).reference(true));
+        for level in [Level::new(), Level::baseline(), Level::fallback()] {
+            let found = bits(&picture, &options.clone().parallel(false).simd_level(level));
+            assert_eq!(found, reference, "{level:?}");
+        }
+        assert_eq!(samples(&picture, &options), samples(&picture, &options.clone().reference(true)));
+    }
+}
+
+/// The bits of [`planes`].
+fn bits(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<u32>> {
+    planes(picture, options).map(|planes| planes.into_iter().map(f32::to_bits).collect())
+}
 
 /// Renders what has arrived in several ways and checks that they agree.
 pub fn check(decoder: &StreamDecoder) {

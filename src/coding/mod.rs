@@ -3,6 +3,8 @@
 pub(crate) mod account;
 mod bits;
 pub(crate) mod fixed;
+#[cfg(all(fuzzing, feature = "encode"))]
+pub mod fuzzing;
 mod rans;
 pub(crate) mod set;
 mod tables;

@@ -4,6 +4,9 @@
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
+#[cfg(feature = "std")]
+use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
+
 /// Symbols of a model.
 pub(crate) const SYMBOLS: usize = 16;
 /// Probabilities of a model are shares of 2^15.
@@ -56,15 +59,24 @@ impl Model {
 
     /// The symbol that one of the shares stands for.
     fn symbol_at(&self, share: u32) -> usize {
-        // All at once rather than one by one, and added up in halves: so it becomes vector code.
-        let share = share as i16;
-        let mut before = self.starts.map(|start| (start - share - 1) >> 15);
-        for half in [8, 4, 2, 1] {
-            for index in 0..half {
-                before[index] += before[index + half];
-            }
-        }
-        usize::from(before[0].unsigned_abs()) - 1
+        #[cfg(feature = "std")]
+        return dispatch!(Level::baseline(), simd => self.symbol_at_with(simd, share));
+        #[cfg(not(feature = "std"))]
+        self.plain_symbol_at(share)
+    }
+
+    /// All at once, with what every machine of the kind has.
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    fn symbol_at_with<S: Simd>(&self, simd: S, share: u32) -> usize {
+        let later = i16x16::load_array_ref(simd, &self.starts).simd_gt(share as i16);
+        // Symbol 0 starts at 0.
+        (later.to_bitmask() | 1 << SYMBOLS).trailing_zeros() as usize - 1
+    }
+
+    #[cfg(any(not(feature = "std"), test))]
+    fn plain_symbol_at(&self, share: u32) -> usize {
+        self.starts.iter().filter(|&&start| start as u32 <= share).count() - 1
     }
 
     /// Learns from a symbol. Every symbol keeps a share.
@@ -115,43 +127,45 @@ pub(crate) enum Attribute {
 pub(crate) struct Decoder<'a> {
     models: &'a mut [Model],
     state: u32,
-    words: &'a [u8],
+    words: &'a [[u8; 2]],
+    /// Words used, even of those that are not there.
+    used: usize,
     refused: bool,
 }
 
 impl<'a> Decoder<'a> {
     /// A decoder of `bytes`, one model for each context.
     pub(crate) fn new(bytes: &'a [u8], models: &'a mut [Model]) -> Self {
-        let mut decoder = Self { models, state: 0, words: bytes, refused: false };
+        let (words, rest) = bytes.as_chunks();
+        let mut decoder = Self { models, state: 0, words, used: 0, refused: !rest.is_empty() };
         // The first state, then words as they are needed.
-        decoder.state = decoder.word();
-        decoder.state |= decoder.word() << 16;
+        for part in 0..2 {
+            decoder.state |= decoder.next() << (16 * part);
+            decoder.used += 1;
+        }
         decoder.refused |= decoder.state < LEAST_STATE;
         decoder
     }
 
     /// Whether all bytes were used and led back to where the encoder began.
     pub(crate) fn is_complete(&self) -> bool {
-        !self.refused && self.words.is_empty() && self.state == LEAST_STATE
+        !self.refused && self.used == self.words.len() && self.state == LEAST_STATE
     }
 
-    fn word(&mut self) -> u32 {
-        match self.words {
-            [low, high, rest @ ..] => {
-                self.words = rest;
-                u32::from(u16::from_le_bytes([*low, *high]))
-            }
-            _ => {
-                self.refused = true;
-                0
-            }
-        }
+    /// The next word; zeros after the last.
+    #[inline(always)]
+    fn next(&self) -> u32 {
+        self.words.get(self.used).map_or(0, |&word| u16::from_le_bytes(word).into())
     }
 
+    /// Takes a word if the state needs one. Whether it does is as good as random, so there is no
+    /// branch to be foreseen.
+    #[inline(always)]
     fn restore(&mut self) {
-        if self.state < LEAST_STATE {
-            self.state = self.state << 16 | self.word();
-        }
+        let next = self.next();
+        let is_short = self.state < LEAST_STATE;
+        self.state = if is_short { self.state << 16 | next } else { self.state };
+        self.used += usize::from(is_short);
     }
 }
 
@@ -164,7 +178,7 @@ impl Decoder<'_> {
 }
 
 impl Coder for Decoder<'_> {
-    #[inline]
+    #[inline(always)]
     fn symbol(&mut self, context: usize, _: u32) -> u32 {
         let model = &mut self.models[context];
         let share = self.state & ((1 << SCALE_BITS) - 1);
@@ -176,7 +190,7 @@ impl Coder for Decoder<'_> {
         symbol as u32
     }
 
-    #[inline]
+    #[inline(always)]
     fn bits(&mut self, count: u32, _: u32) -> u32 {
         let value = self.state & ((1 << count) - 1);
         self.state >>= count;
@@ -276,7 +290,7 @@ impl Coder for Cost<'_> {
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::*;
-    use crate::testing::config;
+    use crate::testing::{config, simd_levels};
     use proptest::prelude::*;
 
     fn flat() -> Model {
@@ -343,6 +357,24 @@ mod tests {
                 let shares = (0..SYMBOLS).map(|symbol| model.share(symbol).1);
                 prop_assert!(shares.clone().all(|share| (1..1 << SCALE_BITS).contains(&share)));
                 prop_assert_eq!(shares.sum::<u32>(), 1 << SCALE_BITS);
+            }
+        }
+    }
+
+    #[test]
+    fn the_symbol_of_every_share_is_found() {
+        let mut model = flat();
+        // Shares of one and of nearly all among them.
+        for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
+            model.update(symbol);
+        }
+        for share in 0..1 << SCALE_BITS {
+            let symbol = model.plain_symbol_at(share);
+            let (start, size) = model.share(symbol);
+            assert!((start..start + size).contains(&share), "{share}: {symbol}");
+            for (name, level) in simd_levels() {
+                let found = dispatch!(level, simd => model.symbol_at_with(simd, share));
+                assert_eq!(found, symbol, "{name}: {share}");
             }
         }
     }

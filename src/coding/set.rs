@@ -80,6 +80,13 @@ impl Models {
     }
 }
 
+#[cfg(all(fuzzing, feature = "encode"))]
+impl Models {
+    pub(super) fn all(&mut self) -> &mut [Model] {
+        &mut self.0
+    }
+}
+
 impl Default for Models {
     fn default() -> Self {
         Self(tables::STARTS.iter().map(|&starts| Model::new(starts)).collect())
@@ -294,20 +301,21 @@ fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
 
 /// Codes how many of `count` Gaussians are in the first part of a cell.
 fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
-    let choices = u64::from(count) + 1;
-    let (context, symbols) = if count < FEW as u32 {
-        (context::FEW + count as usize, choices)
-    } else {
-        (context::MANY + count.ilog2() as usize, SYMBOLS as u64)
-    };
-    let symbol = u64::from(coder.symbol(context, (u64::from(first) * symbols / choices) as u32));
-    if symbol >= symbols {
-        coder.refuse();
-        return 0;
+    const SHARES: u64 = SYMBOLS as u64;
+    if count < FEW as u32 {
+        let coded = coder.symbol(context::FEW + count as usize, first);
+        if coded > count {
+            coder.refuse();
+            return 0;
+        }
+        return coded;
     }
-    // The counts that share this symbol.
-    let least = (symbol * choices).div_ceil(symbols) as u32;
-    let most = ((symbol + 1) * choices).div_ceil(symbols) as u32 - 1;
+    let choices = u64::from(count) + 1;
+    let share = (u64::from(first) * SHARES / choices) as u32;
+    let share = coder.symbol(context::MANY + count.ilog2() as usize, share).into();
+    // The counts that make this share.
+    let least_of = |share: u64| (share * choices).div_ceil(SHARES) as u32;
+    let (least, most) = (least_of(share), least_of(share + 1) - 1);
     let rest =
         plain(coder, (most - least + 1).next_power_of_two().ilog2(), first.wrapping_sub(least));
     if rest > most - least {

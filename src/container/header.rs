@@ -8,6 +8,9 @@ use crate::error::DecodeError;
 use crate::gaussian::Chart;
 use crate::render::Kernel;
 
+/// Of a small output: more Gaussians than one for so many pixels change little of it.
+const PIXELS_PER_GAUSSIAN: u64 = 8;
+
 /// The version that this crate reads and writes; 0 was a draft.
 pub(crate) const VERSION: u8 = 1;
 /// Largest width and height.
@@ -167,5 +170,13 @@ impl Header {
     #[must_use]
     pub fn components(&self) -> usize {
         5 + self.color.channels()
+    }
+
+    /// About how many Gaussians show in an output of this size, in pixels: all, or fewer where it
+    /// is much smaller than the picture. The first ones of a file are the strongest.
+    #[must_use]
+    pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
+        let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
+        u64::from(self.gaussians).min(shown) as u32
     }
 }

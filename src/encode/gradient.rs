@@ -11,8 +11,9 @@ use super::chart::Moments;
 use super::error::EncodeError;
 use super::progress::Observer;
 use super::raster::{FULL_SCALE, Raster, SamplePlane};
+use super::tiling::Tiling;
 use crate::render::{
-    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, TileRow, Tiling, centers, kernel_simd,
+    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, TileRow, centers, kernel_simd,
 };
 
 /// Sums of a Gaussian in a row of tiles: five of the geometry, then one by channel.
@@ -59,9 +60,11 @@ impl Pass {
     pub(crate) fn new(raster: &Raster) -> Self {
         let rows = raster.height.div_ceil(TILE_HEIGHT);
         let tiles = raster.width.div_ceil(TILE_WIDTH) * rows;
+        let region =
+            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
         Self {
             level: Level::new(),
-            tiling: Tiling::default(),
+            tiling: Tiling::new(region),
             rows: Vec::new(),
             slots: Vec::new(),
             ends: Vec::new(),
@@ -74,20 +77,18 @@ impl Pass {
     /// Says which splats touch which tile. Good for passes over the same splats while they change
     /// little, too: near the cut-off a splat weighs next to nothing.
     pub(crate) fn bin(&mut self, raster: &Raster, splats: &[Splat], kernel: Kernel) {
-        let region =
-            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
         self.ends.clear();
         self.ends.resize(splats.len(), 0);
         self.positions.clear();
         let (ends, positions) = (&mut self.ends, &mut self.positions);
-        self.tiling.rebuild(splats, kernel.cutoff(), region, |splat, span| {
+        self.tiling.rebuild(splats, kernel.cutoff(), |splat, span| {
             positions.push(span as u32);
             ends[splat as usize] = positions.len() as u32;
         });
         let tiling = &self.tiling;
         (0..tiling.rows())
             .into_par_iter()
-            .map(|row| TileRow::new(tiling, row))
+            .map(|row| tiling.row(row))
             .collect_into_vec(&mut self.rows);
         // A splat outside the picture has no spans: it ends where the one before ends.
         let mut last = 0;
@@ -229,7 +230,7 @@ impl Pass {
                 slots.fill(Slot::default());
                 *error = 0.0;
                 for (column, residual) in residuals.chunks_exact_mut(CHANNELS).enumerate() {
-                    let list = tiles.spans(column);
+                    let list = tiles.splats(column);
                     let tile = Tile::<CHANNELS> {
                         x: (column * TILE_WIDTH) as u32,
                         y: (row * TILE_HEIGHT) as u32,

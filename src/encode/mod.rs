@@ -23,6 +23,7 @@ mod rate;
 mod residuals;
 mod source;
 mod steering;
+mod tiling;
 pub(crate) mod training;
 mod verify;
 

@@ -1,5 +1,6 @@
 //! Gaussians to samples: view, tiles, kernel, output (spec, section 9).
 
+mod band;
 mod kernel;
 mod output;
 mod splat;
@@ -16,12 +17,19 @@ pub use view::{Region, RenderOptions};
 #[cfg(feature = "encode")]
 pub(crate) use kernel::simd as kernel_simd;
 pub(crate) use output::Sample;
+#[cfg(feature = "encode")]
 pub(crate) use splat::Splat;
 #[cfg(feature = "encode")]
-pub(crate) use tile::centers;
-pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
-pub(crate) use tiling::{TileRow, Tiling};
+pub(crate) use tile::{Backend, centers};
 #[cfg(feature = "encode")]
+pub(crate) use tiling::{Grid, Span, TileRow};
+
+use band::{BAND_ROWS, Band, Bands};
+use output::Place;
+#[cfg(not(feature = "encode"))]
+use tile::Backend;
+use tile::Tile;
+pub(crate) use tile::{Plane, TILE_HEIGHT, TILE_WIDTH};
 pub(crate) use view::View;
 
 use crate::container::Header;
@@ -29,7 +37,9 @@ use crate::error::{DecodeError, LimitKind};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 
-/// Most bytes that a row of tiles takes for slices of the output.
+/// Rows of pixels in a band.
+const BAND_HEIGHT: usize = BAND_ROWS * TILE_HEIGHT;
+/// Most bytes that a band takes for slices of the output.
 const STRIP: u64 = 128;
 
 /// A picture that can be rendered: a header and the Gaussians that have arrived so far.
@@ -111,22 +121,22 @@ impl<'a> Picture<'a> {
         out: &mut [f32],
     ) -> Result<(), DecodeError> {
         let job = self.prepare(options, out.len())?;
-        let width = job.region.width as usize;
-        let pixels = width * job.region.height as usize;
+        let width = job.view.region.width as usize;
+        let pixels = width * job.view.region.height as usize;
         let mut planes: Vec<&mut [f32]> = out.chunks_exact_mut(pixels).collect();
-        let mut strips = Vec::with_capacity(job.tiling.rows());
-        for row in 0..job.tiling.rows() {
-            let length = planes[0].len().min(width * TILE_HEIGHT);
+        let mut strips = Vec::with_capacity(job.bands.count());
+        for band in 0..job.bands.count() {
+            let length = planes[0].len().min(width * BAND_HEIGHT);
             let strip = planes.iter_mut().map(|plane| {
                 let (strip, rest) = core::mem::take(plane).split_at_mut(length);
                 *plane = rest;
                 strip
             });
-            strips.push((row, strip.collect::<Vec<_>>()));
+            strips.push((band, strip.collect::<Vec<_>>()));
         }
-        for_each(options.parallel, strips, |(row, mut strip)| {
-            job.row(row, |planes, x| {
-                output::write_planes(planes, x, job.sources, &mut strip, width);
+        for_each(options.parallel, strips, |memory, (band, mut strip)| {
+            job.band(memory, band, |planes, x, y| {
+                output::write_planes(planes, (x, y), job.sources, &mut strip, width);
             });
         });
         Ok(())
@@ -134,18 +144,19 @@ impl<'a> Picture<'a> {
 
     fn render<T: Sample>(&self, options: &RenderOptions, out: &mut [T]) -> Result<(), DecodeError> {
         let job = self.prepare(options, out.len())?;
-        let stride = job.region.width as usize * job.sources.len();
-        let strips: Vec<_> = out.chunks_mut(stride * TILE_HEIGHT).enumerate().collect();
-        for_each(options.parallel, strips, |(row, strip)| {
-            job.row(row, |planes, x| {
-                output::write_interleaved(planes, x, job.sources, strip, stride);
+        let stride = job.view.region.width as usize * job.sources.len();
+        let strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
+        for_each(options.parallel, strips, |memory, (band, strip)| {
+            job.band(memory, band, |planes, x, y| {
+                let place = Place { x, rows: &mut strip[y * stride..], stride };
+                output::write_interleaved(job.backend, planes, job.sources, place);
             });
         });
         Ok(())
     }
 
-    /// Checks everything and bins the splats; nothing of the output is touched before.
-    fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job, DecodeError> {
+    /// Checks everything and sorts the Gaussians by band; nothing of the output is touched before.
+    fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job<'a>, DecodeError> {
         let wanted = self.output_len(options)?;
         if wanted != out {
             return Err(DecodeError::Request(format!(
@@ -156,33 +167,29 @@ impl<'a> Picture<'a> {
         let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
-        let strips = u64::from(view.region.height).div_ceil(TILE_HEIGHT as u64) * STRIP;
-        let held = self.held + strips + gaussians.len() as u64 * size_of::<Splat>() as u64;
-        self.limits.check_memory(held)?;
-        let mut splats = Vec::with_capacity(gaussians.len());
-        splats.extend(gaussians.iter().filter_map(|g| Splat::new(g, &view)));
+        let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP;
+        let (held, threads) = (self.held + strips, threads(options.parallel));
         let kernel = self.header.kernel;
-        let (region, cutoff) = (view.region, kernel.cutoff());
-        let threads = threads(options.parallel);
-        let tiling = Tiling::new(&splats, cutoff, region, self.limits, held, threads)?;
+        let (cutoff, backend) = (kernel.cutoff(), options.backend);
+        let bands = Bands::new(gaussians, &view, cutoff, backend, self.limits, held, threads)?;
         Ok(Job {
-            splats,
-            tiling,
-            region,
+            gaussians,
+            view,
+            bands,
             kernel,
             channels: self.header.color.channels(),
             sources: output::sources(self.header.color, color),
             base: self.header.base(),
-            backend: options.backend(),
+            backend,
         })
     }
 }
 
 /// A rendering that was checked and can no longer fail.
-struct Job {
-    splats: Vec<Splat>,
-    tiling: Tiling,
-    region: Region,
+struct Job<'a> {
+    gaussians: &'a [Gaussian],
+    view: View,
+    bands: Bands,
     kernel: Kernel,
     channels: usize,
     /// See [`output::sources`].
@@ -191,28 +198,46 @@ struct Job {
     backend: Backend,
 }
 
-impl Job {
-    /// Renders one row of tiles and hands each over with its first column in the region.
-    fn row(&self, row: usize, write: impl FnMut(&[Plane], usize)) {
+impl Job<'_> {
+    /// Renders one band in the memory of an earlier one, and hands each tile over with its first
+    /// column in the region and its first row in the band.
+    fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
+        memory.fill(
+            &self.bands,
+            band,
+            self.gaussians,
+            &self.view,
+            self.kernel.cutoff(),
+            self.backend,
+        );
         match self.channels {
-            1 => self.row_of::<1>(row, write),
-            2 => self.row_of::<2>(row, write),
-            3 => self.row_of::<3>(row, write),
-            _ => self.row_of::<4>(row, write),
+            1 => self.band_of::<1>(memory, band, write),
+            2 => self.band_of::<2>(memory, band, write),
+            3 => self.band_of::<3>(memory, band, write),
+            _ => self.band_of::<4>(memory, band, write),
         }
     }
 
-    fn row_of<const CHANNELS: usize>(&self, row: usize, mut write: impl FnMut(&[Plane], usize)) {
-        let y = self.region.y + (row * TILE_HEIGHT) as u32;
-        let tiles = TileRow::new(&self.tiling, row);
-        let splats = self.tiling.splats(row, &self.splats);
-        for column in 0..self.tiling.columns() {
-            let x = column * TILE_WIDTH;
-            let origin = (self.region.x + x as u32, y);
-            let mut planes: [Plane; CHANNELS] =
-                core::array::from_fn(|channel| [[self.base[channel]; TILE_WIDTH]; TILE_HEIGHT]);
-            self.backend.add(&mut planes, origin, &splats, tiles.spans(column), self.kernel);
-            write(&planes, x);
+    fn band_of<const CHANNELS: usize>(
+        &self,
+        memory: &mut Band,
+        band: usize,
+        mut write: impl FnMut(&[Plane], usize, usize),
+    ) {
+        let base: [f32; CHANNELS] = core::array::from_fn(|channel| self.base[channel]);
+        let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        for row in 0..self.bands.rows(band) {
+            let y = row * TILE_HEIGHT;
+            let top = self.view.region.y + (band * BAND_HEIGHT + y) as u32;
+            let (tiles, splats) = memory.row(self.bands.columns(), row);
+            for column in 0..self.bands.columns() {
+                let x = column * TILE_WIDTH;
+                let origin = (self.view.region.x + x as u32, top);
+                let list = tiles.splats(column);
+                Tile { origin, base, splats, list, kernel: self.kernel }
+                    .render(self.backend, &mut planes);
+                write(&planes, x, y);
+            }
         }
     }
 }
@@ -227,14 +252,16 @@ fn threads(parallel: bool) -> usize {
     1
 }
 
-/// Runs `work` on every item, on the threads of the current pool if there are any.
-fn for_each<T: Send>(parallel: bool, items: Vec<T>, work: impl Fn(T) + Send + Sync) {
+/// Runs `work` on every item, on the threads of the current pool if there are any; each lends its
+/// memory from one to the next.
+fn for_each<T: Send>(parallel: bool, items: Vec<T>, work: impl Fn(&mut Band, T) + Send + Sync) {
     #[cfg(feature = "rayon")]
     if parallel {
         use rayon::iter::{IntoParallelIterator, ParallelIterator};
-        items.into_par_iter().for_each(work);
+        items.into_par_iter().for_each_init(Band::default, work);
         return;
     }
     let _ = parallel;
-    items.into_iter().for_each(work);
+    let mut memory = Band::default();
+    items.into_iter().for_each(|item| work(&mut memory, item));
 }

@@ -14,13 +14,12 @@ pub(crate) struct Splat {
     pub(crate) w: f32,
     pub(crate) i22: f32,
     pub(crate) color: [f32; 4],
-    /// The Cholesky factor in output pixels, for [`Splat::footprint`].
+    /// The Cholesky factor in output pixels, for [`Footprints`].
     cholesky: [f32; 3],
 }
 
 impl Splat {
     /// A splat that touches no picture: in place of a Gaussian that is not drawn.
-    #[cfg(feature = "encode")]
     pub(crate) const NOWHERE: Self = Self {
         x: -4e9,
         y: -4e9,
@@ -65,69 +64,124 @@ impl Splat {
         let v = self.w * dx + self.i22 * dy;
         u * u + v * v
     }
-
-    /// An outline that holds every pixel whose *computed* q is at most `cutoff`.
-    pub(crate) fn footprint(&self, cutoff: f32) -> Footprint {
-        let radius = math::sqrt(cutoff);
-        let [l11, l21, l22] = self.cholesky;
-        // Rounding moves the computed edge: along x by a few units in the last place, along y by
-        // as many units of the larger of l21 and l22 (w dx + i22 dy cancels in a needle). Widen
-        // the ellipse by eight of them.
-        let l11 = l11 * (1.0 + 1e-6);
-        let l22 = l22 + (l21.abs() + l22) * 1e-6;
-        let yy = l21 * l21 + l22 * l22;
-        let sigma_y = math::sqrt(yy);
-        let extent = [radius * l11, radius * sigma_y];
-        Footprint {
-            center: [self.x, self.y],
-            extent,
-            margin: [
-                0.01 + (self.x.abs() + extent[0]) * 4e-6,
-                0.01 + (self.y.abs() + extent[1]) * 4e-6,
-            ],
-            tip: radius * l21,
-            slope: (l11 * l21) / yy,
-            half_width: (l11 * l22) / sigma_y * radius,
-            inverse_extent_y: 1.0 / extent[1],
-        }
-    }
 }
 
-/// An ellipse, a little larger than what a splat covers.
+/// Splats whose footprints are found at the same time.
+pub(super) const LANES: usize = 16;
+
+/// Outlines that hold every pixel at which a *computed* q is at most a cut-off: ellipses a little
+/// larger than that. One lane for each of several splats, for loops that become vector code.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Footprint {
-    center: [f32; 2],
-    /// Half of the bounding box.
-    extent: [f32; 2],
-    margin: [f32; 2],
+pub(super) struct Footprints {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    /// Half of the height.
+    reach: [f32; LANES],
+    margin_x: [f32; LANES],
+    margin_y: [f32; LANES],
     /// dy of the rightmost point; of the leftmost point with the other sign.
-    tip: f32,
+    tip: [f32; LANES],
     /// dx of the middle of a horizontal chord, per dy.
-    slope: f32,
+    slope: [f32; LANES],
     /// Half of the chord through the centre.
-    half_width: f32,
-    inverse_extent_y: f32,
+    half_width: [f32; LANES],
+    inverse_reach: [f32; LANES],
 }
 
-impl Footprint {
-    /// The range of y that the footprint spans, in pixels.
-    pub(crate) fn rows(&self) -> (f32, f32) {
-        let reach = self.extent[1] + self.margin[1];
-        (self.center[1] - reach, self.center[1] + reach)
+impl Footprints {
+    #[inline(always)]
+    pub(super) fn new(splats: &[Splat; LANES], cutoff: f32) -> Self {
+        const NONE: [f32; LANES] = [0.0; LANES];
+        let mut all = Self {
+            x: NONE,
+            y: NONE,
+            reach: NONE,
+            margin_x: NONE,
+            margin_y: NONE,
+            tip: NONE,
+            slope: NONE,
+            half_width: NONE,
+            inverse_reach: NONE,
+        };
+        let radius = math::sqrt(cutoff);
+        let inverse_radius = 1.0 / radius;
+        for (lane, splat) in splats.iter().enumerate() {
+            let [l11, l21, l22] = splat.cholesky;
+            // Rounding moves the computed edge: along x by a few units in the last place, along y
+            // by as many units of the larger of l21 and l22 (w dx + i22 dy cancels in a needle).
+            // Widen the ellipse by eight of them.
+            let l11 = l11 * (1.0 + 1e-6);
+            let l22 = l22 + (l21.abs() + l22) * 1e-6;
+            let sigma_y = math::sqrt(l21 * l21 + l22 * l22);
+            let inverse = 1.0 / sigma_y;
+            all.x[lane] = splat.x;
+            all.y[lane] = splat.y;
+            all.reach[lane] = radius * sigma_y;
+            all.margin_x[lane] = 0.01 + (splat.x.abs() + radius * l11) * 4e-6;
+            all.margin_y[lane] = 0.01 + (splat.y.abs() + radius * sigma_y) * 4e-6;
+            all.tip[lane] = radius * l21;
+            all.slope[lane] = (l11 * l21) * (inverse * inverse);
+            all.half_width[lane] = (l11 * l22) * inverse * radius;
+            all.inverse_reach[lane] = inverse * inverse_radius;
+        }
+        all
     }
 
-    /// The range of x that the part between the rows `top` and `bottom` spans, in pixels.
-    pub(crate) fn columns(&self, top: f32, bottom: f32) -> (f32, f32) {
-        let low = (top - self.center[1] - self.margin[1]).max(-self.extent[1]);
-        let high = (bottom - self.center[1] + self.margin[1]).min(self.extent[1]);
-        // A chord's end moves monotonically on either side of the tip, so the outermost end
-        // lies at the row nearest to the tip.
-        let end = |tip: f32, side: f32| {
-            let dy = tip.max(low).min(high);
-            let t = dy * self.inverse_extent_y;
-            let chord = math::sqrt((1.0 - t * t).max(0.0));
-            self.slope * dy + side * self.half_width * chord + side * self.margin[0]
-        };
-        (self.center[0] + end(-self.tip, -1.0), self.center[0] + end(self.tip, 1.0))
+    /// Where they begin and end along y, in pixels.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> [[f32; LANES]; 2] {
+        let mut ends = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let reach = self.reach[lane] + self.margin_y[lane];
+            ends[0][lane] = self.y[lane] - reach;
+            ends[1][lane] = self.y[lane] + reach;
+        }
+        ends
     }
+
+    /// Where the parts between the rows `top` and `bottom` begin and end along x, in pixels.
+    #[inline(always)]
+    pub(super) fn columns(&self, top: f32, bottom: f32) -> [[f32; LANES]; 2] {
+        let mut ends = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            let (reach, margin) = (self.reach[lane], self.margin_y[lane]);
+            let low = larger(top - self.y[lane] - margin, -reach);
+            let high = smaller(bottom - self.y[lane] + margin, reach);
+            // A chord's end moves monotonically on either side of the tip, so the outermost end
+            // lies at the row nearest to the tip.
+            let end = |tip: f32, half_width: f32, margin: f32| {
+                let dy = smaller(larger(tip, low), high);
+                let t = dy * self.inverse_reach[lane];
+                let chord = math::sqrt(larger(1.0 - t * t, 0.0));
+                self.x[lane] + margin + self.slope[lane] * dy + half_width * chord
+            };
+            let (tip, half) = (self.tip[lane], self.half_width[lane]);
+            ends[0][lane] = end(-tip, -half, -self.margin_x[lane]);
+            ends[1][lane] = end(tip, half, self.margin_x[lane]);
+        }
+        ends
+    }
+
+    /// At least as wide as any parts between two rows `height` pixels apart, in pixels.
+    #[inline(always)]
+    pub(super) fn widest(&self, height: f32) -> [f32; LANES] {
+        let mut widths = [0.0; LANES];
+        for lane in 0..LANES {
+            let reach = height + 2.0 * self.margin_y[lane];
+            let chord = self.half_width[lane] + self.margin_x[lane];
+            widths[lane] = 2.0 * chord + self.slope[lane].abs() * reach;
+        }
+        widths
+    }
+}
+
+// One instruction each, unlike those of `f32`, which think of NaN.
+#[inline(always)]
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+pub(super) fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }

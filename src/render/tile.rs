@@ -1,7 +1,11 @@
-//! One tile of the output: splats added to a few hundred pixels that stay in the first cache
-//! (spec, section 9.4).
+//! One tile of the output: splats added to pixels that stay in registers (spec, section 9.4).
+
+#[cfg(feature = "std")]
+use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, prelude::*};
 
 use super::kernel::Kernel;
+#[cfg(feature = "std")]
+use super::kernel::simd::{Exponential, Quartic, Weight};
 use super::splat::Splat;
 
 /// Pixels per row of a tile: one AVX-512 register.
@@ -21,7 +25,7 @@ pub(crate) enum Backend {
     Reference,
     /// Vector code at one of the levels that this machine has.
     #[cfg(feature = "std")]
-    Simd(fearless_simd::Level),
+    Simd(Level),
 }
 
 impl Backend {
@@ -32,120 +36,111 @@ impl Backend {
     /// The best that this machine has.
     pub(crate) fn fastest() -> Self {
         #[cfg(feature = "std")]
-        return Self::Simd(fearless_simd::Level::new());
+        return Self::Simd(Level::new());
         #[cfg(not(feature = "std"))]
         return Self::Reference;
     }
 
-    /// Adds the listed splats, in order, to the planes of the tile whose first pixel is (x, y).
-    pub(crate) fn add<const CHANNELS: usize>(
-        self,
-        planes: &mut [Plane; CHANNELS],
-        (x, y): (u32, u32),
-        splats: &[Splat],
-        list: &[u32],
-        kernel: Kernel,
-    ) {
+    /// Runs plain loops, compiled for this code's machines.
+    #[inline]
+    pub(super) fn run<T>(self, work: impl FnOnce() -> T) -> T {
         match self {
-            Self::Reference => add_reference(planes, (x, y), splats, list, kernel),
+            Self::Reference => work(),
             #[cfg(feature = "std")]
-            Self::Simd(level) => simd::add(level, planes, (x, y), splats, list, kernel),
+            Self::Simd(level) => dispatch!(level, _ => work()),
         }
     }
 }
 
-fn add_reference<const CHANNELS: usize>(
-    planes: &mut [Plane; CHANNELS],
-    (x, y): (u32, u32),
-    splats: &[Splat],
-    list: &[u32],
-    kernel: Kernel,
-) {
-    for &index in list {
-        let splat = &splats[index as usize];
-        for row in 0..TILE_HEIGHT {
-            for column in 0..TILE_WIDTH {
-                let px = (x as usize + column) as f32 + 0.5;
-                let py = (y as usize + row) as f32 + 0.5;
-                let weight = kernel.weight(splat.q(px, py));
-                for (plane, color) in planes.iter_mut().zip(splat.color) {
-                    plane[row][column] += color * weight;
+/// What a tile shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile<'a, const CHANNELS: usize> {
+    /// The first pixel.
+    pub(crate) origin: (u32, u32),
+    pub(crate) base: [f32; CHANNELS],
+    pub(crate) splats: &'a [Splat],
+    /// Those of the splats that are added, in order.
+    pub(crate) list: &'a [u32],
+    pub(crate) kernel: Kernel,
+}
+
+impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
+    pub(crate) fn render(&self, backend: Backend, planes: &mut [Plane; CHANNELS]) {
+        match (backend, self.kernel) {
+            (Backend::Reference, _) => self.render_plainly(planes),
+            #[cfg(feature = "std")]
+            (Backend::Simd(level), Kernel::Exponential { cutoff }) => {
+                let kernel = Exponential { cutoff };
+                dispatch!(level, simd => self.render_with(simd, kernel, planes));
+            }
+            #[cfg(feature = "std")]
+            (Backend::Simd(level), Kernel::Quartic) => {
+                dispatch!(level, simd => self.render_with(simd, Quartic, planes));
+            }
+        }
+    }
+
+    fn render_plainly(&self, planes: &mut [Plane; CHANNELS]) {
+        *planes = self.base.map(|base| [[base; TILE_WIDTH]; TILE_HEIGHT]);
+        for &index in self.list {
+            let splat = &self.splats[index as usize];
+            for row in 0..TILE_HEIGHT {
+                for column in 0..TILE_WIDTH {
+                    let px = (self.origin.0 as usize + column) as f32 + 0.5;
+                    let py = (self.origin.1 as usize + row) as f32 + 0.5;
+                    let weight = self.kernel.weight(splat.q(px, py));
+                    for (plane, color) in planes.iter_mut().zip(splat.color) {
+                        plane[row][column] += color * weight;
+                    }
                 }
             }
         }
     }
-}
 
-#[cfg(feature = "encode")]
-pub(crate) use simd::centers;
-
-#[cfg(feature = "std")]
-mod simd {
-    use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
-
-    use super::{Plane, TILE_HEIGHT};
-    use crate::render::kernel::Kernel;
-    use crate::render::kernel::simd::{Exponential, Quartic, Weight};
-    use crate::render::splat::Splat;
-
-    pub(super) fn add<const CHANNELS: usize>(
-        level: Level,
-        planes: &mut [Plane; CHANNELS],
-        origin: (u32, u32),
-        splats: &[Splat],
-        list: &[u32],
-        kernel: Kernel,
-    ) {
-        match kernel {
-            Kernel::Exponential { cutoff } => {
-                let kernel = Exponential { cutoff };
-                dispatch!(level, simd => add_with(simd, planes, origin, splats, list, kernel));
-            }
-            Kernel::Quartic => {
-                dispatch!(level, simd => add_with(simd, planes, origin, splats, list, Quartic));
-            }
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    fn render_with<S: Simd, K: Weight>(&self, simd: S, kernel: K, planes: &mut [Plane; CHANNELS]) {
+        let px = centers(simd, self.origin.0);
+        let top = self.origin.1 as usize;
+        let py = f32x8::from_fn(simd, |row| (top + row) as f32 + 0.5);
+        // In registers, where there are enough: loading and storing would be half of the work.
+        let mut sums = [[f32x16::splat(simd, 0.0); TILE_HEIGHT]; CHANNELS];
+        for (sums, base) in sums.iter_mut().zip(self.base) {
+            *sums = [f32x16::splat(simd, base); TILE_HEIGHT];
         }
-    }
-
-    /// The pixel centres of the sixteen columns from `x` on.
-    #[inline(always)]
-    pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
-        f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
-    }
-
-    #[inline(always)]
-    fn add_with<S: Simd, K: Weight, const CHANNELS: usize>(
-        simd: S,
-        planes: &mut [Plane; CHANNELS],
-        (x, y): (u32, u32),
-        splats: &[Splat],
-        list: &[u32],
-        kernel: K,
-    ) {
-        let px = centers(simd, x);
-        let py: [f32; TILE_HEIGHT] = core::array::from_fn(|row| (y as usize + row) as f32 + 0.5);
-        for &index in list {
-            let splat = &splats[index as usize];
+        for &index in self.list {
+            let splat = &self.splats[index as usize];
             let dx = px - splat.x;
             let u = dx * splat.i11;
             let (u2, slant) = (u * u, dx * splat.w);
+            let shifts = ((py - splat.y) * splat.i22).to_array();
             for row in 0..TILE_HEIGHT {
-                let v = slant + splat.i22 * (py[row] - splat.y);
+                let v = slant + shifts[row];
                 let weight = kernel.weight(simd, u2 + v * v);
-                for (plane, color) in planes.iter_mut().zip(splat.color) {
-                    let sum = f32x16::load_array_ref(simd, &plane[row]) + weight * color;
-                    sum.store_array(&mut plane[row]);
+                for (sums, color) in sums.iter_mut().zip(splat.color) {
+                    sums[row] += weight * color;
                 }
             }
         }
+        for (sums, plane) in sums.iter().zip(planes) {
+            for (sum, values) in sums.iter().zip(plane) {
+                sum.store_array(values);
+            }
+        }
     }
+}
+
+/// The pixel centres of the sixteen columns from `x` on.
+#[cfg(feature = "std")]
+#[inline(always)]
+pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
+    f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
 }
 
 #[cfg(all(test, feature = "std"))]
 mod tests {
     use core::cell::RefCell;
 
-    use fearless_simd::Level;
     use proptest::prelude::*;
     use proptest::test_runner::TestRunner;
 
@@ -163,8 +158,10 @@ mod tests {
     ) -> [usize; 2] {
         let list: Vec<u32> = (0..splats.len() as u32).collect();
         let render = |backend: Backend| {
-            let mut planes = [[[0.5; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-            backend.add(&mut planes, origin, splats, &list, kernel);
+            let base = [0.5; CHANNELS];
+            let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+            let tile = Tile { origin, base, splats, list: &list, kernel };
+            tile.render(backend, &mut planes);
             planes.into_iter().flatten().flatten().map(f32::to_bits)
         };
         let pairs = render(Backend::Reference).zip(render(Backend::Simd(level)));

@@ -41,7 +41,7 @@ pub struct RenderOptions {
     color: Option<ColorModel>,
     pub(super) prefix: Option<u32>,
     pub(super) parallel: bool,
-    reference: bool,
+    pub(super) backend: Backend,
 }
 
 impl Default for RenderOptions {
@@ -52,7 +52,7 @@ impl Default for RenderOptions {
             color: None,
             prefix: None,
             parallel: true,
-            reference: false,
+            backend: Backend::fastest(),
         }
     }
 }
@@ -102,7 +102,14 @@ impl RenderOptions {
     /// Whether to use the plain reference code in place of the fast code (default: no). The
     /// result is the same bit for bit; this is how to find out.
     pub fn reference(mut self, reference: bool) -> Self {
-        self.reference = reference;
+        self.backend = if reference { Backend::reference() } else { Backend::fastest() };
+        self
+    }
+
+    /// Uses the code of one level of vector instructions.
+    #[cfg(all(fuzzing, feature = "std"))]
+    pub fn simd_level(mut self, level: fearless_simd::Level) -> Self {
+        self.backend = Backend::Simd(level);
         self
     }
 
@@ -138,10 +145,6 @@ impl RenderOptions {
         let (width, height) = self.output_size(header);
         let channels = self.color.unwrap_or(header.color).channels();
         usize::try_from(width).ok()?.checked_mul(height as usize)?.checked_mul(channels)
-    }
-
-    pub(super) fn backend(&self) -> Backend {
-        if self.reference { Backend::reference() } else { Backend::fastest() }
     }
 
     /// Checks the request against the picture and the limits.

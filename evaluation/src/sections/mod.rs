@@ -2,6 +2,7 @@
 
 mod ablation;
 mod checks;
+mod decode;
 mod growth;
 mod handmade;
 mod levels;
@@ -30,6 +31,8 @@ pub(crate) enum Section {
     Rate,
     /// Time against error, and how both grow
     Speed,
+    /// Decoding next to other decoders, whole and in part
+    Decode,
     /// Arithmetic at its edges, and pictures that are hard to fit
     Stability,
     /// How much is spent on simple and on difficult pictures
@@ -38,11 +41,12 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 6] = [
+    pub(crate) const ALL: [Self; 7] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
         Self::Speed,
+        Self::Decode,
         Self::Stability,
         Self::Scene,
     ];
@@ -53,6 +57,7 @@ impl Section {
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
             Self::Speed => "Speed against error",
+            Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",
             Self::Scene => "Only what a scene needs",
         }
@@ -69,6 +74,7 @@ impl Section {
             Self::Ablation => ablation::measure(bench),
             Self::Rate => rate::measure(bench),
             Self::Speed => speed::measure(bench),
+            Self::Decode => decode::measure(bench),
             Self::Stability => stability::measure(bench),
             Self::Scene => scene::measure(bench),
         }

@@ -70,7 +70,7 @@ impl Files {
         picture: &Picture,
     ) -> Result<Point> {
         self.point(versions, [baseline.id, setting, &picture.name], || {
-            let coded = worker.code(baseline.id, setting, picture, Some(1), 1)?;
+            let coded = worker.code(baseline.id, setting, picture, Some(1), [1; 2])?;
             let distortion = coded.distortion;
             Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
         })

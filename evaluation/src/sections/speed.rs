@@ -117,13 +117,13 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
                 let point = files.baseline(worker, &versions, baseline, setting, picture)?;
                 Ok(point.rate)
             };
-            settings.push(nearest(baseline.settings, rate)?);
+            settings.push(nearest(baseline.settings, RATE, rate)?);
         }
         rows.push(row(baseline.name, &settings.join(", "), &pictures, |index, threads| {
             let (setting, picture) = (settings[index], &pictures[index]);
             let key = [baseline.id, setting, called(threads), &picture.name];
             store.get(&versions, key, || {
-                let coded = worker.code(baseline.id, setting, picture, threads, REPEATS)?;
+                let coded = worker.code(baseline.id, setting, picture, threads, [REPEATS; 2])?;
                 let times = [coded.encode_seconds, coded.decode_seconds];
                 Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
             })
@@ -132,15 +132,19 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Of settings from small files to large ones, that whose rate is nearest to [`RATE`].
-fn nearest<'a>(settings: &[&'a str], mut rate: impl FnMut(&str) -> Result<f64>) -> Result<&'a str> {
+/// Of settings from small files to large ones, that whose rate is nearest to the one `wanted`.
+pub(super) fn nearest<'a>(
+    settings: &[&'a str],
+    wanted: f64,
+    mut rate: impl FnMut(&str) -> Result<f64>,
+) -> Result<&'a str> {
     let (mut low, mut high) = (0, settings.len() - 1);
     while high - low > 1 {
         let middle = usize::midpoint(low, high);
-        if rate(settings[middle])? < RATE { low = middle } else { high = middle }
+        if rate(settings[middle])? < wanted { low = middle } else { high = middle }
     }
-    let below = RATE / rate(settings[low])?;
-    let above = rate(settings[high])? / RATE;
+    let below = wanted / rate(settings[low])?;
+    let above = rate(settings[high])? / wanted;
     Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
 }
 
@@ -250,7 +254,7 @@ mod tests {
         let find = |rates: &[f64]| {
             let names: Vec<String> = rates.iter().map(f64::to_string).collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            nearest(&names, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
+            nearest(&names, 0.5, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
         };
         assert_eq!(find(&[0.1, 0.2, 0.45, 0.6, 0.9]), "0.45");
         assert_eq!(find(&[0.1, 0.2, 0.3, 0.52, 0.9]), "0.52");

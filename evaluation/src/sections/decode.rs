@@ -1,0 +1,376 @@
+//! Decoding: from a file in memory to 8-bit samples, next to other decoders in the same run.
+
+use anyhow::Result;
+use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target};
+
+use super::rate::Files;
+use super::speed::nearest;
+use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
+use crate::bench::Bench;
+use crate::gip;
+use crate::kernel;
+use crate::pictures::Picture;
+use crate::table::{Table, mean};
+use crate::verdict::list;
+
+/// Rates of the files, in bits per pixel.
+const RATES: [f64; 3] = [0.25, 0.5, 1.0];
+/// On how many pictures.
+const PICTURES: usize = 8;
+const QUICK_PICTURES: usize = 2;
+/// Times are medians over so many runs.
+const REPEATS: usize = 15;
+/// How much smaller thumbnails are along each side.
+const THUMBNAIL: u32 = 8;
+/// The picture of which a region is decoded: its width, its rate and its effort, and the region.
+const WIDE: (u32, f64, u8) = (2048, 0.5, 2);
+const REGION: u32 = 128;
+
+pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let pictures = bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES });
+    let mut text = format!(
+        "Compared with: the decoders of libjpeg-turbo, libwebp, OpenJPEG, libavif with dav1d, and \
+         libjxl, on files of about the same rate of the same pictures, one after the other in the \
+         same run. From a file in memory to 8-bit RGB in memory that is asked for each time; \
+         medians of {REPEATS}, then means; {}. Their times include some microseconds of Python.\n",
+        bench.share(pictures.len()),
+    );
+    let mut all = Vec::new();
+    for rate in RATES {
+        all.push(against_others(bench, &pictures, rate)?);
+    }
+    text.push_str(&ratios(&all));
+    text.push_str(&parts(bench, &pictures)?);
+    text.push_str(&region(bench)?);
+    Ok(text)
+}
+
+/// A decoder at a rate: on each picture bits per pixel, PSNR, seconds.
+struct Row {
+    decoder: &'static str,
+    points: Vec<[f64; 3]>,
+}
+
+impl Row {
+    fn mean(&self, column: usize) -> f64 {
+        mean(self.points.iter().map(|point| point[column])).unwrap_or(f64::NAN)
+    }
+}
+
+/// What our own decoder takes for a file, in seconds.
+#[derive(Clone, Copy, Debug)]
+struct Times {
+    bytes: f64,
+    psnr: f64,
+    /// Of the whole, with one thread and with all.
+    whole: [f64; 2],
+    /// From bytes to Gaussians.
+    parse: f64,
+    /// From no Gaussians to samples.
+    output: f64,
+    thumbnail: f64,
+    /// From the first tenth of the bytes.
+    tenth: f64,
+    gaussians: f64,
+    /// Kernel evaluations.
+    evaluations: f64,
+}
+
+fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
+    let mut store = bench.store(
+        "decode.csv",
+        ["rate", "image"],
+        [
+            "bytes",
+            "psnr",
+            "seconds_one",
+            "seconds_all",
+            "seconds_parse",
+            "seconds_output",
+            "seconds_thumbnail",
+            "seconds_tenth",
+            "gaussians",
+            "evaluations",
+        ],
+    )?;
+    let key = [&rate.to_string(), &picture.name];
+    let values = store.get(&bench.product, key.map(String::as_str), || {
+        let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
+        let coded = gip::code(encoder, picture, None)?;
+        let file = &coded.file;
+        let whole = |parallel| seconds(|| render(file, &RenderOptions::new().parallel(parallel)));
+        let nothing = RenderOptions::new().parallel(false).prefix(0);
+        let mut stream = StreamDecoder::new();
+        stream.feed(file)?;
+        let picture_of = || stream.picture().expect("the file is whole");
+        let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
+        let small = RenderOptions::new().parallel(false).size(width, height);
+        let samples = picture.rgb.len();
+        Ok([
+            coded.bytes,
+            coded.distortion.psnr,
+            whole(false)?,
+            whole(true)?,
+            seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
+            seconds(|| Ok(picture_of().render_u8(&nothing, &mut vec![0; samples])?))?,
+            seconds(|| thumbnail(file, &small))?,
+            seconds(|| beginning(&file[..file.len() / 10]))?,
+            coded.report.gaussians.into(),
+            evaluations(stream.gaussians(), picture.width, picture.height),
+        ])
+    })?;
+    let [bytes, psnr, one, all, parse, output, thumbnail, tenth, gaussians, evaluations] = values;
+    let whole = [one, all];
+    Ok(Times { bytes, psnr, whole, parse, output, thumbnail, tenth, gaussians, evaluations })
+}
+
+fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
+    gip::median_seconds(REPEATS, work)
+}
+
+/// Decodes and renders as much of a file as shows.
+fn thumbnail(file: &[u8], options: &RenderOptions) -> Result<()> {
+    let mut decoder = Decoder::new(file)?;
+    let (width, height) = options.output_size(decoder.header());
+    decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
+    let picture = decoder.picture();
+    Ok(picture.render_u8(options, &mut vec![0; picture.output_len(options)?])?)
+}
+
+/// Decodes and renders a file.
+fn render(file: &[u8], options: &RenderOptions) -> Result<()> {
+    let mut decoder = Decoder::new(file)?;
+    decoder.set_options(options.clone());
+    let mut samples = vec![0; decoder.output_len().unwrap_or(0)];
+    Ok(decoder.decode_into(&mut samples)?)
+}
+
+/// Decodes and renders what the beginning of a file has.
+fn beginning(bytes: &[u8]) -> Result<()> {
+    gip::open(bytes, |picture| {
+        let options = RenderOptions::new().parallel(false);
+        let mut samples = vec![0; picture.output_len(&options)?];
+        Ok(picture.render_u8(&options, &mut samples)?)
+    })
+}
+
+/// Pixels of all tiles of 16 x 8 that the Gaussians touch, each time that one does.
+fn evaluations(gaussians: &[Gaussian], width: u32, height: u32) -> f64 {
+    const TILE: (u32, u32) = (16, 8);
+    let touched = |gaussian: &Gaussian, row: u32| {
+        let chords = (row * TILE.1..(row + 1) * TILE.1).filter_map(|y| chord(gaussian, y, width));
+        let whole = chords.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        whole.map_or(0, |(first, last)| last / TILE.0 - first / TILE.0 + 1)
+    };
+    let rows = height.div_ceil(TILE.1);
+    let tiles = gaussians.iter().flat_map(|gaussian| (0..rows).map(|row| touched(gaussian, row)));
+    f64::from(tiles.sum::<u32>()) * f64::from(TILE.0 * TILE.1)
+}
+
+/// The first and the last pixel of a row in which a Gaussian of the quartic kernel shows.
+fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
+    let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
+    let [x, cy] = gaussian.center.map(f64::from);
+    // q <= 8, solved for dx.
+    let (yy, dy) = (l21 * l21 + l22 * l22, f64::from(y) + 0.5 - cy);
+    let squared = 8.0 - dy * dy / yy;
+    let half = (squared > 0.0).then(|| l11 * l22 / yy.sqrt() * squared.sqrt())?;
+    let middle = x - 0.5 + l11 * l21 / yy * dy;
+    let (first, last) = ((middle - half).ceil().max(0.0), (middle + half).floor());
+    let last = last.min(f64::from(width) - 1.0);
+    (first <= last).then_some((first as u32, last as u32))
+}
+
+/// All decoders at a rate, ours first.
+fn against_others(bench: &mut Bench, pictures: &[Picture], rate: f64) -> Result<(f64, Vec<Row>)> {
+    let mut rows = vec![Row { decoder: gip::NAME, points: Vec::new() }];
+    let others = || BASELINES.iter().chain([&SEQUENTIAL_JPEG]);
+    rows.extend(others().map(|other| Row { decoder: other.name, points: Vec::new() }));
+    for picture in pictures {
+        let times = ours(bench, picture, rate)?;
+        rows[0].points.push([picture.rate(times.bytes), times.psnr, times.whole[0]]);
+        for (row, other) in rows[1..].iter_mut().zip(others()) {
+            row.points.push(theirs(bench, other, picture, rate)?);
+        }
+    }
+    Ok((rate, rows))
+}
+
+fn theirs(bench: &mut Bench, other: &Baseline, picture: &Picture, rate: f64) -> Result<[f64; 3]> {
+    let mut files = Files::open(bench)?;
+    let mut store = bench.store(
+        "decoders.csv",
+        ["codec", "quality", "image"],
+        ["bpp", "psnr", "decode_seconds"],
+    )?;
+    let (worker, versions) = bench.baselines()?;
+    let setting = nearest(other.settings, rate, |setting| {
+        Ok(files.baseline(worker, &versions, other, setting, picture)?.rate)
+    })?;
+    store.get(&versions, [other.id, setting, &picture.name], || {
+        let coded = worker.code(other.id, setting, picture, Some(1), [1, REPEATS as u32])?;
+        Ok([picture.rate(coded.bytes), coded.distortion.psnr, coded.decode_seconds])
+    })
+}
+
+/// Times of all decoders with one thread, and ours as a share of theirs.
+fn ratios(all: &[(f64, Vec<Row>)]) -> String {
+    let mut text = String::from("\n### One thread\n");
+    for (rate, rows) in all {
+        let mut table = Table::new(&[
+            "decoder",
+            "bpp",
+            "PSNR in dB",
+            "ms",
+            "ours / theirs, median",
+            "least",
+            "most",
+        ]);
+        for row in rows {
+            let pairs = rows[0].points.iter().zip(&row.points);
+            let mut shares: Vec<f64> = pairs.map(|(ours, theirs)| ours[2] / theirs[2]).collect();
+            shares.sort_by(f64::total_cmp);
+            let [least, most] = [shares[0], shares[shares.len() - 1]];
+            table.row(&[
+                row.decoder.to_owned(),
+                format!("{:.3}", row.mean(0)),
+                format!("{:.2}", row.mean(1)),
+                format!("{:.2}", 1000.0 * row.mean(2)),
+                format!("{:.2}", shares[shares.len() / 2]),
+                format!("{least:.2}"),
+                format!("{most:.2}"),
+            ]);
+        }
+        let faster = rows.iter().filter(|row| row.mean(2) < rows[0].mean(2));
+        text.push_str(&format!(
+            "\nFiles of about {rate} bits per pixel:\n{}\nWorse: ours is slower than {}.\n",
+            table.finish(),
+            list(faster.map(|row| row.decoder)),
+        ));
+    }
+    text
+}
+
+/// What our decoder's time consists of, and how it is with threads, thumbnails and beginnings.
+fn parts(bench: &Bench, pictures: &[Picture]) -> Result<String> {
+    let floor = kernel::seconds_per_evaluation();
+    let mut stages = Table::new(&[
+        "bpp",
+        "Gaussians",
+        "evaluations per pixel",
+        "bytes to Gaussians, ms",
+        "output, ms",
+        "binning and splatting, ms",
+        "floor of splatting, ms",
+        "all, ms",
+    ]);
+    let mut gains = Table::new(&[
+        "bpp",
+        "all threads, times as fast",
+        "thumbnail, times as fast",
+        "first tenth, share of the time",
+    ]);
+    for rate in RATES {
+        let times: Vec<Times> =
+            pictures.iter().map(|picture| ours(bench, picture, rate)).collect::<Result<_>>()?;
+        let mean = |get: fn(&Times) -> f64| mean(times.iter().map(get)).unwrap_or(f64::NAN);
+        let pixels = f64::from(pictures[0].width * pictures[0].height);
+        let [whole, parse, output] = [mean(|t| t.whole[0]), mean(|t| t.parse), mean(|t| t.output)];
+        let evaluations = mean(|times| times.evaluations);
+        let ms = |seconds: f64| format!("{:.2}", 1000.0 * seconds);
+        stages.row(&[
+            rate.to_string(),
+            format!("{:.0}", mean(|times| times.gaussians)),
+            format!("{:.1}", evaluations / pixels),
+            ms(parse),
+            ms(output),
+            ms(whole - parse - output),
+            ms(evaluations * floor),
+            ms(whole),
+        ]);
+        gains.row(&[
+            rate.to_string(),
+            format!("{:.2}", mean(|times| times.whole[0] / times.whole[1])),
+            format!("{:.1}", mean(|times| times.whole[0] / times.thumbnail)),
+            format!("{:.0} %", 100.0 * mean(|times| times.tenth / times.whole[0])),
+        ]);
+    }
+    Ok(format!(
+        "\n### Where the time goes\n\nOurs, one thread. The output is what a picture without \
+         Gaussians takes; the floor is what the evaluations would take in a loop of nothing but \
+         them, whose data stay in registers and in the first cache: {:.3} ns each on this machine, \
+         in this run.\n{}\n### Less than all\n\nCompared with ours for the whole picture on one \
+         thread. Thumbnails are 1/{THUMBNAIL} as wide and as high and take as many of the layers as \
+         show at their size; all times start from the file in memory.\n{}",
+        1e9 * floor,
+        stages.finish(),
+        gains.finish(),
+    ))
+}
+
+/// A small region of a large picture.
+fn region(bench: &Bench) -> Result<String> {
+    let mut store = bench.store(
+        "decode-region.csv",
+        ["image", "width", "rate", "effort"],
+        ["gaussians", "whole", "whole_rendered", "region", "region_rendered"],
+    )?;
+    let (width, rate, effort) = WIDE;
+    let picture = &bench.pictures[0];
+    let height = width * picture.height / picture.width;
+    let key = [width.to_string(), rate.to_string(), effort.to_string()];
+    let key = [&picture.name, &key[0], &key[1], &key[2]];
+    let values = store.get(&bench.product, key.map(String::as_str), || {
+        let wide = picture.mirrored(width, height);
+        let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(rate));
+        let file = gip::code(encoder, &wide, None)?.file;
+        let (x, y) = ((width - REGION) / 2, (height - REGION) / 2);
+        let all = RenderOptions::new().parallel(false);
+        let part = all.clone().region(Region { x, y, width: REGION, height: REGION });
+        let mut stream = StreamDecoder::new();
+        stream.feed(&file)?;
+        let rendered = |options: &RenderOptions| {
+            let picture = stream.picture().expect("the file is whole");
+            let length = picture.output_len(options)?;
+            seconds(|| Ok(picture.render_u8(options, &mut vec![0; length])?))
+        };
+        Ok([
+            stream.gaussians().len() as f64,
+            seconds(|| render(&file, &all))?,
+            rendered(&all)?,
+            seconds(|| render(&file, &part))?,
+            rendered(&part)?,
+        ])
+    })?;
+    let [gaussians, whole, whole_rendered, region, region_rendered] = values;
+    Ok(format!(
+        "\n### A region\n\nCompared with ours for the whole picture on one thread: {REGION} x \
+         {REGION} pixels in the middle of {} mirrored to {width} x {height}, {rate} bits per pixel, \
+         {gaussians} Gaussians. From a file that is open already, as a viewer has it: {:.3} ms \
+         against {:.2} ms, {:.0} times as fast. From the bytes, all of which have to be read: {:.2} \
+         ms against {:.2} ms, {:.1} times as fast.\n",
+        picture.name,
+        1000.0 * region_rendered,
+        1000.0 * whole_rendered,
+        whole_rendered / region_rendered,
+        1000.0 * region,
+        1000.0 * whole,
+        whole / region,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn touched_tiles_are_counted() {
+        let gaussian = |center, cholesky| Gaussian { center, cholesky, color: [1.0; 4] };
+        // A disc of radius 2.83 within one tile, and one on the corner of four.
+        let inside = gaussian([8.0, 4.0], [1.0, 0.0, 1.0]);
+        let corner = gaussian([16.0, 8.0], [1.0, 0.0, 1.0]);
+        let outside = gaussian([-9.0, 8.0], [1.0, 0.0, 1.0]);
+        let tiles = |gaussian| evaluations(&[gaussian], 64, 64) / 128.0;
+        assert_eq!([inside, corner, outside].map(tiles), [1.0, 4.0, 0.0]);
+    }
+}
