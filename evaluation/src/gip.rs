@@ -110,10 +110,7 @@ pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
 }
 
 /// How long something takes: the median of several times.
-pub(crate) fn median_seconds(
-    repeats: usize,
-    mut work: impl FnMut() -> Result<()>,
-) -> Result<f64> {
+pub(crate) fn median_seconds(repeats: usize, mut work: impl FnMut() -> Result<()>) -> Result<f64> {
     let mut seconds = Vec::new();
     for _ in 0..repeats {
         let start = Instant::now();

@@ -39,9 +39,10 @@ impl Case {
 impl Coded {
     fn item(&self) -> Item {
         match *self {
-            Self::Symbol { context, symbol } => {
-                Item::Symbol { context: usize::from(context) % contexts(), symbol: u32::from(symbol % 16) }
-            }
+            Self::Symbol { context, symbol } => Item::Symbol {
+                context: usize::from(context) % contexts(),
+                symbol: u32::from(symbol % 16),
+            },
             Self::Bits { count, value } => {
                 let count = u32::from(count % 17);
                 Item::Bits { count, value: u32::from(value) & ((1 << count) - 1) }

@@ -44,7 +44,10 @@ pub fn check_levels(decoder: &StreamDecoder) {
             let found = bits(&picture, &options.clone().parallel(false).simd_level(level));
             assert_eq!(found, reference, "{level:?}");
         }
-        assert_eq!(samples(&picture, &options), samples(&picture, &options.clone().reference(true)));
+        assert_eq!(
+            samples(&picture, &options),
+            samples(&picture, &options.clone().reference(true))
+        );
     }
 }
 
