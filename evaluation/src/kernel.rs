@@ -34,18 +34,18 @@ pub(crate) fn seconds_per_evaluation() -> f64 {
 #[inline(always)]
 fn sums<S: Simd>(simd: S, gaussians: &[[f32; 8]]) -> [f32; 16] {
     let zero = f32x16::splat(simd, 0.0);
-    let mut sums = [[zero; ROWS]; 3];
+    let mut sums = [[zero; 3]; ROWS];
     let x = f32x16::from_fn(simd, |column| column as f32);
     for &[i11, w, i22, dx, dy, red, green, blue] in gaussians {
         let (u, slant) = ((x - dx) * i11, (x - dx) * w);
         let squared = u * u;
-        for row in 0..ROWS {
+        for (row, sums) in sums.iter_mut().enumerate() {
             let v = slant + i22 * (row as f32 - dy);
             let root = (f32x16::splat(simd, 1.0) - (squared + v * v) * 0.125).max(0.0);
             let weight = root * root * (root * root);
-            sums[0][row] += weight * red;
-            sums[1][row] += weight * green;
-            sums[2][row] += weight * blue;
+            sums[0] += weight * red;
+            sums[1] += weight * green;
+            sums[2] += weight * blue;
         }
     }
     let mut total = zero;

@@ -74,7 +74,7 @@ impl Model {
         (later.to_bitmask() | 1 << SYMBOLS).trailing_zeros() as usize - 1
     }
 
-    #[cfg(any(not(feature = "std"), test))]
+    #[cfg(any(not(feature = "std"), all(test, feature = "encode")))]
     fn plain_symbol_at(&self, share: u32) -> usize {
         self.starts.iter().filter(|&&start| start as u32 <= share).count() - 1
     }

@@ -5,7 +5,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::splat::{LANES, Splat};
+use super::footprint::LANES;
+use super::splat::Splat;
 use super::tile::{Backend, TILE_PIXELS};
 use super::tiling::{Columns, Extent, Grid, Span, TileRow};
 use super::view::View;

@@ -1,6 +1,7 @@
 //! Gaussians to samples: view, tiles, kernel, output (spec, section 9).
 
 mod band;
+mod footprint;
 mod kernel;
 mod output;
 mod splat;

@@ -14,8 +14,8 @@ pub(crate) struct Splat {
     pub(crate) w: f32,
     pub(crate) i22: f32,
     pub(crate) color: [f32; 4],
-    /// The Cholesky factor in output pixels, for [`Footprints`].
-    cholesky: [f32; 3],
+    /// The Cholesky factor in output pixels, for its footprint.
+    pub(super) cholesky: [f32; 3],
 }
 
 impl Splat {
@@ -64,124 +64,4 @@ impl Splat {
         let v = self.w * dx + self.i22 * dy;
         u * u + v * v
     }
-}
-
-/// Splats whose footprints are found at the same time.
-pub(super) const LANES: usize = 16;
-
-/// Outlines that hold every pixel at which a *computed* q is at most a cut-off: ellipses a little
-/// larger than that. One lane for each of several splats, for loops that become vector code.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Footprints {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    /// Half of the height.
-    reach: [f32; LANES],
-    margin_x: [f32; LANES],
-    margin_y: [f32; LANES],
-    /// dy of the rightmost point; of the leftmost point with the other sign.
-    tip: [f32; LANES],
-    /// dx of the middle of a horizontal chord, per dy.
-    slope: [f32; LANES],
-    /// Half of the chord through the centre.
-    half_width: [f32; LANES],
-    inverse_reach: [f32; LANES],
-}
-
-impl Footprints {
-    #[inline(always)]
-    pub(super) fn new(splats: &[Splat; LANES], cutoff: f32) -> Self {
-        const NONE: [f32; LANES] = [0.0; LANES];
-        let mut all = Self {
-            x: NONE,
-            y: NONE,
-            reach: NONE,
-            margin_x: NONE,
-            margin_y: NONE,
-            tip: NONE,
-            slope: NONE,
-            half_width: NONE,
-            inverse_reach: NONE,
-        };
-        let radius = math::sqrt(cutoff);
-        let inverse_radius = 1.0 / radius;
-        for (lane, splat) in splats.iter().enumerate() {
-            let [l11, l21, l22] = splat.cholesky;
-            // Rounding moves the computed edge: along x by a few units in the last place, along y
-            // by as many units of the larger of l21 and l22 (w dx + i22 dy cancels in a needle).
-            // Widen the ellipse by eight of them.
-            let l11 = l11 * (1.0 + 1e-6);
-            let l22 = l22 + (l21.abs() + l22) * 1e-6;
-            let sigma_y = math::sqrt(l21 * l21 + l22 * l22);
-            let inverse = 1.0 / sigma_y;
-            all.x[lane] = splat.x;
-            all.y[lane] = splat.y;
-            all.reach[lane] = radius * sigma_y;
-            all.margin_x[lane] = 0.01 + (splat.x.abs() + radius * l11) * 4e-6;
-            all.margin_y[lane] = 0.01 + (splat.y.abs() + radius * sigma_y) * 4e-6;
-            all.tip[lane] = radius * l21;
-            all.slope[lane] = (l11 * l21) * (inverse * inverse);
-            all.half_width[lane] = (l11 * l22) * inverse * radius;
-            all.inverse_reach[lane] = inverse * inverse_radius;
-        }
-        all
-    }
-
-    /// Where they begin and end along y, in pixels.
-    #[inline(always)]
-    pub(super) fn rows(&self) -> [[f32; LANES]; 2] {
-        let mut ends = [[0.0; LANES]; 2];
-        for lane in 0..LANES {
-            let reach = self.reach[lane] + self.margin_y[lane];
-            ends[0][lane] = self.y[lane] - reach;
-            ends[1][lane] = self.y[lane] + reach;
-        }
-        ends
-    }
-
-    /// Where the parts between the rows `top` and `bottom` begin and end along x, in pixels.
-    #[inline(always)]
-    pub(super) fn columns(&self, top: f32, bottom: f32) -> [[f32; LANES]; 2] {
-        let mut ends = [[0.0; LANES]; 2];
-        for lane in 0..LANES {
-            let (reach, margin) = (self.reach[lane], self.margin_y[lane]);
-            let low = larger(top - self.y[lane] - margin, -reach);
-            let high = smaller(bottom - self.y[lane] + margin, reach);
-            // A chord's end moves monotonically on either side of the tip, so the outermost end
-            // lies at the row nearest to the tip.
-            let end = |tip: f32, half_width: f32, margin: f32| {
-                let dy = smaller(larger(tip, low), high);
-                let t = dy * self.inverse_reach[lane];
-                let chord = math::sqrt(larger(1.0 - t * t, 0.0));
-                self.x[lane] + margin + self.slope[lane] * dy + half_width * chord
-            };
-            let (tip, half) = (self.tip[lane], self.half_width[lane]);
-            ends[0][lane] = end(-tip, -half, -self.margin_x[lane]);
-            ends[1][lane] = end(tip, half, self.margin_x[lane]);
-        }
-        ends
-    }
-
-    /// At least as wide as any parts between two rows `height` pixels apart, in pixels.
-    #[inline(always)]
-    pub(super) fn widest(&self, height: f32) -> [f32; LANES] {
-        let mut widths = [0.0; LANES];
-        for lane in 0..LANES {
-            let reach = height + 2.0 * self.margin_y[lane];
-            let chord = self.half_width[lane] + self.margin_x[lane];
-            widths[lane] = 2.0 * chord + self.slope[lane].abs() * reach;
-        }
-        widths
-    }
-}
-
-// One instruction each, unlike those of `f32`, which think of NaN.
-#[inline(always)]
-pub(super) fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-#[inline(always)]
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }

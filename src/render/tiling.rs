@@ -3,7 +3,8 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::splat::{Footprints, LANES, Splat, larger, smaller};
+use super::footprint::{Footprints, LANES, larger, smaller};
+use super::splat::Splat;
 use super::tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
 use super::view::Region;
 
