@@ -1,4 +1,4 @@
-//! Every level of vector instructions gives the bits of the reference code.
+//! The vector code of this machine and of the least of its kind give the bits of the reference code.
 
 #![no_main]
 
