@@ -31,29 +31,14 @@ const MAX_SIDE: u32 = 40;
 /// kind, on one thread and on several: all bits are those of the reference code.
 pub fn check_levels(decoder: &StreamDecoder) {
     let Some(picture) = decoder.picture() else { return };
-    let header = picture.header();
-    let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
-    let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
-    let options = [
-        RenderOptions::new().size(width, height),
-        RenderOptions::new().region(Region { x, y, width, height }),
-    ];
-    for options in options {
-        let reference = bits(&picture, &options.clone().parallel(false).reference(true));
+    for options in views(&picture) {
+        let one = options.clone().parallel(false);
         for level in [Level::new(), Level::baseline()] {
-            let found = bits(&picture, &options.clone().parallel(false).simd_level(level));
-            assert_eq!(found, reference, "{level:?}");
+            check_backend(&picture, &one.clone().simd_level(level));
         }
-        assert_eq!(
-            samples(&picture, &options),
-            samples(&picture, &options.clone().reference(true))
-        );
+        let reference = options.clone().reference(true);
+        assert_eq!(samples(&picture, &options), samples(&picture, &reference));
     }
-}
-
-/// The bits of [`planes`].
-fn bits(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<u32>> {
-    planes(picture, options).map(|planes| planes.into_iter().map(f32::to_bits).collect())
 }
 
 /// Renders what has arrived in several ways and checks that they agree.
@@ -61,27 +46,35 @@ pub fn check(decoder: &StreamDecoder) {
     let Some(picture) = decoder.picture() else { return };
     let header = picture.header();
     assert!(picture.gaussians().len() <= header.gaussians as usize);
-    let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
+    let [small, middle] = views(&picture).map(|options| options.parallel(false));
 
-    let small = RenderOptions::new().size(width, height);
-    check_backends(&picture, &small);
+    check_backend(&picture, &small);
+    let (width, height) = small.output_size(header);
     let part = Region { x: width / 3, y: height / 3, width: width - width / 3, height: 1 };
     check_region(&picture, &small, width, part);
 
-    // The middle of the picture at its stored size, however large that is.
+    check_backend(&picture, &middle);
+}
+
+/// All of a picture, small, and its middle at its stored size, however large that is.
+fn views(picture: &Picture<'_>) -> [RenderOptions; 2] {
+    let header = picture.header();
+    let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
     let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
-    check_backends(&picture, &RenderOptions::new().region(Region { x, y, width, height }));
+    [
+        RenderOptions::new().size(width, height),
+        RenderOptions::new().region(Region { x, y, width, height }),
+    ]
 }
 
 /// The fast code gives the bits of the reference code, or refuses just as it does.
-fn check_backends(picture: &Picture<'_>, options: &RenderOptions) {
-    let options = options.clone().parallel(false);
-    let fast = planes(picture, &options);
-    let reference = planes(picture, &options.reference(true));
+fn check_backend(picture: &Picture<'_>, options: &RenderOptions) {
+    let fast = planes(picture, options);
+    let reference = planes(picture, &options.clone().reference(true));
     match (&fast, &reference) {
         (Some(fast), Some(reference)) => {
             let differs = fast.iter().zip(reference).position(|(a, b)| a.to_bits() != b.to_bits());
-            assert_eq!(differs, None, "a sample of the fast code differs");
+            assert_eq!(differs, None, "a sample of the fast code differs: {options:?}");
             assert!(fast.iter().all(|sample| sample.is_finite()), "a sample is not finite");
         }
         _ => assert_eq!(fast, reference, "only one of fast and reference code refused"),

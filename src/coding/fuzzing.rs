@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::rans::{Coder, Decoder, Encoder};
-use super::set::Models;
+use super::set::{Models, context};
 
 /// What is coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +26,8 @@ pub enum Item {
 
 /// How many contexts there are.
 #[must_use]
-pub fn contexts() -> usize {
-    Models::default().all().len()
+pub const fn contexts() -> usize {
+    context::COUNT
 }
 
 /// The bytes of `items`.

@@ -92,7 +92,7 @@ impl Tiling {
         self.grid.rows
     }
 
-    /// How many spans a row of tiles has.
+    /// The spans of a row of tiles, in order.
     pub(crate) fn spans(&self, row: usize) -> &[Span] {
         &self.spans[self.starts[row]..self.starts[row + 1]]
     }

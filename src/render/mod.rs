@@ -21,16 +21,14 @@ pub(crate) use output::Sample;
 #[cfg(feature = "encode")]
 pub(crate) use splat::Splat;
 #[cfg(feature = "encode")]
-pub(crate) use tile::{Backend, centers};
+pub(crate) use tile::centers;
 #[cfg(feature = "encode")]
 pub(crate) use tiling::{Grid, Span, TileRow};
 
 use band::{BAND_ROWS, Band, Bands};
 use output::Place;
-#[cfg(not(feature = "encode"))]
-use tile::Backend;
 use tile::Tile;
-pub(crate) use tile::{Plane, TILE_HEIGHT, TILE_WIDTH};
+pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
 pub(crate) use view::View;
 
 use crate::container::Header;
