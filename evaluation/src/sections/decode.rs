@@ -35,12 +35,13 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          medians of {REPEATS}, then means; {}. Their times include some microseconds of Python.\n",
         bench.share(pictures.len()),
     );
+    let mut files = Files::open(bench)?;
     let mut all = Vec::new();
     for rate in RATES {
-        all.push(against_others(bench, &pictures, rate)?);
+        all.push(against_others(bench, &mut files, &pictures, rate)?);
     }
     text.push_str(&ratios(&all));
-    text.push_str(&parts(bench, &pictures)?);
+    text.push_str(&parts(&all, &pictures));
     text.push_str(&region(bench)?);
     Ok(text)
 }
@@ -181,8 +182,22 @@ fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
     (first <= last).then_some((first as u32, last as u32))
 }
 
-/// All decoders at a rate, ours first.
-fn against_others(bench: &mut Bench, pictures: &[Picture], rate: f64) -> Result<(f64, Vec<Row>)> {
+/// What was measured at a rate.
+struct Measured {
+    rate: f64,
+    /// All decoders, ours first.
+    rows: Vec<Row>,
+    /// More of ours, picture by picture.
+    ours: Vec<Times>,
+}
+
+fn against_others(
+    bench: &mut Bench,
+    files: &mut Files,
+    pictures: &[Picture],
+    rate: f64,
+) -> Result<Measured> {
+    let mut all = Vec::new();
     let mut rows = vec![Row { decoder: gip::NAME, points: Vec::new() }];
     let others = || BASELINES.iter().chain([&SEQUENTIAL_JPEG]);
     rows.extend(others().map(|other| Row { decoder: other.name, points: Vec::new() }));
@@ -190,14 +205,20 @@ fn against_others(bench: &mut Bench, pictures: &[Picture], rate: f64) -> Result<
         let times = ours(bench, picture, rate)?;
         rows[0].points.push([picture.rate(times.bytes), times.psnr, times.whole[0]]);
         for (row, other) in rows[1..].iter_mut().zip(others()) {
-            row.points.push(theirs(bench, other, picture, rate)?);
+            row.points.push(theirs(bench, files, other, picture, rate)?);
         }
+        all.push(times);
     }
-    Ok((rate, rows))
+    Ok(Measured { rate, rows, ours: all })
 }
 
-fn theirs(bench: &mut Bench, other: &Baseline, picture: &Picture, rate: f64) -> Result<[f64; 3]> {
-    let mut files = Files::open(bench)?;
+fn theirs(
+    bench: &mut Bench,
+    files: &mut Files,
+    other: &Baseline,
+    picture: &Picture,
+    rate: f64,
+) -> Result<[f64; 3]> {
     let mut store = bench.store(
         "decoders.csv",
         ["codec", "quality", "image"],
@@ -214,9 +235,9 @@ fn theirs(bench: &mut Bench, other: &Baseline, picture: &Picture, rate: f64) -> 
 }
 
 /// Times of all decoders with one thread, and ours as a share of theirs.
-fn ratios(all: &[(f64, Vec<Row>)]) -> String {
+fn ratios(all: &[Measured]) -> String {
     let mut text = String::from("\n### One thread\n");
-    for (rate, rows) in all {
+    for Measured { rate, rows, .. } in all {
         let mut table = Table::new(&[
             "decoder",
             "bpp",
@@ -252,7 +273,7 @@ fn ratios(all: &[(f64, Vec<Row>)]) -> String {
 }
 
 /// What our decoder's time consists of, and how it is with threads, thumbnails and beginnings.
-fn parts(bench: &Bench, pictures: &[Picture]) -> Result<String> {
+fn parts(all: &[Measured], pictures: &[Picture]) -> String {
     let floor = kernel::seconds_per_evaluation();
     let mut stages = Table::new(&[
         "bpp",
@@ -270,10 +291,8 @@ fn parts(bench: &Bench, pictures: &[Picture]) -> Result<String> {
         "thumbnail, times as fast",
         "first tenth, share of the time",
     ]);
-    for rate in RATES {
-        let times: Vec<Times> =
-            pictures.iter().map(|picture| ours(bench, picture, rate)).collect::<Result<_>>()?;
-        let mean = |get: fn(&Times) -> f64| mean(times.iter().map(get)).unwrap_or(f64::NAN);
+    for Measured { rate, ours, .. } in all {
+        let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
         let pixels = f64::from(pictures[0].width * pictures[0].height);
         let [whole, parse, output] = [mean(|t| t.whole[0]), mean(|t| t.parse), mean(|t| t.output)];
         let evaluations = mean(|times| times.evaluations);
@@ -295,7 +314,7 @@ fn parts(bench: &Bench, pictures: &[Picture]) -> Result<String> {
             format!("{:.0} %", 100.0 * mean(|times| times.tenth / times.whole[0])),
         ]);
     }
-    Ok(format!(
+    format!(
         "\n### Where the time goes\n\nOurs, one thread. The output is what a picture without \
          Gaussians takes; the floor is what the evaluations would take in a loop of nothing but \
          them, whose data stay in registers and in the first cache: {:.3} ns each on this machine, \
@@ -305,7 +324,7 @@ fn parts(bench: &Bench, pictures: &[Picture]) -> Result<String> {
         1e9 * floor,
         stages.finish(),
         gains.finish(),
-    ))
+    )
 }
 
 /// A small region of a large picture.
