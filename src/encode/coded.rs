@@ -23,23 +23,26 @@ use crate::lattice::{Code, Grid, Lattice};
 use crate::limits::Limits;
 use crate::render::{Picture, RenderOptions};
 
-/// How often every code is looked at, when the steps are being sought and for the file.
-const SCOUTING_PASSES: u32 = 2;
-const PASSES: u32 = 8;
-/// How often steps are sought at most, and how near is near enough, as a logarithm to base 2.
-const SCOUTINGS: u32 = 4;
+/// How often steps are tried at most: by rounding alone, with a few passes over the codes, with all.
+const MOST_ROUNDINGS: u32 = 8;
+const MOST_SCOUTINGS: u32 = 4;
+const MOST_TRIES: u32 = 4;
+/// How near is near enough for more passes, as a logarithm to base 2.
 const CLOSE: f64 = 0.02;
-/// How much less the size and the error become after scouting, as a logarithm to base 2.
-const SETTLING: f64 = 0.016;
+/// How much less the size becomes after rounding, and size and error after the first pass, as
+/// logarithms to base 2.
+const SETTLING_OF_ROUNDED: f64 = 0.12;
+const SETTLING: f64 = 0.045;
 /// More than anything is off, as a logarithm to base 2.
 const LARGEST_OFF: f64 = 10.0;
-/// Passes until a target is steered to by what a bit is worth, how far that may change, as a
-/// logarithm to base 2, and most passes until the target is met.
-const UNSTEERED_PASSES: u32 = 3;
+/// How far what a bit is worth may change, as a logarithm to base 2.
 const STEERED_BY: f64 = 1.0;
+/// Most passes until a target is met.
 const MOST_PASSES: u32 = 12;
-/// How often all that is done, with other steps.
-const MOST_TRIES: u32 = 4;
+/// By how much finer steps are taken where nothing else gives the PSNR, as logarithms to base 2.
+const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
+/// How often it is tried to do without some Gaussians.
+const MOST_TRIMMINGS: u32 = 32;
 /// The first layers of a file, as shares of its Gaussians: a tenth of the file already shows the
 /// picture.
 const LAYERS: [f64; 2] = [0.08, 0.24];
@@ -57,30 +60,6 @@ pub(crate) fn count_for_size(
     let least = layout.write_set(&Coded::empty(layout.header().color)).len() as u64;
     layout.check_size(bytes, least)?;
     Ok((((bytes - least) * 8) as f64 / rate::BITS_PER_GAUSSIAN).min(most as f64) as usize)
-}
-
-/// The file of a finished fit for the target.
-pub(crate) fn finish(
-    mut fit: Fit<'_>,
-    source: &Source<'_>,
-    raster: &Raster,
-    layout: &Layout<'_>,
-    target: Target,
-    extension: u32,
-    observer: &mut Observer<'_>,
-) -> Result<Finished, EncodeError> {
-    if let Target::Psnr(psnr) = target {
-        extend(&mut fit, rate::SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
-    }
-    let (gaussians, error, mut work) = (fit.gaussians(), fit.best_error(), fit.work());
-    let codes = gaussians.len() * (size_of::<Gaussian>() + 2 * size_of::<Code>());
-    let memory = raster.memory() + Residuals::memory(raster) + codes;
-    work.peak_memory = work.peak_memory.max(memory);
-    // The descent needs the memory.
-    drop(fit);
-    let coded = Coder::new(source, raster, layout).encode(&gaussians, error, target, observer)?;
-    observer.poll()?;
-    Ok(Finished { file: layout.write_set(&coded), work })
 }
 
 /// Extends a fit until its squared error is at most `error`, or nothing helps.
@@ -162,19 +141,49 @@ pub(crate) struct Coder<'a> {
     source: &'a Source<'a>,
     raster: &'a Raster,
     layout: &'a Layout<'a>,
+    /// How often every code is looked at, or a little more for a target.
+    passes: u32,
     grid: Grid,
     model: ColorModel,
 }
 
 impl<'a> Coder<'a> {
-    pub(crate) fn new(source: &'a Source<'a>, raster: &'a Raster, layout: &'a Layout<'a>) -> Self {
+    pub(crate) fn new(
+        source: &'a Source<'a>,
+        raster: &'a Raster,
+        layout: &'a Layout<'a>,
+        passes: u32,
+    ) -> Self {
         let header = layout.header();
         let grid = Grid::new(header.width, header.height);
-        Self { source, raster, layout, grid, model: header.color }
+        Self { source, raster, layout, passes, grid, model: header.color }
+    }
+
+    /// The file of a finished fit for the target.
+    pub(crate) fn finish(
+        &self,
+        mut fit: Fit<'_>,
+        target: Target,
+        extension: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Finished, EncodeError> {
+        let raster = self.raster;
+        if let Target::Psnr(psnr) = target {
+            extend(&mut fit, rate::SHARE_OF_FIT * raster.error_of(psnr), extension, observer)?;
+        }
+        let (gaussians, error, mut work) = (fit.gaussians(), fit.best_error(), fit.work());
+        let codes = gaussians.len() * (size_of::<Gaussian>() + 2 * size_of::<Code>());
+        let memory = raster.memory() + Residuals::memory(raster) + codes;
+        work.peak_memory = work.peak_memory.max(memory);
+        // The descent needs the memory.
+        drop(fit);
+        let coded = self.encode(&gaussians, error, target, observer)?;
+        observer.poll()?;
+        Ok(Finished { file: self.layout.write_set(&coded), work })
     }
 
     /// Codes `gaussians`, whose picture has the squared error `error`, for a target.
-    pub(crate) fn encode(
+    fn encode(
         &self,
         gaussians: &[Gaussian],
         error: f64,
@@ -184,23 +193,26 @@ impl<'a> Coder<'a> {
         let step = rate::step_for(error, gaussians.len());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let mut coded = self.rounded(gaussians, step);
-            self.descend(&mut coded, 0.0, PASSES, observer)?;
+            self.descend(&mut coded, 0.0, self.passes, observer)?;
             return Ok(coded);
         };
-        let mut search = Search::new(step, aim.by_step());
-        for _ in 0..SCOUTINGS {
-            let mut coded = self.rounded(gaussians, search.at);
-            self.descend(&mut coded, 0.0, SCOUTING_PASSES, observer)?;
-            let off = self.off(&coded, aim, observer)? - SETTLING;
-            search.tell(off);
-            if off.abs() < CLOSE {
+        let first = self.first_step(gaussians, step, aim, observer)?;
+        let mut search = Search::new(first, aim.by_step());
+        let mut settling = SETTLING / f64::from(self.scouting_passes());
+        let mut scouted = self.scouted(gaussians, search.at, aim, observer)?;
+        for _ in 1..MOST_SCOUTINGS {
+            let expected = scouted.1 - settling;
+            if expected.abs() < CLOSE {
                 break;
             }
+            search.tell(expected);
+            scouted = self.scouted(gaussians, search.at, aim, observer)?;
         }
         let mut search = Search::new(search.at, aim.by_step());
         let mut best: Option<(Coded, f64)> = None;
         for _ in 0..MOST_TRIES {
-            let (coded, off) = self.steered(gaussians, search.at, aim, observer)?;
+            let (mut coded, before) = scouted;
+            let (off, lambda) = self.steer(&mut coded, before, settling, aim, observer)?;
             let miss = aim.miss(off);
             if best.as_ref().is_none_or(|(_, least)| miss < *least) {
                 best = Some((coded, miss));
@@ -208,17 +220,64 @@ impl<'a> Coder<'a> {
             if miss == 0.0 {
                 break;
             }
-            search.tell(off);
+            // Now it is known how much happens after scouting.
+            let unsteered = off - lambda * aim.by_lambda();
+            settling = before - unsteered;
+            search.tell(unsteered);
+            scouted = self.scouted(gaussians, search.at, aim, observer)?;
         }
-        let (mut coded, _) = best.expect("at least one was tried");
+        let (mut coded, miss) = best.expect("at least one was tried");
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
             self.shorten(&mut coded, bytes);
+            return Ok(coded);
         }
+        // A few Gaussians are hard to steer, but finer steps are always better in the end.
+        let mut finer = search.at;
+        let mut is_good = !Aim::is_wrong(miss);
+        for change in FINER {
+            if is_good {
+                break;
+            }
+            finer -= change;
+            coded = self.rounded(gaussians, finer);
+            self.descend(&mut coded, 0.0, self.passes, observer)?;
+            is_good = self.off(&coded, aim, observer)? <= 0.0;
+        }
+        self.trim(&mut coded, aim, observer)?;
         Ok(coded)
     }
 
-    /// Codes Gaussians with a step, and gets as near to an aim as what a bit is worth can bring it.
-    fn steered(
+    /// The first step to try: how long a file gets can nearly be told from rounding alone.
+    fn first_step(
+        &self,
+        gaussians: &[Gaussian],
+        step: f64,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<f64, EncodeError> {
+        let mut search = Search::new(step, aim.by_step());
+        if matches!(aim, Aim::Psnr(_)) {
+            return Ok(search.at);
+        }
+        for _ in 0..MOST_ROUNDINGS {
+            observer.poll()?;
+            let mut coded = self.rounded(gaussians, search.at);
+            self.walked(&mut coded);
+            let off = self.off(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
+            search.tell(off);
+            if off.abs() < CLOSE {
+                break;
+            }
+        }
+        Ok(search.at)
+    }
+
+    fn scouting_passes(&self) -> u32 {
+        self.passes.div_ceil(4)
+    }
+
+    /// Codes of a step after a few passes, and how far they are from an aim.
+    fn scouted(
         &self,
         gaussians: &[Gaussian],
         step: f64,
@@ -226,19 +285,35 @@ impl<'a> Coder<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(Coded, f64), EncodeError> {
         let mut coded = self.rounded(gaussians, step);
-        let mut lambda = 0.0;
-        self.descend(&mut coded, lambda, UNSTEERED_PASSES, observer)?;
-        let mut off = self.off(&coded, aim, observer)?;
-        for pass in UNSTEERED_PASSES..MOST_PASSES {
-            if pass >= PASSES && aim.miss(off) == 0.0 {
+        self.descend(&mut coded, 0.0, self.scouting_passes(), observer)?;
+        let off = self.off(&coded, aim, observer)?;
+        Ok((coded, off))
+    }
+
+    /// Goes on with scouted codes that are `off`, and gets as near to an aim as what a bit is worth
+    /// can bring them; by `settling` they become less off anyway. How far they are from the aim
+    /// then, and what a bit was worth, as a logarithm to base 2.
+    fn steer(
+        &self,
+        coded: &mut Coded,
+        mut off: f64,
+        settling: f64,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<(f64, f64), EncodeError> {
+        let first = self.scouting_passes();
+        let mut lambda: f64 = 0.0;
+        for pass in first..MOST_PASSES {
+            if pass >= self.passes && aim.miss(off) == 0.0 {
                 break;
             }
-            lambda -= (off / aim.by_lambda()).clamp(-0.5, 0.5);
+            let expected = off - settling * f64::from(first) / f64::from(pass);
+            lambda -= (expected / aim.by_lambda()).clamp(-0.5, 0.5);
             lambda = lambda.clamp(-STEERED_BY, STEERED_BY);
-            self.descend(&mut coded, lambda, 1, observer)?;
-            off = self.off(&coded, aim, observer)?;
+            self.descend(coded, lambda, 1, observer)?;
+            off = self.off(coded, aim, observer)?;
         }
-        Ok((coded, off))
+        Ok((off, lambda))
     }
 
     /// How far from an aim.
@@ -260,7 +335,7 @@ impl<'a> Coder<'a> {
         })
     }
 
-    /// Removes the weakest Gaussians until the file has at most `bytes`.
+    /// Removes the weakest Gaussians until the file has at most so many bytes.
     fn shorten(&self, coded: &mut Coded, bytes: u64) {
         loop {
             let size = self.layout.write_set(coded).len() as u64;
@@ -270,6 +345,40 @@ impl<'a> Coder<'a> {
             coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
             coded.codes.truncate(coded.codes.len() - count);
         }
+    }
+
+    /// Removes the weakest Gaussians of a picture that is too good, as many as can be spared.
+    fn trim(
+        &self,
+        coded: &mut Coded,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let mut off = self.off(coded, aim, observer)?;
+        if off > 0.0 || aim.miss(off) == 0.0 {
+            return Ok(());
+        }
+        coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+        // Those from `end` on cannot be spared, and likely not many more at a time.
+        let mut end = coded.codes.len();
+        let mut portion = end.div_ceil(2);
+        for _ in 0..MOST_TRIMMINGS {
+            let mut fewer = coded.clone();
+            let start = end.saturating_sub(portion);
+            fewer.codes.drain(start..end);
+            let off_with_fewer = self.off(&fewer, aim, observer)?;
+            if off_with_fewer <= 0.0 {
+                (*coded, off, end) = (fewer, off_with_fewer, start);
+            } else if portion > 1 {
+                portion /= 2;
+            } else {
+                end -= 1;
+            }
+            if end == 0 || aim.miss(off) == 0.0 {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Rounds `gaussians` to the lattice of a step, given by its logarithm to base 2.

@@ -1,7 +1,7 @@
 //! One run from pixels to a file, steered to the caller's target.
 
 use super::budget::Budget;
-use super::coded;
+use super::coded::{self, Coder};
 use super::fit::Fit;
 use super::layout::Layout;
 use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE};
@@ -40,11 +40,12 @@ pub(crate) struct Outcome {
     pub(crate) shortfall: Option<String>,
 }
 
-/// Fits `source` and meets the encoder's target.
+/// Fits `source` and meets the encoder's target, with `passes` over the codes of coded Gaussians.
 pub(crate) fn encode(
     encoder: &Encoder,
     source: &Source<'_>,
     training: &Training,
+    passes: u32,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
     let (target, precision) = (encoder.target, encoder.precision);
@@ -57,7 +58,8 @@ pub(crate) fn encode(
     let extension = training.iterations.div_ceil(4);
     let Finished { file, work } = match precision {
         Precision::Coded => {
-            coded::finish(fit, source, &raster, &layout, target, extension, observer)
+            let coder = Coder::new(source, &raster, &layout, passes);
+            coder.finish(fit, target, extension, observer)
         }
         _ => packed::finish(fit, &layout, target, budget, extension, source, observer),
     }?;

@@ -40,8 +40,22 @@ use training::Training;
 use crate::container::Metadata;
 use crate::render::Kernel;
 
-/// Iterations by effort, from 1 to 9.
-const ITERATIONS: [u32; 9] = [60, 90, 150, 300, 600, 1200, 2400, 4800, 9600];
+/// Iterations by effort, from 1 to 9, and passes over the codes of coded Gaussians: where time is
+/// short, iterations gain more.
+const EFFORTS: [(u32, u32); 9] = [
+    (60, 2),
+    (90, 2),
+    (180, 2),
+    (300, 4),
+    (600, 8),
+    (1_200, 8),
+    (2_400, 8),
+    (4_800, 8),
+    (9_600, 8),
+];
+/// Fewest iterations where the error decides how many Gaussians there are: after fewer, it would take
+/// far too many.
+const FEWEST_BY_ERROR: u32 = 180;
 /// Most threads that can be asked for.
 const MAX_THREADS: usize = 1024;
 
@@ -153,9 +167,9 @@ impl Encoder {
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
-        let training = self.check()?;
+        let (training, passes) = self.check()?;
         let mut observer = Observer::new(progress, training.iterations);
-        let mut run = || control::encode(self, source, &training, &mut observer);
+        let mut run = || control::encode(self, source, &training, passes, &mut observer);
         let outcome = match self.threads {
             None => run(),
             Some(threads) => pool(threads)?.install(run),
@@ -175,23 +189,26 @@ impl Encoder {
         })
     }
 
-    /// Checks all options and settles the training's constants.
-    fn check(&self) -> Result<Training, EncodeError> {
+    /// Checks all options and settles the training's constants and the passes over codes.
+    fn check(&self) -> Result<(Training, u32), EncodeError> {
         let wrong = |text: String| Err(EncodeError::Option(text));
-        let Some(&iterations) = ITERATIONS.get(usize::from(self.effort).wrapping_sub(1)) else {
+        let Some(&(iterations, passes)) = EFFORTS.get(usize::from(self.effort).wrapping_sub(1))
+        else {
             return wrong(format!("effort {}; it must be 1 to 9", self.effort));
         };
         if self.threads.is_some_and(|threads| !(1..=MAX_THREADS).contains(&threads)) {
             return wrong(format!("the number of threads must be 1 to {MAX_THREADS}"));
         }
         self.target.check().map_err(EncodeError::Option)?;
+        let fewest = if self.target.is_by_error() { FEWEST_BY_ERROR } else { 1 };
+        let iterations = iterations.max(fewest);
         self.metadata.check().map_err(EncodeError::Option)?;
         let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
         training.check().map_err(|rule| EncodeError::Option(format!("training: {rule}")))?;
         if self.precision == Precision::Coded && training.kernel != Kernel::Quartic {
             return wrong("training: coded Gaussians need the quartic kernel".into());
         }
-        Ok(training)
+        Ok((training, passes))
     }
 }
 

@@ -63,6 +63,11 @@ impl Target {
         }
     }
 
+    /// Whether the error decides how many Gaussians there are.
+    pub(crate) fn is_by_error(self) -> bool {
+        matches!(self, Self::Psnr(_)) || self.error_per_gaussian().is_some()
+    }
+
     /// The squared error, in full samples, that every Gaussian shall account for at this quality.
     pub(crate) fn error_per_gaussian(self) -> Option<f64> {
         let quality = match self {
