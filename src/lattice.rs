@@ -10,6 +10,7 @@ use crate::container::ChunkType;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::math;
+use crate::render::Backend;
 
 /// Steps of geometry: position, size, ratio, slant.
 const GEOMETRY: usize = 4;
@@ -57,19 +58,74 @@ pub(crate) struct Shape {
     pub(crate) cholesky: [f32; 3],
 }
 
+/// The exponentials of whole steps.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Exponentials {
+    step: f32,
+    /// Those of the codes that are likely, class by class: the coder waits for them.
+    likely: Vec<f32>,
+}
+
+impl Exponentials {
+    /// Codes of class 0 in the table: from minus half of that on. Every class has twice as many.
+    const LIKELY: u32 = 16;
+    /// Classes in the table.
+    const CLASSES: u32 = 6;
+
+    fn new(step: f32) -> Self {
+        let mut likely = Vec::new();
+        Backend::fastest().run(
+            #[inline(always)]
+            || {
+                for class in 0..Self::CLASSES {
+                    let (count, step) = (Self::LIKELY << class, step * fineness(class));
+                    let first = -(count as i32 / 2);
+                    likely.extend((0..count as i32).map(|index| Self::exp(first + index, step)));
+                }
+            },
+        );
+        Self { step, likely }
+    }
+
+    #[inline(always)]
+    fn exp(code: i32, step: f32) -> f32 {
+        math::exp((code as f32 * step).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
+    }
+
+    /// The step of class 0.
+    pub(crate) fn step(&self) -> f32 {
+        self.step
+    }
+
+    fn of(&self, code: i32, class: u32) -> f32 {
+        let count = Self::LIKELY << class;
+        let index = code.wrapping_add(count as i32 / 2) as u32;
+        if class < Self::CLASSES && index < count {
+            return self.likely[(count - Self::LIKELY + index) as usize];
+        }
+        Self::exp(code, self.step * fineness(class))
+    }
+}
+
 /// The steps of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lattice {
     /// Of the position, relative to the Gaussian's own extent.
     pub(crate) position: f32,
-    pub(crate) size: f32,
-    pub(crate) ratio: f32,
+    pub(crate) size: Exponentials,
+    pub(crate) ratio: Exponentials,
     pub(crate) slant: f32,
     /// Of each colour axis.
     pub(crate) color: Vec<f32>,
 }
 
 impl Lattice {
+    /// With steps of position, size, ratio and slant, and one for each colour axis.
+    pub(crate) fn new([position, size, ratio, slant]: [f32; GEOMETRY], color: Vec<f32>) -> Self {
+        let [size, ratio] = [size, ratio].map(Exponentials::new);
+        Self { position, size, ratio, slant, color }
+    }
+
     /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel.
     pub(crate) fn parse(payload: &[u8], channels: usize) -> Result<Self, DecodeError> {
         let malformed = |reason| DecodeError::malformed(ChunkType::QNTZ, reason);
@@ -80,13 +136,13 @@ impl Lattice {
         if !steps.iter().all(|step| STEPS.contains(step)) {
             return Err(malformed("a step that is not within 2^-20 to 2^10"));
         }
-        let [position, size, ratio, slant] = [steps[0], steps[1], steps[2], steps[3]];
-        Ok(Self { position, size, ratio, slant, color: steps[GEOMETRY..].to_vec() })
+        let (geometry, color) = steps.split_first_chunk().expect("four steps at least");
+        Ok(Self::new(*geometry, color.to_vec()))
     }
 
     /// All steps: position, size, ratio, slant, colour axes.
     pub(crate) fn steps(&self) -> Vec<f32> {
-        let geometry = [self.position, self.size, self.ratio, self.slant];
+        let geometry = [self.position, self.size.step, self.ratio.step, self.slant];
         geometry.iter().chain(&self.color).copied().collect()
     }
 
@@ -98,13 +154,10 @@ impl Lattice {
 
     /// The shape that a code stands for.
     pub(crate) fn shape(&self, code: &Code) -> Shape {
-        let fine = fineness(code.class);
-        let exp = |code: i32, step: f32| {
-            math::exp((code as f32 * (step * fine)).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
-        };
-        let (size, ratio) = (exp(code.size, self.size), exp(code.ratio, self.ratio));
+        let size = self.size.of(code.size, code.class);
+        let ratio = self.ratio.of(code.ratio, code.class);
         let (l11, l22) = (size * ratio, size / ratio);
-        let l21 = code.slant as f32 * (self.slant * fine) * l22;
+        let l21 = code.slant as f32 * (self.slant * fineness(code.class)) * l22;
         Shape { size, cholesky: [l11, l21, l22] }
     }
 
@@ -160,8 +213,8 @@ impl Lattice {
         let fine = fineness(class);
         let nearest = |value: f32, step: f32| (value / step).round().clamp(-30_000.0, 30_000.0);
         let [l11, l21, l22] = gaussian.cholesky;
-        let size = nearest(0.5 * (l11 * l22).ln(), self.size * fine) as i32;
-        let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio * fine) as i32;
+        let size = nearest(0.5 * (l11 * l22).ln(), self.size.step * fine) as i32;
+        let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio.step * fine) as i32;
         let mut code = Code { class, size, ratio, ..Code::default() };
         // With L (1 + D) for the rounded factor, the slant is to make D21 zero.
         let Shape { size, cholesky: [c11, _, c22] } = self.shape(&code);
@@ -284,10 +337,15 @@ impl Grid {
         // Whole roots first.
         let first =
             if side > self.root { (side / self.root).div_ceil(2) * self.root } else { side / 2 };
+        // All ones along the axis. Which it is is as good as random, so there is no branch to be
+        // foreseen.
+        let along = [(axis as u32).wrapping_sub(1), 0_u32.wrapping_sub(axis as u32)];
         let mut parts = [*cell; 2];
-        parts[0].sides[axis] = first;
-        parts[1].sides[axis] = side - first;
-        parts[1].corner[axis] += first;
+        for (axis, along) in along.into_iter().enumerate() {
+            parts[0].sides[axis] -= (side - first) & along;
+            parts[1].sides[axis] -= first & along;
+            parts[1].corner[axis] += first & along;
+        }
         Some((axis, parts))
     }
 

@@ -2,7 +2,13 @@
 
 use alloc::vec::Vec;
 
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use fearless_simd::Level;
+
 use super::rans::{Coder, Decoder, Encoder};
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+use super::search::Nearest;
+use super::search::{Portable, Search};
 use super::set::{Models, context};
 
 /// What is coded.
@@ -40,10 +46,22 @@ pub fn encode(items: &[Item]) -> Vec<u8> {
 }
 
 /// The values that `bytes` have in place of those of `items`, and whether they are sound.
+///
+/// # Panics
+/// When that depends on how symbols are found.
 #[must_use]
 pub fn decode(bytes: &[u8], items: &[Item]) -> (Vec<u32>, bool) {
+    let decoded = decode_with(Portable, bytes, items);
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(avx2) = Level::new().as_avx2() {
+        assert_eq!(decode_with(Nearest(avx2), bytes, items), decoded);
+    }
+    decoded
+}
+
+fn decode_with(search: impl Search, bytes: &[u8], items: &[Item]) -> (Vec<u32>, bool) {
     let mut models = Models::default();
-    let mut decoder = Decoder::new(bytes, models.all());
+    let mut decoder = Decoder::with_search(bytes, models.all(), search);
     let values = code(&mut decoder, items);
     (values, decoder.is_complete())
 }

@@ -6,5 +6,6 @@ pub(crate) mod fixed;
 #[cfg(all(fuzzing, feature = "encode"))]
 pub mod fuzzing;
 mod rans;
+mod search;
 pub(crate) mod set;
 mod tables;

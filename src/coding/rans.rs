@@ -5,12 +5,13 @@
 use alloc::vec::Vec;
 
 #[cfg(feature = "std")]
-use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
+use super::search::shares_of;
+use super::search::{END, Portable, Search, Starts};
 
 /// Symbols of a model.
 pub(crate) const SYMBOLS: usize = 16;
 /// Probabilities of a model are shares of 2^15.
-const SCALE_BITS: u32 = 15;
+pub(crate) const SCALE_BITS: u32 = 15;
 /// States are at least this, so that one word of 16 bits always restores them.
 const LEAST_STATE: u32 = 1 << 16;
 /// Most bits that one call passes.
@@ -19,12 +20,24 @@ pub(crate) const MAX_BITS: u32 = 16;
 /// time by half as much.
 const FIRST_RATE: u8 = 5;
 const SLOWER_AFTER: [u8; 2] = [32, 96];
+/// The rates, as powers of 1/2, by how many symbols were seen.
+const RATES: [u8; 256] = {
+    let mut rates = [FIRST_RATE; 256];
+    let mut seen = 0;
+    while seen < rates.len() {
+        rates[seen] += (seen >= SLOWER_AFTER[0] as usize) as u8;
+        rates[seen] += (seen >= SLOWER_AFTER[1] as usize) as u8;
+        seen += 1;
+    }
+    rates
+};
 
-/// How probable each symbol is, and what was seen to make it so.
+/// How probable each symbol is, and what was seen to make it so. In a cache line of its own: every
+/// symbol waits for one.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(crate) struct Model {
-    /// The shares of all symbols before each one, summed up: the first is 0.
-    starts: [i16; SYMBOLS],
+    starts: Starts,
     seen: u8,
 }
 
@@ -46,53 +59,32 @@ const TARGETS: [[i16; SYMBOLS]; SYMBOLS] = {
 
 impl Model {
     /// A model that expects what its `starts` say: increasing from 0, all below 2^15.
-    pub(crate) const fn new(starts: [i16; SYMBOLS]) -> Self {
-        Self { starts, seen: 0 }
-    }
-
-    /// The first of the shares that stand for a symbol, and how many they are.
-    fn share(&self, symbol: usize) -> (u32, u32) {
-        let start = self.starts[symbol] as u32;
-        let end = self.starts.get(symbol + 1).map_or(1 << SCALE_BITS, |&end| end as u32);
-        (start, end - start)
-    }
-
-    /// The symbol that one of the shares stands for.
-    fn symbol_at(&self, share: u32) -> usize {
-        #[cfg(feature = "std")]
-        return dispatch!(Level::baseline(), simd => self.symbol_at_with(simd, share));
-        #[cfg(not(feature = "std"))]
-        self.plain_symbol_at(share)
-    }
-
-    /// All at once, with what every machine of the kind has.
-    #[cfg(feature = "std")]
-    #[inline(always)]
-    fn symbol_at_with<S: Simd>(&self, simd: S, share: u32) -> usize {
-        let later = i16x16::load_array_ref(simd, &self.starts).simd_gt(share as i16);
-        // Symbol 0 starts at 0.
-        (later.to_bitmask() | 1 << SYMBOLS).trailing_zeros() as usize - 1
-    }
-
-    #[cfg(any(not(feature = "std"), all(test, feature = "encode")))]
-    fn plain_symbol_at(&self, share: u32) -> usize {
-        self.starts.iter().filter(|&&start| start as u32 <= share).count() - 1
+    pub(crate) fn new(starts: [i16; SYMBOLS]) -> Self {
+        let mut model = Self { starts: [END; SYMBOLS + 1], seen: 0 };
+        model.starts[..SYMBOLS].copy_from_slice(&starts);
+        model
     }
 
     /// Learns from a symbol. Every symbol keeps a share.
-    fn update(&mut self, symbol: usize) {
-        let rate =
-            FIRST_RATE + SLOWER_AFTER.map(|after| u8::from(self.seen >= after)).iter().sum::<u8>();
+    #[inline(always)]
+    pub(crate) fn update(&mut self, symbol: usize) {
+        let rate = RATES[usize::from(self.seen)];
         self.seen = self.seen.saturating_add(1);
-        for (start, target) in self.starts.iter_mut().zip(&TARGETS[symbol]) {
-            *start += (target - *start) >> rate;
-        }
+        let starts = self.starts.first_chunk_mut().expect("one for each symbol");
+        let (old, target): ([i16; SYMBOLS], _) = (*starts, &TARGETS[symbol]);
+        *starts = core::array::from_fn(|index| old[index] + ((target[index] - old[index]) >> rate));
+    }
+
+    #[cfg(all(test, feature = "encode"))]
+    pub(crate) fn starts(&self) -> &Starts {
+        &self.starts
     }
 
     /// What each symbol costs, in bits.
     #[cfg(feature = "std")]
     pub(crate) fn costs(&self) -> [f32; SYMBOLS] {
-        core::array::from_fn(|symbol| SCALE_BITS as f32 - (self.share(symbol).1 as f32).log2())
+        let size = |symbol| shares_of(&self.starts, symbol).1;
+        core::array::from_fn(|symbol| SCALE_BITS as f32 - (size(symbol) as f32).log2())
     }
 }
 
@@ -124,8 +116,9 @@ pub(crate) enum Attribute {
 
 /// Reads what an [`Encoder`] wrote. Whether the bytes were sound is known at the end.
 #[derive(Debug)]
-pub(crate) struct Decoder<'a> {
+pub(crate) struct Decoder<'a, S = Portable> {
     models: &'a mut [Model],
+    search: S,
     state: u32,
     words: &'a [[u8; 2]],
     /// Words used, even of those that are not there.
@@ -136,8 +129,17 @@ pub(crate) struct Decoder<'a> {
 impl<'a> Decoder<'a> {
     /// A decoder of `bytes`, one model for each context.
     pub(crate) fn new(bytes: &'a [u8], models: &'a mut [Model]) -> Self {
+        Self::with_search(bytes, models, Portable)
+    }
+}
+
+impl<'a, S: Search> Decoder<'a, S> {
+    /// A decoder that finds symbols in a certain way.
+    #[inline(always)]
+    pub(crate) fn with_search(bytes: &'a [u8], models: &'a mut [Model], search: S) -> Self {
         let (words, rest) = bytes.as_chunks();
-        let mut decoder = Self { models, state: 0, words, used: 0, refused: !rest.is_empty() };
+        let refused = !rest.is_empty();
+        let mut decoder = Self { models, search, state: 0, words, used: 0, refused };
         // The first state, then words as they are needed.
         for part in 0..2 {
             decoder.state |= decoder.next() << (16 * part);
@@ -177,17 +179,16 @@ impl Decoder<'_> {
     }
 }
 
-impl Coder for Decoder<'_> {
+impl<S: Search> Coder for Decoder<'_, S> {
     #[inline(always)]
     fn symbol(&mut self, context: usize, _: u32) -> u32 {
         let model = &mut self.models[context];
         let share = self.state & ((1 << SCALE_BITS) - 1);
-        let symbol = model.symbol_at(share);
-        let (start, size) = model.share(symbol);
-        model.update(symbol);
-        self.state = size * (self.state >> SCALE_BITS) + (share - start);
+        let found = self.search.find(&model.starts, share);
+        model.update(found.symbol as usize);
+        self.state = found.size * (self.state >> SCALE_BITS) + found.offset;
         self.restore();
-        symbol as u32
+        found.symbol
     }
 
     #[inline(always)]
@@ -242,7 +243,7 @@ impl<'a> Encoder<'a> {
 impl Coder for Encoder<'_> {
     fn symbol(&mut self, context: usize, symbol: u32) -> u32 {
         let model = &mut self.models[context];
-        let (start, size) = model.share(symbol as usize);
+        let (start, size) = shares_of(&model.starts, symbol as usize);
         self.shares.push((start as u16, size as u16, SCALE_BITS as u8));
         model.update(symbol as usize);
         symbol
@@ -290,7 +291,7 @@ impl Coder for Cost<'_> {
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::*;
-    use crate::testing::{config, simd_levels};
+    use crate::testing::config;
     use proptest::prelude::*;
 
     fn flat() -> Model {
@@ -354,27 +355,9 @@ mod tests {
             let mut model = flat();
             for symbol in symbols {
                 model.update(symbol);
-                let shares = (0..SYMBOLS).map(|symbol| model.share(symbol).1);
+                let shares = (0..SYMBOLS).map(|symbol| shares_of(&model.starts, symbol).1);
                 prop_assert!(shares.clone().all(|share| (1..1 << SCALE_BITS).contains(&share)));
                 prop_assert_eq!(shares.sum::<u32>(), 1 << SCALE_BITS);
-            }
-        }
-    }
-
-    #[test]
-    fn the_symbol_of_every_share_is_found() {
-        let mut model = flat();
-        // Shares of one and of nearly all among them.
-        for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
-            model.update(symbol);
-        }
-        for share in 0..1 << SCALE_BITS {
-            let symbol = model.plain_symbol_at(share);
-            let (start, size) = model.share(symbol);
-            assert!((start..start + size).contains(&share), "{share}: {symbol}");
-            for (name, level) in simd_levels() {
-                let found = dispatch!(level, simd => model.symbol_at_with(simd, share));
-                assert_eq!(found, symbol, "{name}: {share}");
             }
         }
     }

@@ -5,6 +5,9 @@ use core::ops::Range;
 
 use alloc::vec::Vec;
 
+#[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+use fearless_simd::{Level, Simd};
+
 #[cfg(feature = "std")]
 use super::account::Accounting;
 use super::account::AttributeBits;
@@ -13,6 +16,9 @@ use super::rans::Cost;
 #[cfg(feature = "encode")]
 pub(crate) use super::rans::Costs;
 use super::rans::{Attribute, Coder, Decoder, MAX_BITS, Model, SYMBOLS};
+#[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+use super::search::Nearest;
+use super::search::Search;
 use super::tables;
 use crate::container::{ChunkType, Header};
 use crate::error::DecodeError;
@@ -64,6 +70,8 @@ const FEW: usize = SYMBOLS;
 const BEYOND: u32 = SYMBOLS as u32 - 1;
 /// Signed symbols stand for -7 to 7.
 const SIGNED: i32 = 7;
+/// Cells that may wait: every split, of which each halves a side of 2^32 at most, leaves one more.
+const MOST_CELLS: usize = 2 * 32 + 2;
 /// The size that a Gaussian is expected to have, from the level of the cell that it has for
 /// itself: logarithm for a pixel, and what every doubling of the area adds.
 const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
@@ -143,16 +151,28 @@ impl<'a> SetCoding<'a> {
         if count as usize > bytes.len().saturating_mul(MOST_PER_BYTE) {
             return malformed("too short for its number of Gaussians");
         }
-        let mut decoder = Decoder::new(bytes, &mut models.0);
         let (count, mut members) = (count as usize, Unknown(receive));
         #[cfg(feature = "std")]
         if let Some(account) = account {
+            let decoder = Decoder::new(bytes, &mut models.0);
             let mut accounting = Accounting::new(decoder, account);
             self.walk(&mut accounting, count, &mut members);
             return checked(&accounting.into_decoder());
         }
         #[cfg(not(feature = "std"))]
         let _ = account;
+        #[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+        if let Some(avx2) = Level::new().as_avx2() {
+            return avx2.vectorize(
+                #[inline(always)]
+                || {
+                    let mut decoder = Decoder::with_search(bytes, &mut models.0, Nearest(avx2));
+                    self.walk(&mut decoder, count, &mut members);
+                    checked(&decoder)
+                },
+            );
+        }
+        let mut decoder = Decoder::new(bytes, &mut models.0);
         self.walk(&mut decoder, count, &mut members);
         checked(&decoder)
     }
@@ -196,26 +216,29 @@ impl<'a> SetCoding<'a> {
 
     /// Walks through the tree of cells, first parts first, and codes every Gaussian in the cell
     /// that it has for itself.
+    #[inline(always)]
     fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {
         coder.begin(Attribute::Position);
-        let mut cells = alloc::vec![(self.grid.whole(), 0..count)];
-        while let Some((cell, range)) = cells.pop() {
-            let is_split = range.len() > 1 || !self.grid.is_within_root(&cell);
+        let mut cells = alloc::vec![(self.grid.whole(), 0..count); MOST_CELLS];
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (cell, Range { start, end }) = cells[waiting].clone();
+            let is_split = end - start > 1 || !self.grid.is_within_root(&cell);
             match self.grid.split(&cell).filter(|_| is_split) {
                 Some((axis, parts)) => {
-                    let middle = parts[1].corner[axis];
-                    let first = members.partition(range.clone(), axis, middle);
-                    let first = count_of(coder, range.len() as u32, first as u32) as usize;
-                    let middle = range.start + first;
-                    // The last one pushed comes first.
-                    for (part, range) in [(1, middle..range.end), (0, range.start..middle)] {
-                        if !range.is_empty() {
-                            cells.push((parts[part], range));
-                        }
+                    let first = members.partition(start..end, axis, parts[1].corner[axis]);
+                    let first = count_of(coder, (end - start) as u32, first as u32) as usize;
+                    // The last one comes first. Whether one is empty is as good as random, so there
+                    // is no branch to be foreseen.
+                    for (part, range) in [(1, start + first..end), (0, start..start + first)] {
+                        let is_empty = range.is_empty();
+                        cells[waiting] = (parts[part], range);
+                        waiting += usize::from(!is_empty);
                     }
                 }
                 None => {
-                    for index in range {
+                    for index in start..end {
                         let (code, shape) = self.gaussian(coder, &cell, members.get(index));
                         members.set(index, code, &shape, &cell);
                     }
@@ -225,6 +248,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes a Gaussian within a cell.
+    #[inline(always)]
     fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> (Code, Shape) {
         let mut code = self.attributes(coder, cell.level(), known);
         let shape = self.lattice.shape(&code);
@@ -240,6 +264,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes all but the centre.
+    #[inline(always)]
     fn attributes(&self, coder: &mut impl Coder, level: u32, known: Code) -> Code {
         coder.begin(Attribute::Precision);
         let mut class = coder.symbol(context::CLASS, known.class);
@@ -253,7 +278,7 @@ impl<'a> SetCoding<'a> {
 
         let shift = class.saturating_sub(LEVELS as u32 - 1);
         let rank = (class as usize).min(LEVELS - 1);
-        let step = self.lattice.size * lattice::fineness(class);
+        let step = self.lattice.size.step() * lattice::fineness(class);
         let expected = EXPECTED_SIZE[0] + EXPECTED_SIZE[1] * level as f32;
         let expected = (expected / step) as i32;
         let size = known.size.wrapping_sub(expected);
@@ -268,6 +293,7 @@ impl<'a> SetCoding<'a> {
     }
 
     /// Codes the colour axes: the first by its magnitude and sign, the others relative to that sign.
+    #[inline(always)]
     fn color(&self, coder: &mut impl Coder, class: usize, known: [i32; 4]) -> [i32; 4] {
         let shift = (class as u32).saturating_sub(COLOR_LEVEL);
         let mut color = [0; 4];
@@ -292,7 +318,7 @@ impl<'a> SetCoding<'a> {
 }
 
 /// Refuses what a decoder refused, or did not read to its end.
-fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
+fn checked<S: Search>(decoder: &Decoder<'_, S>) -> Result<(), DecodeError> {
     if decoder.is_complete() {
         return Ok(());
     }
@@ -300,6 +326,7 @@ fn checked(decoder: &Decoder<'_>) -> Result<(), DecodeError> {
 }
 
 /// Codes how many of `count` Gaussians are in the first part of a cell.
+#[inline(always)]
 fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
     const SHARES: u64 = SYMBOLS as u64;
     if count < FEW as u32 {
@@ -326,6 +353,7 @@ fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
 }
 
 /// Codes a signed value, its low `shift` bits plainly.
+#[inline(always)]
 fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32 {
     let high = value >> shift;
     let is_beyond = high.unsigned_abs() > SIGNED as u32;
@@ -341,6 +369,8 @@ fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32
 }
 
 /// Codes a number by its length (Elias, 1975).
+#[cold]
+#[inline(never)]
 fn excess(coder: &mut impl Coder, value: u32) -> u32 {
     let length = coder.symbol(context::EXCESS, value.saturating_add(1).ilog2().min(BEYOND));
     let low = plain(coder, length, value.wrapping_add(1) & ((1 << length) - 1));
@@ -348,7 +378,11 @@ fn excess(coder: &mut impl Coder, value: u32) -> u32 {
 }
 
 /// Codes the low `count` bits of a value without a model, however many.
+#[inline(always)]
 fn plain(coder: &mut impl Coder, count: u32, value: u32) -> u32 {
+    if count == 0 {
+        return 0;
+    }
     let low = count.min(MAX_BITS);
     let value = value & ((1_u64 << count) - 1) as u32;
     let bits = coder.bits(low, value & ((1 << low) - 1));
@@ -534,7 +568,7 @@ mod tests {
 
     fn lattice(channels: usize) -> Lattice {
         let color = vec![0.1; channels];
-        Lattice { position: 1.25, size: 0.66, ratio: 0.9, slant: 1.9, color }
+        Lattice::new([1.25, 0.66, 0.9, 1.9], color)
     }
 
     proptest! {

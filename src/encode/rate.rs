@@ -37,13 +37,7 @@ pub(crate) fn step_for(error: f64, count: usize) -> f64 {
 /// The lattice of a step of colour, given by its logarithm to base 2.
 pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
     let step = step.exp2().clamp(STEPS.0, STEPS.1) as f32;
-    Lattice {
-        position: POSITION,
-        size: SIZE,
-        ratio: RATIO,
-        slant: SLANT,
-        color: vec![step; model.channels()],
-    }
+    Lattice::new([POSITION, SIZE, RATIO, SLANT], vec![step; model.channels()])
 }
 
 /// The squared error that a bit is worth.

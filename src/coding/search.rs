@@ -1,0 +1,156 @@
+//! Which symbol a share stands for: what entropy decoding waits for most.
+
+#[cfg(feature = "std")]
+use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
+
+use super::rans::SYMBOLS;
+
+/// The shares of all symbols before each one, summed up, and of all of them: from 0 to 2^15, which
+/// is the smallest `i16`.
+pub(crate) type Starts = [i16; SYMBOLS + 1];
+
+/// The last of [`Starts`].
+pub(crate) const END: i16 = i16::MIN;
+
+/// The symbol of a share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Found {
+    pub(crate) symbol: u32,
+    /// The symbol's shares before this one.
+    pub(crate) offset: u32,
+    /// All of the symbol's shares.
+    pub(crate) size: u32,
+}
+
+impl Found {
+    fn new(starts: &Starts, share: u32, symbol: usize) -> Self {
+        let (start, size) = shares_of(starts, symbol);
+        Self { symbol: symbol as u32, offset: share - start, size }
+    }
+}
+
+/// The first of a symbol's shares, and how many they are.
+pub(crate) fn shares_of(starts: &Starts, symbol: usize) -> (u32, u32) {
+    let [start, end] = [symbol, symbol + 1].map(|index| u32::from(starts[index] as u16));
+    (start, end - start)
+}
+
+/// A way to find symbols.
+pub(crate) trait Search: Copy {
+    /// The symbol of a share below 2^15.
+    fn find(self, starts: &Starts, share: u32) -> Found;
+}
+
+/// With what every machine of the kind has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Portable;
+
+impl Search for Portable {
+    #[inline(always)]
+    fn find(self, starts: &Starts, share: u32) -> Found {
+        #[cfg(feature = "std")]
+        let symbol = dispatch!(Level::baseline(), simd => symbol_at(simd, starts, share));
+        #[cfg(not(feature = "std"))]
+        let symbol = plain_symbol_at(starts, share);
+        Found::new(starts, share, symbol)
+    }
+}
+
+#[cfg(feature = "std")]
+#[inline(always)]
+fn symbol_at<S: Simd>(simd: S, starts: &Starts, share: u32) -> usize {
+    let starts = starts.first_chunk().expect("one for each symbol");
+    let later = i16x16::load_array_ref(simd, starts).simd_gt(share as i16);
+    // Symbol 0 starts at 0.
+    (later.to_bitmask() | 1 << SYMBOLS).trailing_zeros() as usize - 1
+}
+
+#[cfg(any(not(feature = "std"), all(test, feature = "encode")))]
+fn plain_symbol_at(starts: &Starts, share: u32) -> usize {
+    starts[..SYMBOLS].iter().filter(|&&start| start as u32 <= share).count() - 1
+}
+
+/// With an instruction for the least of eight numbers: the distances of the starts on either side
+/// are there before the symbol is.
+#[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Nearest(pub(crate) fearless_simd::Avx2);
+
+#[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+impl Search for Nearest {
+    #[inline(always)]
+    fn find(self, starts: &Starts, share: u32) -> Found {
+        nearest(self.0, starts, share)
+    }
+}
+
+#[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+fearless_simd::kernel!(
+    #[inline]
+    fn nearest(avx2: Avx2, starts: &Starts, share: u32) -> Found {
+        #[cfg(target_arch = "x86")]
+        use core::arch::x86 as arch;
+        #[cfg(target_arch = "x86_64")]
+        use core::arch::x86_64 as arch;
+
+        use arch::{
+            __m128i, _mm_cmpgt_epi16, _mm_cvtsi128_si32, _mm_min_epu16, _mm_minpos_epu16,
+            _mm_movemask_epi8, _mm_packs_epi16, _mm_set1_epi16, _mm_sub_epi16,
+        };
+        use fearless_simd::i16x8;
+
+        use crate::coding::rans::SCALE_BITS;
+
+        let eight_from = |first: usize| -> __m128i {
+            let eight = starts[first..].first_chunk().expect("seventeen in all");
+            i16x8::load_array_ref(avx2, eight).into()
+        };
+        // Of what lies on the wrong side the distance wraps around to 2^15 and more.
+        let least = |a: __m128i, b: __m128i| {
+            let least = _mm_minpos_epu16(_mm_min_epu16(a, b));
+            _mm_cvtsi128_si32(least) as u32 & 0xffff
+        };
+        let at = _mm_set1_epi16(share as i16);
+        let (low, high) = (eight_from(0), eight_from(8));
+        let offset = least(_mm_sub_epi16(at, low), _mm_sub_epi16(at, high));
+        let next = _mm_set1_epi16((share + 1) as i16);
+        let rest = least(_mm_sub_epi16(low, next), _mm_sub_epi16(high, next));
+        // The last symbol's shares end with all.
+        let rest = rest.min((1 << SCALE_BITS) - 1 - share);
+        let later = _mm_packs_epi16(_mm_cmpgt_epi16(low, at), _mm_cmpgt_epi16(high, at));
+        let symbol = (SYMBOLS as u32 - 1) - (_mm_movemask_epi8(later) as u32).count_ones();
+        Found { symbol, offset, size: offset + rest + 1 }
+    }
+);
+
+#[cfg(all(test, feature = "encode"))]
+mod tests {
+    use super::*;
+    use crate::coding::rans::{Model, SCALE_BITS};
+    use crate::testing::simd_levels;
+
+    #[test]
+    fn the_symbol_of_every_share_is_found() {
+        let mut model = Model::new(core::array::from_fn(|index| (index * 2048) as i16));
+        // Shares of one and of nearly all among them.
+        for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
+            model.update(symbol);
+        }
+        let starts = model.starts();
+        for share in 0..1 << SCALE_BITS {
+            let symbol = plain_symbol_at(starts, share);
+            let (start, size) = shares_of(starts, symbol);
+            assert!((start..start + size).contains(&share), "{share}: {symbol}");
+            for (name, level) in simd_levels() {
+                let found = dispatch!(level, simd => symbol_at(simd, starts, share));
+                assert_eq!(found, symbol, "{name}: {share}");
+            }
+            let found = Found::new(starts, share, symbol);
+            assert_eq!(Portable.find(starts, share), found, "{share}");
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            if let Some(avx2) = Level::new().as_avx2() {
+                assert_eq!(Nearest(avx2).find(starts, share), found, "{share}");
+            }
+        }
+    }
+}
