@@ -11,10 +11,8 @@ use super::chart::Moments;
 use super::error::EncodeError;
 use super::progress::Observer;
 use super::raster::{FULL_SCALE, Raster, SamplePlane};
-use super::tiling::Tiling;
-use crate::render::{
-    Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, TileRow, centers, kernel_simd,
-};
+use super::tiling::{TileRow, Tiling};
+use crate::render::{Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, centers, kernel_simd};
 
 /// Sums of a Gaussian in a row of tiles: five of the geometry, then one by channel.
 type Slot = [f32; 8];

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::render::{Backend, Grid, Region, Span, Splat, TileRow};
+use crate::render::{Backend, Grid, Region, Splat};
 
 /// Splats that one thread bins in one go.
 const PIECE: usize = 256;
@@ -113,5 +113,72 @@ impl Tiling {
     /// Bytes held.
     pub(crate) fn memory(&self) -> usize {
         self.starts.capacity() * size_of::<usize>() + self.spans.capacity() * size_of::<Span>()
+    }
+}
+
+/// Tiles of a row that something touches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    pub(crate) splat: u32,
+    /// The first tile, and the one after the last.
+    pub(crate) first: u32,
+    pub(crate) end: u32,
+}
+
+/// One row of tiles: which splats touch each.
+#[derive(Debug, Default)]
+pub(crate) struct TileRow {
+    /// `splats[starts[t]..starts[t + 1]]` are those that touch tile t.
+    starts: Vec<usize>,
+    splats: Vec<u32>,
+}
+
+impl TileRow {
+    /// Sorts splats by tile, in the memory of an earlier row: for each what stands for it, and
+    /// which of so many tiles it touches.
+    pub(crate) fn sort(&mut self, columns: usize, spans: impl Iterator<Item = Span> + Clone) {
+        // First how many more touch a tile than the one before it, then how many touch those
+        // before it.
+        let starts = &mut self.starts;
+        starts.clear();
+        starts.resize(columns + 1, 0);
+        for Span { first, end, .. } in spans.clone() {
+            starts[end as usize] = starts[end as usize].wrapping_sub(1);
+            starts[first as usize] = starts[first as usize].wrapping_add(1);
+        }
+        let (mut count, mut total) = (0_usize, 0);
+        for start in &mut *starts {
+            count = count.wrapping_add(*start);
+            *start = total;
+            total += count;
+        }
+        self.splats.clear();
+        self.splats.reserve_exact(total);
+        self.splats.resize(total, 0);
+        // `starts[t]` runs through its tile's splats and ends where the next begins; shift it back
+        // afterwards.
+        for Span { splat, first, end } in spans {
+            for start in &mut starts[first as usize..end as usize] {
+                self.splats[*start] = splat;
+                *start += 1;
+            }
+        }
+        starts.rotate_right(1);
+        starts[0] = 0;
+    }
+
+    /// Pairs of a tile and a splat.
+    pub(crate) fn entries(&self) -> usize {
+        self.splats.len()
+    }
+
+    /// What touches a tile, in order.
+    pub(crate) fn splats(&self, column: usize) -> &[u32] {
+        &self.splats[self.starts[column]..self.starts[column + 1]]
+    }
+
+    /// Bytes held.
+    pub(crate) fn memory(&self) -> usize {
+        self.starts.capacity() * size_of::<usize>() + self.splats.capacity() * size_of::<u32>()
     }
 }

@@ -6,9 +6,10 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::footprint::LANES;
-use super::splat::Splat;
+use super::groups::{Group, Groups, MOST_TOGETHER};
+use super::splat::{Block, Splat};
 use super::tile::{Backend, TILE_PIXELS};
-use super::tiling::{Columns, Extent, Grid, Span, TileRow};
+use super::tiling::{Columns, Extent, Grid};
 use super::view::View;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
@@ -45,35 +46,32 @@ impl Bands {
         let held = held + by_band + by_gaussian;
         limits.check_memory(held)?;
         let mut starts = vec![0_usize; bands + 1];
-        let mut loads = vec![Load::default(); bands];
+        // By how much the load changes from one band to the next.
+        let mut changes = vec![Load::default(); bands + 1];
         let mut reaches = Vec::with_capacity(gaussians.len());
         let mut work = 0;
         for gaussians in gaussians.chunks(LANES) {
-            let mut splats = [Splat::NOWHERE; LANES];
-            for (splat, gaussian) in splats.iter_mut().zip(gaussians) {
-                *splat = Splat::new(gaussian, view).unwrap_or(Splat::NOWHERE);
-            }
-            let extents = grid.extents(backend, &splats, cutoff);
+            let extents = grid.extents(backend, gaussians, view, cutoff);
             for &Extent { first, end, columns } in &extents[..gaussians.len()] {
                 work += u64::from(end - first) * u64::from(columns) * TILE_PIXELS as u64;
                 // Every band counts as work, so that hostile shapes cannot keep this loop busy.
                 limits.check_work(work)?;
                 let reach = first / BAND_ROWS as u32..end.div_ceil(BAND_ROWS as u32);
                 let reach = if first < end { reach } else { 0..0 };
-                for load in &mut loads[reach.start as usize..reach.end as usize] {
-                    load.members += 1;
-                    load.entries += u64::from(columns);
-                }
+                let load = Load { members: 1, entries: columns.into() };
+                changes[reach.start as usize].add(load);
+                changes[reach.end as usize].subtract(load);
                 reaches.push(reach);
             }
         }
-        let mut total = 0;
-        for (start, load) in starts.iter_mut().zip(&loads) {
+        let (mut total, mut most, mut load) = (0, 0, Load::default());
+        for (start, change) in starts.iter_mut().zip(changes) {
+            load.add(change);
             *start = total;
             total += load.members as usize;
+            most = most.max(load.memory(grid.columns));
         }
-        let most = loads.iter().map(Load::memory).max().unwrap_or(0);
-        let columns = (grid.columns + 1) * size_of::<usize>();
+        let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<Group>();
         let per_thread = most + columns as u64;
         let memory = total as u64 * size_of::<u32>() as u64;
         limits.check_memory(held + memory + per_thread * threads.min(bands) as u64)?;
@@ -114,22 +112,32 @@ struct Load {
 }
 
 impl Load {
-    /// Bytes of a [`Band`], beside one word for each column.
-    fn memory(&self) -> u64 {
+    fn add(&mut self, other: Self) {
+        self.members = self.members.wrapping_add(other.members);
+        self.entries = self.entries.wrapping_add(other.entries);
+    }
+
+    fn subtract(&mut self, other: Self) {
+        self.members = self.members.wrapping_sub(other.members);
+        self.entries = self.entries.wrapping_sub(other.entries);
+    }
+
+    /// Bytes of a [`Band`], beside one word for each of the columns.
+    fn memory(&self, columns: usize) -> u64 {
         let blocks = self.members.div_ceil(LANES as u64);
-        self.members * size_of::<Splat>() as u64
-            + blocks * (BAND_ROWS * size_of::<Columns>()) as u64
-            + self.entries * size_of::<u32>() as u64
+        let groups = self.entries + blocks * (columns as u64).min(MOST_TOGETHER.into());
+        blocks * (size_of::<Block>() + BAND_ROWS * size_of::<Columns>()) as u64
+            + groups * size_of::<Group>() as u64
     }
 }
 
 /// The splats of one band, and which of them touch which tile of a row.
 #[derive(Debug, Default)]
 pub(crate) struct Band {
-    splats: Vec<Splat>,
-    /// For every row of tiles, those that each splat touches, and some more at the end.
+    blocks: Vec<Block>,
+    /// For every row of tiles, those that each splat touches.
     columns: [Vec<Columns>; BAND_ROWS],
-    row: TileRow,
+    groups: Groups,
 }
 
 impl Band {
@@ -145,30 +153,36 @@ impl Band {
     ) {
         let first = band * BAND_ROWS;
         let members = &bands.members[bands.starts[band]..bands.starts[band + 1]];
-        self.splats.clear();
-        self.splats.reserve_exact(members.len());
-        for &index in members {
-            let splat = Splat::new(&gaussians[index as usize], view);
-            self.splats.push(splat.unwrap_or(Splat::NOWHERE));
-        }
         let blocks = members.len().div_ceil(LANES);
+        self.blocks.clear();
+        self.blocks.reserve_exact(blocks);
+        for members in members.chunks(LANES) {
+            let mut block = [Splat::NOWHERE; LANES];
+            for (splat, &index) in block.iter_mut().zip(members) {
+                *splat = Splat::new(&gaussians[index as usize], view).unwrap_or(Splat::NOWHERE);
+            }
+            self.blocks.push(block);
+        }
         for columns in &mut self.columns {
             columns.clear();
             columns.reserve_exact(blocks);
             columns.resize(blocks, [[0; LANES]; 2]);
         }
         let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
-        bands.grid.columns_of(backend, &self.splats, cutoff, rows, |splat, row, columns| {
+        let splats = self.blocks.as_flattened();
+        bands.grid.columns_of(backend, splats, cutoff, rows, |splat, row, columns| {
             self.columns[row - first][splat / LANES] = *columns;
         });
     }
 
-    /// The splats of each tile of one of the band's rows, which has so many.
-    pub(crate) fn row(&mut self, columns: usize, row: usize) -> (&TileRow, &[Splat]) {
-        let blocks = self.columns[row].iter();
-        let ends = blocks.flat_map(|[first, end]| first.iter().zip(end));
-        let spans = (0..).zip(ends).map(|(splat, (&first, &end))| Span { splat, first, end });
-        self.row.sort(columns, spans);
-        (&self.row, &self.splats)
+    /// The splats of the band, and those of each tile of one of its rows, which has so many.
+    pub(crate) fn row(
+        &mut self,
+        backend: Backend,
+        columns: usize,
+        row: usize,
+    ) -> (&Groups, &[Block]) {
+        self.groups.sort(backend, columns, &self.columns[row]);
+        (&self.groups, &self.blocks)
     }
 }

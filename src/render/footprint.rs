@@ -1,10 +1,30 @@
 //! Where splats may show: sixteen at a time, in plain loops over lanes that become vector code.
 
-use super::splat::Splat;
 use crate::math;
 
 /// Splats whose footprints are found at the same time.
 pub(super) const LANES: usize = 16;
+
+/// Centres and Cholesky factors, one lane for each of several ellipses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ellipses {
+    center: [[f32; LANES]; 2],
+    cholesky: [[f32; LANES]; 3],
+}
+
+impl Ellipses {
+    /// Far from every picture, all of them.
+    pub(super) const NOWHERE: Self =
+        Self { center: [[-4e9; LANES]; 2], cholesky: [[1.0; LANES], [0.0; LANES], [1.0; LANES]] };
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, center: [f32; 2], cholesky: [f32; 3]) {
+        let [x, y] = &mut self.center;
+        (x[lane], y[lane]) = (center[0], center[1]);
+        let [l11, l21, l22] = &mut self.cholesky;
+        (l11[lane], l21[lane], l22[lane]) = (cholesky[0], cholesky[1], cholesky[2]);
+    }
+}
 
 /// Outlines that hold every pixel at which a *computed* q is at most a cut-off: ellipses a little
 /// larger than that. One lane for each of several splats, for loops that become vector code.
@@ -28,11 +48,12 @@ pub(super) struct Footprints {
 #[expect(clippy::needless_range_loop, reason = "every loop is over lanes")]
 impl Footprints {
     #[inline(always)]
-    pub(super) fn new(splats: &[Splat; LANES], cutoff: f32) -> Self {
+    pub(super) fn new(ellipses: &Ellipses, cutoff: f32) -> Self {
         const NONE: [f32; LANES] = [0.0; LANES];
+        let Ellipses { center: [x, y], cholesky: [l11, l21, l22] } = ellipses;
         let mut all = Self {
-            x: NONE,
-            y: NONE,
+            x: *x,
+            y: *y,
             reach: NONE,
             margin_x: NONE,
             margin_y: NONE,
@@ -43,8 +64,9 @@ impl Footprints {
         };
         let radius = math::sqrt(cutoff);
         let inverse_radius = 1.0 / radius;
-        for (lane, splat) in splats.iter().enumerate() {
-            let [l11, l21, l22] = splat.cholesky;
+        for lane in 0..LANES {
+            let (x, y) = (x[lane], y[lane]);
+            let (l11, l21, l22) = (l11[lane], l21[lane], l22[lane]);
             // Rounding moves the computed edge: along x by a few units in the last place, along y
             // by as many units of the larger of l21 and l22 (w dx + i22 dy cancels in a needle).
             // Widen the ellipse by eight of them.
@@ -52,11 +74,9 @@ impl Footprints {
             let l22 = l22 + (l21.abs() + l22) * 1e-6;
             let sigma_y = math::sqrt(l21 * l21 + l22 * l22);
             let inverse = 1.0 / sigma_y;
-            all.x[lane] = splat.x;
-            all.y[lane] = splat.y;
             all.reach[lane] = radius * sigma_y;
-            all.margin_x[lane] = 0.01 + (splat.x.abs() + radius * l11) * 4e-6;
-            all.margin_y[lane] = 0.01 + (splat.y.abs() + radius * sigma_y) * 4e-6;
+            all.margin_x[lane] = 0.01 + (x.abs() + radius * l11) * 4e-6;
+            all.margin_y[lane] = 0.01 + (y.abs() + radius * sigma_y) * 4e-6;
             all.tip[lane] = radius * l21;
             all.slope[lane] = (l11 * l21) * (inverse * inverse);
             all.half_width[lane] = (l11 * l22) * inverse * radius;

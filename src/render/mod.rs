@@ -2,6 +2,7 @@
 
 mod band;
 mod footprint;
+mod groups;
 mod kernel;
 mod output;
 mod splat;
@@ -23,7 +24,7 @@ pub(crate) use splat::Splat;
 #[cfg(feature = "encode")]
 pub(crate) use tile::centers;
 #[cfg(feature = "encode")]
-pub(crate) use tiling::{Grid, Span, TileRow};
+pub(crate) use tiling::Grid;
 
 use band::{BAND_ROWS, Band, Bands};
 use output::Place;
@@ -228,12 +229,12 @@ impl Job<'_> {
         for row in 0..self.bands.rows(band) {
             let y = row * TILE_HEIGHT;
             let top = self.view.region.y + (band * BAND_HEIGHT + y) as u32;
-            let (tiles, splats) = memory.row(self.bands.columns(), row);
+            let (groups, blocks) = memory.row(self.backend, self.bands.columns(), row);
             for column in 0..self.bands.columns() {
                 let x = column * TILE_WIDTH;
                 let origin = (self.view.region.x + x as u32, top);
-                let list = tiles.splats(column);
-                Tile { origin, base, splats, list, kernel: self.kernel }
+                let members = groups.members(column);
+                Tile { origin, base, blocks, members, kernel: self.kernel }
                     .render(self.backend, &mut planes);
                 write(&planes, x, y);
             }

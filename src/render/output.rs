@@ -105,24 +105,40 @@ fn write_rows<T: Sample, const CHANNELS: usize>(
     Place { x, rows, stride }: Place<'_, T>,
     convert: impl Fn(&[f32; TILE_WIDTH]) -> [T; TILE_WIDTH],
 ) {
-    let columns = TILE_WIDTH.min(stride / CHANNELS - x);
-    for (row, samples) in rows.chunks_mut(stride).take(TILE_HEIGHT).enumerate() {
-        let mut pixels = [[T::OPAQUE; CHANNELS]; TILE_WIDTH];
-        for (channel, source) in sources.into_iter().enumerate() {
-            if let Some(plane) = source {
-                let line = convert(&planes[plane][row]);
-                for (pixel, sample) in pixels.iter_mut().zip(line) {
-                    pixel[channel] = sample;
-                }
-            }
+    let rows = rows.chunks_mut(stride).take(TILE_HEIGHT);
+    let tiles = rows.map(|samples| samples[x * CHANNELS..].as_chunks_mut().0);
+    if stride / CHANNELS - x >= TILE_WIDTH {
+        // Nearly all: copies of known length.
+        for (row, samples) in tiles.enumerate() {
+            *samples.first_chunk_mut().expect("a whole tile") =
+                interleaved(planes, sources, row, &convert);
         }
-        let (samples, _) = samples[x * CHANNELS..].as_chunks_mut();
-        match samples.first_chunk_mut() {
-            // Nearly all: a copy of known length.
-            Some(whole) => *whole = pixels,
-            None => samples.copy_from_slice(&pixels[..columns]),
+    } else {
+        for (row, samples) in tiles.enumerate() {
+            let pixels = interleaved(planes, sources, row, &convert);
+            samples.copy_from_slice(&pixels[..samples.len()]);
         }
     }
+}
+
+/// The pixels of a row of a tile.
+#[inline(always)]
+fn interleaved<T: Sample, const CHANNELS: usize>(
+    planes: &[Plane],
+    sources: [Option<usize>; CHANNELS],
+    row: usize,
+    convert: impl Fn(&[f32; TILE_WIDTH]) -> [T; TILE_WIDTH],
+) -> [[T; CHANNELS]; TILE_WIDTH] {
+    let mut pixels = [[T::OPAQUE; CHANNELS]; TILE_WIDTH];
+    for (channel, source) in sources.into_iter().enumerate() {
+        if let Some(plane) = source {
+            let line = convert(&planes[plane][row]);
+            for (pixel, sample) in pixels.iter_mut().zip(line) {
+                pixel[channel] = sample;
+            }
+        }
+    }
+    pixels
 }
 
 /// [`Sample::from_unit`], sixteen at a time and bit for bit.

@@ -1,5 +1,6 @@
 //! A Gaussian as the inner loop wants it, and where on the output it may be visible.
 
+use super::footprint::LANES;
 use super::view::View;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
@@ -18,6 +19,17 @@ pub(crate) struct Splat {
     pub(super) cholesky: [f32; 3],
 }
 
+/// Splats that stand together in the file; at the end some that touch nothing.
+pub(crate) type Block = [Splat; LANES];
+
+/// A block of at most so many splats.
+#[cfg(all(test, feature = "std"))]
+pub(super) fn block_of(splats: &[Splat]) -> Block {
+    let mut block = [Splat::NOWHERE; LANES];
+    block[..splats.len()].copy_from_slice(splats);
+    block
+}
+
 impl Splat {
     /// A splat that touches no picture: in place of a Gaussian that is not drawn.
     pub(crate) const NOWHERE: Self = Self {
@@ -31,30 +43,43 @@ impl Splat {
     };
 
     /// `None` for a Gaussian that is not drawn.
+    #[inline(always)]
     pub(crate) fn new(gaussian: &Gaussian, view: &View) -> Option<Self> {
+        let ([x, y], cholesky, amplitude) = Self::outline(gaussian, view)?;
+        let [i11, w, i22] = inverse_cholesky(cholesky);
+        let color = match amplitude {
+            Some(amplitude) => gaussian.color.map(|c| c * amplitude),
+            None => gaussian.color,
+        };
+        Some(Self { x, y, i11, w, i22, color, cholesky })
+    }
+
+    /// The centre and the Cholesky factor in output pixels, and by what widening changed the
+    /// amplitude, if anything. `None` for a Gaussian that is not drawn.
+    #[inline(always)]
+    pub(super) fn outline(
+        gaussian: &Gaussian,
+        view: &View,
+    ) -> Option<([f32; 2], [f32; 3], Option<f32>)> {
         if !gaussian.is_drawable() {
             return None;
         }
         let [sx, sy] = view.scale;
+        let center = [gaussian.center[0] * sx, gaussian.center[1] * sy];
         let [l11, l21, l22] = gaussian.cholesky;
-        let mut cholesky = [l11 * sx, l21 * sy, l22 * sy];
-        let mut color = gaussian.color;
-        if view.filter != [0.0; 2] {
-            let [fx, fy] = view.filter;
-            let [l11, l21, l22] = cholesky;
-            let wide11 = math::sqrt(l11 * l11 + fx);
-            let wide21 = (l11 * l21) / wide11;
-            // yy + fy - wide21^2 without its cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
-            let rest = l21 / wide11;
-            let wide22 = math::sqrt((l22 * l22 + fy) + (rest * rest) * fx);
-            // Widening keeps the integral, so the amplitude falls as the area grows.
-            let amplitude = (l11 / wide11) * (l22 / wide22);
-            color = color.map(|c| c * amplitude);
-            cholesky = [wide11, wide21, wide22];
+        let [l11, l21, l22] = [l11 * sx, l21 * sy, l22 * sy];
+        if view.filter == [0.0; 2] {
+            return Some((center, [l11, l21, l22], None));
         }
-        let [i11, w, i22] = inverse_cholesky(cholesky);
-        let (x, y) = (gaussian.center[0] * sx, gaussian.center[1] * sy);
-        Some(Self { x, y, i11, w, i22, color, cholesky })
+        let [fx, fy] = view.filter;
+        let wide11 = math::sqrt(l11 * l11 + fx);
+        let wide21 = (l11 * l21) / wide11;
+        // yy + fy - wide21^2 without its cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
+        let rest = l21 / wide11;
+        let wide22 = math::sqrt((l22 * l22 + fy) + (rest * rest) * fx);
+        // Widening keeps the integral, so the amplitude falls as the area grows.
+        let amplitude = (l11 / wide11) * (l22 / wide22);
+        Some((center, [wide11, wide21, wide22], Some(amplitude)))
     }
 
     /// The squared Mahalanobis distance of the pixel centre (px, py).

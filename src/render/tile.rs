@@ -3,10 +3,11 @@
 #[cfg(feature = "std")]
 use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, prelude::*};
 
+use super::groups::Members;
 use super::kernel::Kernel;
 #[cfg(feature = "std")]
 use super::kernel::simd::{Exponential, Quartic, Weight};
-use super::splat::Splat;
+use super::splat::Block;
 
 /// Pixels per row of a tile: one AVX-512 register.
 pub(crate) const TILE_WIDTH: usize = 16;
@@ -43,7 +44,7 @@ impl Backend {
 
     /// Runs plain loops, compiled for this code's machines.
     #[inline]
-    pub(super) fn run<T>(self, work: impl FnOnce() -> T) -> T {
+    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
         match self {
             Self::Reference => work(),
             #[cfg(feature = "std")]
@@ -58,9 +59,9 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
     /// The first pixel.
     pub(crate) origin: (u32, u32),
     pub(crate) base: [f32; CHANNELS],
-    pub(crate) splats: &'a [Splat],
+    pub(crate) blocks: &'a [Block],
     /// Those of the splats that are added, in order.
-    pub(crate) list: &'a [u32],
+    pub(crate) members: Members<'a>,
     pub(crate) kernel: Kernel,
 }
 
@@ -82,8 +83,8 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
 
     fn render_plainly(&self, planes: &mut [Plane; CHANNELS]) {
         *planes = self.base.map(|base| [[base; TILE_WIDTH]; TILE_HEIGHT]);
-        for &index in self.list {
-            let splat = &self.splats[index as usize];
+        for (block, lane) in self.members {
+            let splat = &self.blocks[block][lane];
             for row in 0..TILE_HEIGHT {
                 for column in 0..TILE_WIDTH {
                     let px = (self.origin.0 as usize + column) as f32 + 0.5;
@@ -108,8 +109,8 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         for (sums, base) in sums.iter_mut().zip(self.base) {
             *sums = [f32x16::splat(simd, base); TILE_HEIGHT];
         }
-        for &index in self.list {
-            let splat = &self.splats[index as usize];
+        for (block, lane) in self.members {
+            let splat = &self.blocks[block][lane];
             let dx = px - splat.x;
             let u = dx * splat.i11;
             let (u2, slant) = (u * u, dx * splat.w);
@@ -146,6 +147,9 @@ mod tests {
 
     use super::*;
     use crate::gaussian::Gaussian;
+    use crate::render::footprint::LANES;
+    use crate::render::groups::Group;
+    use crate::render::splat::{Splat, block_of};
     use crate::render::view::{Region, View};
     use crate::testing::{config, simd_levels};
 
@@ -156,11 +160,14 @@ mod tests {
         origin: (u32, u32),
         kernel: Kernel,
     ) -> [usize; 2] {
-        let list: Vec<u32> = (0..splats.len() as u32).collect();
+        let blocks: Vec<Block> = splats.chunks(LANES).map(block_of).collect();
+        let groups: Vec<Group> =
+            (0..=blocks.len() as u32).map(|block| Group { block, members: 0xffff }).collect();
+        let members = Members::new(&groups);
         let render = |backend: Backend| {
             let base = [0.5; CHANNELS];
             let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-            let tile = Tile { origin, base, splats, list: &list, kernel };
+            let tile = Tile { origin, base, blocks: &blocks, members, kernel };
             tile.render(backend, &mut planes);
             planes.into_iter().flatten().flatten().map(f32::to_bits)
         };

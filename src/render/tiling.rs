@@ -1,12 +1,15 @@
 //! Which tiles a splat touches. A superset is harmless: the cut-off is tested per pixel.
 
-use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::footprint::{Footprints, LANES, larger, smaller};
+#[cfg(feature = "std")]
+use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*};
+
+use super::footprint::{Ellipses, Footprints, LANES, larger, smaller};
 use super::splat::Splat;
 use super::tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
-use super::view::Region;
+use super::view::{Region, View};
+use crate::gaussian::Gaussian;
 
 /// The tiles of a region.
 #[derive(Clone, Copy, Debug)]
@@ -39,10 +42,18 @@ impl Grid {
         rows: Range<usize>,
         tell: impl FnMut(usize, usize, &Columns),
     ) {
-        backend.run(
-            #[inline(always)]
-            || self.columns_with(splats, cutoff, rows, tell),
-        );
+        match backend {
+            Backend::Reference => self.columns_with(splats, cutoff, rows, truncated, tell),
+            #[cfg(feature = "std")]
+            Backend::Simd(level) => dispatch!(level, simd => self.columns_with(
+                splats,
+                cutoff,
+                rows,
+                #[inline(always)]
+                |values| truncated_at_once(simd, values),
+                tell,
+            )),
+        }
     }
 
     #[inline(always)]
@@ -51,25 +62,23 @@ impl Grid {
         splats: &[Splat],
         cutoff: f32,
         rows: Range<usize>,
+        truncated: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
         mut tell: impl FnMut(usize, usize, &Columns),
     ) {
         let Region { x, y, width, height } = self.region;
         for (block, splats) in splats.chunks(LANES).enumerate() {
-            let footprints = match splats.first_chunk() {
-                Some(splats) => Footprints::new(splats, cutoff),
-                None => {
-                    let mut filled = [Splat::NOWHERE; LANES];
-                    filled[..splats.len()].copy_from_slice(splats);
-                    Footprints::new(&filled, cutoff)
-                }
-            };
-            let [first_row, end_row] = tiles(footprints.rows(), y, height, TILE_HEIGHT);
+            let mut ellipses = Ellipses::NOWHERE;
+            for (lane, splat) in splats.iter().enumerate() {
+                ellipses.set(lane, [splat.x, splat.y], splat.cholesky);
+            }
+            let footprints = Footprints::new(&ellipses, cutoff);
+            let [first_row, end_row] = tiles(footprints.rows(), y, height, TILE_HEIGHT, truncated);
             let lowest = first_row.into_iter().fold(i32::MAX, i32::min) as usize;
             let highest = end_row.into_iter().fold(0, i32::max) as usize;
             for row in rows.start.max(lowest)..rows.end.min(highest) {
                 let top = y as f32 + (row * TILE_HEIGHT) as f32 + 0.5;
                 let ends = footprints.columns(top, top + (TILE_HEIGHT - 1) as f32);
-                let [first, end] = tiles(ends, x, width, TILE_WIDTH);
+                let [first, end] = tiles(ends, x, width, TILE_WIDTH, truncated);
                 let mut columns = [[0; LANES]; 2];
                 for lane in 0..LANES {
                     let touched = first_row[lane] <= row as i32 && (row as i32) < end_row[lane];
@@ -82,24 +91,45 @@ impl Grid {
         }
     }
 
-    /// Tells of each splat, in order, which rows of tiles it touches, and at least how many tiles
-    /// in any of them.
+    /// Tells of each of at most so many Gaussians, in order, which rows of tiles it touches, and at
+    /// least how many tiles in any of them.
     pub(super) fn extents(
         &self,
         backend: Backend,
-        splats: &[Splat; LANES],
+        gaussians: &[Gaussian],
+        view: &View,
         cutoff: f32,
     ) -> [Extent; LANES] {
-        backend.run(
-            #[inline(always)]
-            || self.extents_with(splats, cutoff),
-        )
+        match backend {
+            Backend::Reference => self.extents_with(gaussians, view, cutoff, truncated),
+            #[cfg(feature = "std")]
+            Backend::Simd(level) => dispatch!(level, simd => self.extents_with(
+                gaussians,
+                view,
+                cutoff,
+                #[inline(always)]
+                |values| truncated_at_once(simd, values),
+            )),
+        }
     }
 
     #[inline(always)]
-    fn extents_with(&self, splats: &[Splat; LANES], cutoff: f32) -> [Extent; LANES] {
-        let footprints = Footprints::new(splats, cutoff);
-        let [first, end] = tiles(footprints.rows(), self.region.y, self.region.height, TILE_HEIGHT);
+    fn extents_with(
+        &self,
+        gaussians: &[Gaussian],
+        view: &View,
+        cutoff: f32,
+        truncated: impl Fn([f32; LANES]) -> [i32; LANES],
+    ) -> [Extent; LANES] {
+        let mut ellipses = Ellipses::NOWHERE;
+        for (lane, gaussian) in gaussians.iter().enumerate() {
+            if let Some((center, cholesky, _)) = Splat::outline(gaussian, view) {
+                ellipses.set(lane, center, cholesky);
+            }
+        }
+        let footprints = Footprints::new(&ellipses, cutoff);
+        let [first, end] =
+            tiles(footprints.rows(), self.region.y, self.region.height, TILE_HEIGHT, truncated);
         let widths = footprints.widest(TILE_HEIGHT as f32);
         let mut extents = [Extent::default(); LANES];
         for (lane, extent) in extents.iter_mut().enumerate() {
@@ -123,75 +153,6 @@ pub(super) struct Extent {
     pub(super) columns: u32,
 }
 
-/// Tiles of a row that something touches.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Span {
-    pub(crate) splat: u32,
-    /// The first tile, and the one after the last.
-    pub(crate) first: u32,
-    pub(crate) end: u32,
-}
-
-/// One row of tiles: which splats touch each.
-#[derive(Debug, Default)]
-pub(crate) struct TileRow {
-    /// `splats[starts[t]..starts[t + 1]]` are those that touch tile t.
-    starts: Vec<usize>,
-    splats: Vec<u32>,
-}
-
-impl TileRow {
-    /// Sorts splats by tile, in the memory of an earlier row: for each what stands for it, and
-    /// which of so many tiles it touches.
-    pub(crate) fn sort(&mut self, columns: usize, spans: impl Iterator<Item = Span> + Clone) {
-        // First how many more touch a tile than the one before it, then how many touch those
-        // before it.
-        let starts = &mut self.starts;
-        starts.clear();
-        starts.resize(columns + 1, 0);
-        for Span { first, end, .. } in spans.clone() {
-            starts[end as usize] = starts[end as usize].wrapping_sub(1);
-            starts[first as usize] = starts[first as usize].wrapping_add(1);
-        }
-        let (mut count, mut total) = (0_usize, 0);
-        for start in &mut *starts {
-            count = count.wrapping_add(*start);
-            *start = total;
-            total += count;
-        }
-        self.splats.clear();
-        self.splats.reserve_exact(total);
-        self.splats.resize(total, 0);
-        // `starts[t]` runs through its tile's splats and ends where the next begins; shift it back
-        // afterwards.
-        for Span { splat, first, end } in spans {
-            for start in &mut starts[first as usize..end as usize] {
-                self.splats[*start] = splat;
-                *start += 1;
-            }
-        }
-        starts.rotate_right(1);
-        starts[0] = 0;
-    }
-
-    /// Pairs of a tile and a splat.
-    #[cfg(feature = "encode")]
-    pub(crate) fn entries(&self) -> usize {
-        self.splats.len()
-    }
-
-    /// What touches a tile, in order.
-    pub(crate) fn splats(&self, column: usize) -> &[u32] {
-        &self.splats[self.starts[column]..self.starts[column + 1]]
-    }
-
-    /// Bytes held.
-    #[cfg(feature = "encode")]
-    pub(crate) fn memory(&self) -> usize {
-        self.starts.capacity() * size_of::<usize>() + self.splats.capacity() * size_of::<u32>()
-    }
-}
-
 /// The tiles whose pixel centres may lie between each of `low` and `high`, out of those that cover
 /// `length` pixels from `origin` on: the first, and the one after the last. None if that is not
 /// larger.
@@ -201,18 +162,35 @@ fn tiles(
     origin: u32,
     length: u32,
     size: usize,
+    truncated: impl Fn([f32; LANES]) -> [i32; LANES],
 ) -> [[i32; LANES]; 2] {
     // Pixel i has its centre at i + 0.5.
     let shift = origin as f32 + 0.5;
     let (length, one) = (length as f32, size as f32);
-    let mut ends = [[0; LANES]; 2];
+    // Truncation is towards zero, so the first pixel is at most one too early. What lies beyond
+    // either end begins after it ends.
+    let mut first = low;
+    let mut last = high;
     for lane in 0..LANES {
-        // Casts round towards zero, so the first pixel is at most one too early. What lies beyond
-        // either end begins after it ends.
-        let first = smaller(larger(low[lane] - shift, 0.0), length + one) as i32;
-        let last = smaller(larger(high[lane] - shift, -one), length - 1.0) as i32;
-        ends[0][lane] = first / size as i32;
-        ends[1][lane] = last.div_euclid(size as i32) + 1;
+        first[lane] = smaller(larger(low[lane] - shift, 0.0), length + one);
+        last[lane] = smaller(larger(high[lane] - shift, -one), length - 1.0);
     }
-    ends
+    let (mut first, mut last) = (truncated(first), truncated(last));
+    for lane in 0..LANES {
+        first[lane] /= size as i32;
+        last[lane] = last[lane].div_euclid(size as i32) + 1;
+    }
+    [first, last]
+}
+
+/// Integers from numbers that are near enough to zero, rounded towards it.
+fn truncated(values: [f32; LANES]) -> [i32; LANES] {
+    values.map(|value| value as i32)
+}
+
+/// [`truncated`], all at once.
+#[cfg(feature = "std")]
+#[inline(always)]
+fn truncated_at_once<S: Simd>(simd: S, values: [f32; LANES]) -> [i32; LANES] {
+    i32x16::truncate_from(f32x16::load_array(simd, values)).to_array()
 }
