@@ -410,3 +410,23 @@ impl Cell {
         self.corner[axis] + (part << shift) + (1 << shift >> 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_what_would_be_computed() {
+        for step in [0.9, 0.013, 700.0] {
+            let exponentials = Exponentials::new(step);
+            for class in 0..=MAX_CLASS {
+                let step = step * fineness(class);
+                for code in (-1000..1000).chain([i32::MIN, i32::MAX]) {
+                    let found = exponentials.of(code, class);
+                    let computed = Exponentials::exp(code, step);
+                    assert_eq!(found.to_bits(), computed.to_bits(), "{step} {class} {code}");
+                }
+            }
+        }
+    }
+}

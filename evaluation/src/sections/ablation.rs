@@ -50,7 +50,7 @@ const FIGURES: [(&str, Better); 2] = [("PSNR", Better::Higher), ("MS-SSIM", Bett
 /// Everything that the measurements share.
 #[derive(Debug)]
 struct Ablation<'a> {
-    store: Store<4, 4>,
+    store: Store<4, 3>,
     bench: &'a Bench,
     pictures: Vec<Picture>,
     gaussians: u32,
@@ -64,7 +64,6 @@ struct Outcome {
     rate: f64,
     psnr: f64,
     ms_ssim: f64,
-    seconds: f64,
 }
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
@@ -75,7 +74,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         store: bench.store(
             "ablation.csv",
             ["variant", "iterations", "gaussians", "image"],
-            ["bpp", "psnr", "msssim", "seconds"],
+            ["bpp", "psnr", "msssim"],
         )?,
         bench,
         pictures: pictures(PICTURES),
@@ -138,8 +137,7 @@ impl Ablation<'_> {
 
     /// How often to prune and to grow.
     fn intervals(&mut self) -> Result<String> {
-        let mut table =
-            Table::new(&["pruned every", "grown", "PSNR in dB", "MS-SSIM", "training s"]);
+        let mut table = Table::new(&["pruned every", "grown", "PSNR in dB", "MS-SSIM"]);
         let mut compared: Vec<Named> = Vec::new();
         for growths in GROWTHS {
             for interval in PRUNING {
@@ -153,7 +151,6 @@ impl Ablation<'_> {
                     format!("{growths} times"),
                     format!("{:.2}", outcome.psnr),
                     format!("{:.4}", outcome.ms_ssim),
-                    format!("{:.1}", outcome.seconds),
                 ]);
                 compared.push((variant, vec![outcome.psnr, outcome.ms_ssim]));
             }
@@ -273,11 +270,11 @@ impl Ablation<'_> {
                 let encoder = encoder.clone().with_target(Target::Gaussians(gaussians));
                 let coded = gip::code(encoder, picture, None)?;
                 let (report, ms_ssim) = (&coded.report, coded.distortion.ms_ssim);
-                Ok([picture.rate(coded.bytes), report.psnr_float, ms_ssim, report.seconds])
+                Ok([picture.rate(coded.bytes), report.psnr_float, ms_ssim])
             })?);
         }
         let of = |column: usize| mean(rows.iter().map(|row| row[column])).unwrap_or(f64::NAN);
-        Ok(Outcome { rate: of(0), psnr: of(1), ms_ssim: of(2), seconds: of(3) })
+        Ok(Outcome { rate: of(0), psnr: of(1), ms_ssim: of(2) })
     }
 }
 

@@ -1,0 +1,65 @@
+//! A thumbnail, a crop and a close-up of a picture, from one file that is opened once. Nothing is
+//! resampled: the Gaussians are evaluated at the pixels that are asked for.
+//!
+//!     cargo run --release --example views -- photo.gip thumbnail.ppm crop.ppm close_up.ppm
+
+use std::error::Error;
+use std::fs::File;
+use std::io::Write;
+
+use image_gip::{ColorModel, Decoder, Picture, Region, RenderOptions};
+
+/// Longer side of the thumbnail.
+const THUMBNAIL: u32 = 96;
+/// How many times as large the close-up shows things.
+const CLOSE_UP: u32 = 8;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [input, thumbnail, crop, close_up] = arguments.as_slice() else {
+        return Err("usage: views INPUT.gip THUMBNAIL.ppm CROP.ppm CLOSE_UP.ppm".into());
+    };
+    let mut decoder = Decoder::new(File::open(input)?)?;
+    let (width, height) = (decoder.header().width, decoder.header().height);
+
+    // Few pixels need few Gaussians, and the strongest come first: the rest need not even be read.
+    let longer = width.max(height);
+    let side = |side: u32| (side * THUMBNAIL).div_ceil(longer);
+    let small = RenderOptions::new().size(side(width), side(height));
+    decoder.read_at_least(decoder.header().gaussians_for(side(width), side(height)))?;
+    save(thumbnail, &decoder.picture(), small)?;
+
+    // What follows takes all of them.
+    decoder.read_to_end()?;
+    let picture = decoder.picture();
+    let middle = Region {
+        x: width / 4,
+        y: height / 4,
+        width: width.div_ceil(2),
+        height: height.div_ceil(2),
+    };
+    save(crop, &picture, RenderOptions::new().region(middle))?;
+
+    // A region is given in pixels of the output.
+    let enlarged = RenderOptions::new().size(width * CLOSE_UP, height * CLOSE_UP);
+    let part = Region {
+        x: (width * CLOSE_UP - width) / 2,
+        y: (height * CLOSE_UP - height) / 2,
+        width,
+        height,
+    };
+    save(close_up, &picture, enlarged.region(part))
+}
+
+/// Renders to a PPM file.
+fn save(path: &str, picture: &Picture<'_>, options: RenderOptions) -> Result<(), Box<dyn Error>> {
+    let options = options.color(ColorModel::Rgb);
+    let mut samples = vec![0; picture.output_len(&options)?];
+    picture.render_u8(&options, &mut samples)?;
+    let (width, height) = options.output_size(picture.header());
+    let mut file = File::create(path)?;
+    write!(file, "P6\n{width} {height}\n255\n")?;
+    file.write_all(&samples)?;
+    println!("{path}: {width} x {height} from {} Gaussians", picture.gaussians().len());
+    Ok(())
+}
