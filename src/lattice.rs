@@ -153,6 +153,7 @@ impl Lattice {
     }
 
     /// The shape that a code stands for.
+    #[inline]
     pub(crate) fn shape(&self, code: &Code) -> Shape {
         let size = self.size.of(code.size, code.class);
         let ratio = self.ratio.of(code.ratio, code.class);
@@ -173,6 +174,7 @@ impl Lattice {
     }
 
     /// The Gaussian that a code and its shape stand for.
+    #[inline(always)]
     pub(crate) fn gaussian(
         &self,
         code: &Code,

@@ -67,12 +67,10 @@ impl Model {
 
     /// Learns from a symbol. Every symbol keeps a share.
     #[inline(always)]
-    pub(crate) fn update(&mut self, symbol: usize) {
+    pub(crate) fn update(&mut self, search: impl Search, symbol: usize) {
         let rate = RATES[usize::from(self.seen)];
         self.seen = self.seen.saturating_add(1);
-        let starts = self.starts.first_chunk_mut().expect("one for each symbol");
-        let (old, target): ([i16; SYMBOLS], _) = (*starts, &TARGETS[symbol]);
-        *starts = core::array::from_fn(|index| old[index] + ((target[index] - old[index]) >> rate));
+        search.approach(&mut self.starts, &TARGETS[symbol], rate);
     }
 
     #[cfg(all(test, feature = "encode"))]
@@ -185,7 +183,7 @@ impl<S: Search> Coder for Decoder<'_, S> {
         let model = &mut self.models[context];
         let share = self.state & ((1 << SCALE_BITS) - 1);
         let found = self.search.find(&model.starts, share);
-        model.update(found.symbol as usize);
+        model.update(self.search, found.symbol as usize);
         self.state = found.size * (self.state >> SCALE_BITS) + found.offset;
         self.restore();
         found.symbol
@@ -245,7 +243,7 @@ impl Coder for Encoder<'_> {
         let model = &mut self.models[context];
         let (start, size) = shares_of(&model.starts, symbol as usize);
         self.shares.push((start as u16, size as u16, SCALE_BITS as u8));
-        model.update(symbol as usize);
+        model.update(Portable, symbol as usize);
         symbol
     }
 
@@ -354,7 +352,7 @@ mod tests {
         fn every_symbol_keeps_a_share(symbols in prop::collection::vec(0_usize..16, 0..600)) {
             let mut model = flat();
             for symbol in symbols {
-                model.update(symbol);
+                model.update(Portable, symbol);
                 let shares = (0..SYMBOLS).map(|symbol| shares_of(&model.starts, symbol).1);
                 prop_assert!(shares.clone().all(|share| (1..1 << SCALE_BITS).contains(&share)));
                 prop_assert_eq!(shares.sum::<u32>(), 1 << SCALE_BITS);
@@ -367,7 +365,7 @@ mod tests {
         let mut model = flat();
         assert!((model.costs()[3] - 4.0).abs() < 1e-6);
         for _ in 0..2000 {
-            model.update(3);
+            model.update(Portable, 3);
         }
         assert!(model.costs()[3] < 0.02, "{:?}", model.costs());
     }
@@ -385,7 +383,7 @@ mod tests {
             let mut cost = Cost { costs: &costs, bits: 0.0 };
             cost.symbol(0, symbol);
             bits += cost.bits;
-            learning[0].update(symbol as usize);
+            learning[0].update(Portable, symbol as usize);
             encoder.symbol(0, symbol);
         }
         let written = encoder.finish().len() as f32 * 8.0;

@@ -5,8 +5,8 @@ use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
 
 use super::rans::SYMBOLS;
 
-/// The shares of all symbols before each one, summed up, and of all of them: from 0 to 2^15, which
-/// is the smallest `i16`.
+/// The shares of all symbols before each one, summed up, and at the end those of all: from 0 to
+/// 2^15, whose bits are those of the smallest `i16`.
 pub(crate) type Starts = [i16; SYMBOLS + 1];
 
 /// The last of [`Starts`].
@@ -39,6 +39,9 @@ pub(crate) fn shares_of(starts: &Starts, symbol: usize) -> (u32, u32) {
 pub(crate) trait Search: Copy {
     /// The symbol of a share below 2^15.
     fn find(self, starts: &Starts, share: u32) -> Found;
+
+    /// Moves starts towards others by 2^-rate of the distance, rounded down.
+    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8);
 }
 
 /// With what every machine of the kind has.
@@ -54,6 +57,25 @@ impl Search for Portable {
         let symbol = plain_symbol_at(starts, share);
         Found::new(starts, share, symbol)
     }
+
+    #[inline(always)]
+    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
+        #[cfg(feature = "std")]
+        dispatch!(Level::baseline(), simd => approach(simd, starts, targets, rate));
+        #[cfg(not(feature = "std"))]
+        for (start, target) in starts.iter_mut().zip(targets) {
+            *start += (target - *start) >> rate;
+        }
+    }
+}
+
+#[cfg(feature = "std")]
+#[inline(always)]
+fn approach<S: Simd>(simd: S, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
+    let starts = starts.first_chunk_mut().expect("one for each symbol");
+    let old = i16x16::load_array_ref(simd, starts);
+    let change = (i16x16::load_array_ref(simd, targets) - old) >> u32::from(rate);
+    (old + change).store_array(starts);
 }
 
 #[cfg(feature = "std")]
@@ -81,6 +103,11 @@ impl Search for Nearest {
     #[inline(always)]
     fn find(self, starts: &Starts, share: u32) -> Found {
         nearest(self.0, starts, share)
+    }
+
+    #[inline(always)]
+    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
+        approach(self.0, starts, targets, rate);
     }
 }
 
@@ -134,7 +161,7 @@ mod tests {
         let mut model = Model::new(core::array::from_fn(|index| (index * 2048) as i16));
         // Shares of one and of nearly all among them.
         for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
-            model.update(symbol);
+            model.update(Portable, symbol);
         }
         let starts = model.starts();
         for share in 0..1 << SCALE_BITS {

@@ -157,11 +157,13 @@ impl Band {
         self.blocks.clear();
         self.blocks.reserve_exact(blocks);
         for members in members.chunks(LANES) {
-            let mut block = [Splat::NOWHERE; LANES];
+            self.blocks.push([Splat::NOWHERE; LANES]);
+            let block = self.blocks.last_mut().expect("it was just added");
             for (splat, &index) in block.iter_mut().zip(members) {
-                *splat = Splat::new(&gaussians[index as usize], view).unwrap_or(Splat::NOWHERE);
+                if let Some(drawn) = Splat::new(&gaussians[index as usize], view) {
+                    *splat = drawn;
+                }
             }
-            self.blocks.push(block);
         }
         for columns in &mut self.columns {
             columns.clear();

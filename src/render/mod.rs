@@ -252,16 +252,35 @@ fn threads(parallel: bool) -> usize {
     1
 }
 
-/// Runs `work` on every item, on the threads of the current pool if there are any; each lends its
-/// memory from one to the next.
+/// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
+/// lends its memory from one item to the next.
 fn for_each<T: Send>(parallel: bool, items: Vec<T>, work: impl Fn(&mut Band, T) + Send + Sync) {
     #[cfg(feature = "rayon")]
     if parallel {
-        use rayon::iter::{IntoParallelIterator, ParallelIterator};
-        items.into_par_iter().for_each_init(Band::default, work);
+        on_threads(items, work);
         return;
     }
     let _ = parallel;
     let mut memory = Band::default();
     items.into_iter().for_each(|item| work(&mut memory, item));
+}
+
+#[cfg(feature = "rayon")]
+fn on_threads<T: Send>(items: Vec<T>, work: impl Fn(&mut Band, T) + Send + Sync) {
+    let others = threads(true).min(items.len()).saturating_sub(1);
+    let items = std::sync::Mutex::new(items.into_iter());
+    let next = || items.lock().expect("taking an item does not panic").next();
+    let run = || {
+        let mut memory = Band::default();
+        while let Some(item) = next() {
+            work(&mut memory, item);
+        }
+    };
+    // Threads of the pool may have to wake up first; this one does not wait for them.
+    rayon::in_place_scope(|scope| {
+        for _ in 0..others {
+            scope.spawn(|_| run());
+        }
+        run();
+    });
 }

@@ -114,7 +114,9 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             let dx = px - splat.x;
             let u = dx * splat.i11;
             let (u2, slant) = (u * u, dx * splat.w);
-            let shifts = ((py - splat.y) * splat.i22).to_array();
+            // Through memory: a row takes its number from there within an addition, where taking it
+            // from a register would need instructions that compete with the arithmetic.
+            let shifts = core::hint::black_box(((py - splat.y) * splat.i22).to_array());
             for row in 0..TILE_HEIGHT {
                 let v = slant + shifts[row];
                 let weight = kernel.weight(simd, u2 + v * v);

@@ -9,6 +9,7 @@ use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
 use crate::bench::Bench;
 use crate::gip;
 use crate::kernel;
+use crate::memory;
 use crate::pictures::Picture;
 use crate::table::{Table, mean};
 use crate::verdict::list;
@@ -22,6 +23,10 @@ const QUICK_PICTURES: usize = 2;
 const REPEATS: usize = 15;
 /// How much smaller thumbnails are along each side.
 const THUMBNAIL: u32 = 8;
+/// How much smaller a preview of the first bytes is along each side.
+const PREVIEW: u32 = 4;
+/// Bytes that a Gaussian takes in the list that a caller gets.
+const LISTED: f64 = size_of::<Gaussian>() as f64;
 /// The picture of which a region is decoded: its width, its rate and its effort, and the region.
 const WIDE: (u32, f64, u8) = (2048, 0.5, 2);
 const REGION: u32 = 128;
@@ -70,8 +75,12 @@ struct Times {
     /// From no Gaussians to samples.
     output: f64,
     thumbnail: f64,
-    /// From the first tenth of the bytes.
-    tenth: f64,
+    /// From the first tenth of the bytes, at full size and at a quarter of it along each side.
+    tenth: [f64; 2],
+    /// How many Gaussians that tenth has.
+    tenth_gaussians: f64,
+    /// Most bytes held at a time with one thread, without the file and the output.
+    memory: f64,
     gaussians: f64,
     /// Kernel evaluations.
     evaluations: f64,
@@ -90,6 +99,9 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
             "seconds_output",
             "seconds_thumbnail",
             "seconds_tenth",
+            "seconds_tenth_small",
+            "gaussians_tenth",
+            "memory",
             "gaussians",
             "evaluations",
         ],
@@ -107,6 +119,12 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = RenderOptions::new().parallel(false).size(width, height);
         let samples = picture.rgb.len();
+        let tenth = &file[..file.len() / 10];
+        let preview = RenderOptions::new()
+            .parallel(false)
+            .size(picture.width / PREVIEW, picture.height / PREVIEW);
+        let (rendered, held) = memory::peak(|| render(file, &RenderOptions::new().parallel(false)));
+        rendered?;
         Ok([
             coded.bytes,
             coded.distortion.psnr,
@@ -115,14 +133,29 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut vec![0; samples])?))?,
             seconds(|| thumbnail(file, &small))?,
-            seconds(|| beginning(&file[..file.len() / 10]))?,
+            seconds(|| beginning(tenth, &RenderOptions::new().parallel(false)))?,
+            seconds(|| beginning(tenth, &preview))?,
+            gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
+            held - samples as f64,
             coded.report.gaussians.into(),
             evaluations(stream.gaussians(), picture.width, picture.height),
         ])
     })?;
-    let [bytes, psnr, one, all, parse, output, thumbnail, tenth, gaussians, evaluations] = values;
-    let whole = [one, all];
-    Ok(Times { bytes, psnr, whole, parse, output, thumbnail, tenth, gaussians, evaluations })
+    let [bytes, psnr, one, all, parse, output, thumbnail, rest @ ..] = values;
+    let [tenth, preview, tenth_gaussians, memory, gaussians, evaluations] = rest;
+    Ok(Times {
+        bytes,
+        psnr,
+        whole: [one, all],
+        parse,
+        output,
+        thumbnail,
+        tenth: [tenth, preview],
+        tenth_gaussians,
+        memory,
+        gaussians,
+        evaluations,
+    })
 }
 
 fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
@@ -147,11 +180,10 @@ fn render(file: &[u8], options: &RenderOptions) -> Result<()> {
 }
 
 /// Decodes and renders what the beginning of a file has.
-fn beginning(bytes: &[u8]) -> Result<()> {
+fn beginning(bytes: &[u8], options: &RenderOptions) -> Result<()> {
     gip::open(bytes, |picture| {
-        let options = RenderOptions::new().parallel(false);
-        let mut samples = vec![0; picture.output_len(&options)?];
-        Ok(picture.render_u8(&options, &mut samples)?)
+        let mut samples = vec![0; picture.output_len(options)?];
+        Ok(picture.render_u8(options, &mut samples)?)
     })
 }
 
@@ -290,6 +322,14 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         "all threads, times as fast",
         "thumbnail, times as fast",
         "first tenth, share of the time",
+        "and at a quarter of the size",
+        "Gaussians in it",
+    ]);
+    let mut memory = Table::new(&[
+        "bpp",
+        "beside file and output, kB",
+        "of which listed Gaussians, kB",
+        "the rest, kB",
     ]);
     for Measured { rate, ours, .. } in all {
         let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
@@ -311,7 +351,16 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
             rate.to_string(),
             format!("{:.2}", mean(|times| times.whole[0] / times.whole[1])),
             format!("{:.1}", mean(|times| times.whole[0] / times.thumbnail)),
-            format!("{:.0} %", 100.0 * mean(|times| times.tenth / times.whole[0])),
+            format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole[0])),
+            format!("{:.0} %", 100.0 * mean(|times| times.tenth[1] / times.whole[0])),
+            format!("{:.1} %", 100.0 * mean(|times| times.tenth_gaussians / times.gaussians)),
+        ]);
+        let kilobytes = |bytes: f64| format!("{:.0}", 1e-3 * bytes);
+        memory.row(&[
+            rate.to_string(),
+            kilobytes(mean(|times| times.memory)),
+            kilobytes(mean(|times| LISTED * times.gaussians)),
+            kilobytes(mean(|times| times.memory - LISTED * times.gaussians)),
         ]);
     }
     format!(
@@ -320,10 +369,13 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
          them, whose data stay in registers and in the first cache: {:.3} ns each on this machine, \
          in this run.\n{}\n### Less than all\n\nCompared with ours for the whole picture on one \
          thread. Thumbnails are 1/{THUMBNAIL} as wide and as high and take as many of the layers as \
-         show at their size; all times start from the file in memory.\n{}",
+         show at their size; the first tenth of the bytes is shown at the whole picture's size, and \
+         smaller as a preview; all times start from the file in memory.\n{}\n### Memory\n\nMost \
+         bytes held at a time with one thread.\n{}",
         1e9 * floor,
         stages.finish(),
         gains.finish(),
+        memory.finish(),
     )
 }
 
