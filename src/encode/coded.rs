@@ -45,7 +45,7 @@ const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
 const MOST_TRIMMINGS: u32 = 32;
 /// The first layers of a file, as shares of its Gaussians: a tenth of the file already shows the
 /// picture.
-const LAYERS: [f64; 2] = [0.055, 0.165];
+const LAYERS: [f64; 2] = [0.045, 0.165];
 /// Fewest Gaussians that are worth layers.
 const LEAST_LAYERED: usize = 250;
 /// How often a finished fit may be extended.
