@@ -119,8 +119,8 @@ def answer(codec, quality, threads, encodings, decodings, source, decoded):
     # Another version may round otherwise; another picture would be another measurement.
     if result.shape != samples.shape or abs(result.astype(int) - samples).mean() > 1:
         raise ValueError(f"two decoders of {codec} disagree")
-    with open(decoded, "wb") as out:
-        out.write(samples.tobytes())
+    with open(decoded, "wb") as file:
+        file.write(samples.tobytes())
     return len(data), encode_seconds, decode_seconds
 
 

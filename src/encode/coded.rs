@@ -196,55 +196,69 @@ impl<'a> Coder<'a> {
             self.descend(&mut coded, 0.0, self.passes, observer)?;
             return Ok(coded);
         };
-        let first = self.first_step(gaussians, step, aim, observer)?;
-        let mut search = Search::new(first, aim.by_step());
-        let mut settling = SETTLING / f64::from(self.scouting_passes());
-        let mut scouted = self.scouted(gaussians, search.at, aim, observer)?;
+        let step = self.first_step(gaussians, step, aim, observer)?;
+        let (mut coded, mut off, step) = self.aimed(gaussians, step, aim, observer)?;
+        if let Some(bytes) = target.bytes(self.raster.pixels()) {
+            self.shorten(&mut coded, bytes);
+            return Ok(coded);
+        }
+        if aim.miss(off) > 0.0 {
+            // A few Gaussians are hard to steer, but finer steps are always better in the end.
+            let mut finer = step;
+            for change in FINER {
+                if off <= 0.0 {
+                    break;
+                }
+                finer -= change;
+                (coded, off) = self.passed(gaussians, finer, self.passes, aim, observer)?;
+            }
+        }
+        self.trim(coded, off, aim, observer)
+    }
+
+    /// The codes that come nearest to an aim, how far from it they are, and the step that would be
+    /// tried next; `step` is the first.
+    fn aimed(
+        &self,
+        gaussians: &[Gaussian],
+        step: f64,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<(Coded, f64, f64), EncodeError> {
+        let passes = self.scouting_passes();
+        let mut settling = SETTLING / f64::from(passes);
+        let mut search = Search::new(step, aim.by_step());
+        let mut scouted = self.passed(gaussians, search.at, passes, aim, observer)?;
         for _ in 1..MOST_SCOUTINGS {
             let expected = scouted.1 - settling;
             if expected.abs() < CLOSE {
                 break;
             }
             search.tell(expected);
-            scouted = self.scouted(gaussians, search.at, aim, observer)?;
+            scouted = self.passed(gaussians, search.at, passes, aim, observer)?;
         }
         let mut search = Search::new(search.at, aim.by_step());
+        let mut scouted = Some(scouted);
         let mut best: Option<(Coded, f64)> = None;
         for _ in 0..MOST_TRIES {
-            let (mut coded, before) = scouted;
+            let (mut coded, before) = match scouted.take() {
+                Some(scouted) => scouted,
+                None => self.passed(gaussians, search.at, passes, aim, observer)?,
+            };
             let (off, lambda) = self.steer(&mut coded, before, settling, aim, observer)?;
-            let miss = aim.miss(off);
-            if best.as_ref().is_none_or(|(_, least)| miss < *least) {
-                best = Some((coded, miss));
+            if best.as_ref().is_none_or(|(_, least)| aim.miss(off) < aim.miss(*least)) {
+                best = Some((coded, off));
             }
-            if miss == 0.0 {
+            if aim.miss(off) == 0.0 {
                 break;
             }
             // Now it is known how much happens after scouting.
             let unsteered = off - lambda * aim.by_lambda();
             settling = before - unsteered;
             search.tell(unsteered);
-            scouted = self.scouted(gaussians, search.at, aim, observer)?;
         }
-        let (mut coded, miss) = best.expect("at least one was tried");
-        if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            self.shorten(&mut coded, bytes);
-            return Ok(coded);
-        }
-        // A few Gaussians are hard to steer, but finer steps are always better in the end.
-        let mut finer = search.at;
-        let mut is_good = !Aim::is_wrong(miss);
-        for change in FINER {
-            if is_good {
-                break;
-            }
-            finer -= change;
-            coded = self.rounded(gaussians, finer);
-            self.descend(&mut coded, 0.0, self.passes, observer)?;
-            is_good = self.off(&coded, aim, observer)? <= 0.0;
-        }
-        self.trim(&mut coded, aim, observer)?;
-        Ok(coded)
+        let (coded, off) = best.expect("at least one was tried");
+        Ok((coded, off, search.at))
     }
 
     /// The first step to try: how long a file gets can nearly be told from rounding alone.
@@ -276,16 +290,17 @@ impl<'a> Coder<'a> {
         self.passes.div_ceil(4)
     }
 
-    /// Codes of a step after a few passes, and how far they are from an aim.
-    fn scouted(
+    /// Codes of a step after some passes, and how far they are from an aim.
+    fn passed(
         &self,
         gaussians: &[Gaussian],
         step: f64,
+        passes: u32,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(Coded, f64), EncodeError> {
         let mut coded = self.rounded(gaussians, step);
-        self.descend(&mut coded, 0.0, self.scouting_passes(), observer)?;
+        self.descend(&mut coded, 0.0, passes, observer)?;
         let off = self.off(&coded, aim, observer)?;
         Ok((coded, off))
     }
@@ -350,13 +365,13 @@ impl<'a> Coder<'a> {
     /// Removes the weakest Gaussians of a picture that is too good, as many as can be spared.
     fn trim(
         &self,
-        coded: &mut Coded,
+        mut coded: Coded,
+        mut off: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
-        let mut off = self.off(coded, aim, observer)?;
+    ) -> Result<Coded, EncodeError> {
         if off > 0.0 || aim.miss(off) == 0.0 {
-            return Ok(());
+            return Ok(coded);
         }
         coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
         // Those from `end` on cannot be spared, and likely not many more at a time.
@@ -368,7 +383,7 @@ impl<'a> Coder<'a> {
             fewer.codes.drain(start..end);
             let off_with_fewer = self.off(&fewer, aim, observer)?;
             if off_with_fewer <= 0.0 {
-                (*coded, off, end) = (fewer, off_with_fewer, start);
+                (coded, off, end) = (fewer, off_with_fewer, start);
             } else if portion > 1 {
                 portion /= 2;
             } else {
@@ -378,7 +393,7 @@ impl<'a> Coder<'a> {
                 break;
             }
         }
-        Ok(())
+        Ok(coded)
     }
 
     /// Rounds `gaussians` to the lattice of a step, given by its logarithm to base 2.

@@ -40,11 +40,6 @@ impl Aim {
         (below - off).max(0.0)
     }
 
-    /// Whether that is missed on the wrong side.
-    pub(crate) fn is_wrong(miss: f64) -> bool {
-        miss >= WRONG
-    }
-
     /// By how much `off` changes when all steps double.
     pub(crate) fn by_step(self) -> f64 {
         match self {

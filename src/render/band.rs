@@ -122,7 +122,7 @@ impl Load {
         self.entries = self.entries.wrapping_sub(other.entries);
     }
 
-    /// Bytes of a [`Band`], beside one word for each of the columns.
+    /// Bytes of a [`Band`], beside what the columns' own places take.
     fn memory(&self, columns: usize) -> u64 {
         let blocks = self.members.div_ceil(LANES as u64);
         let groups = self.entries + blocks * (columns as u64).min(MOST_TOGETHER.into());

@@ -115,27 +115,25 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
         let one = RenderOptions::new().parallel(false);
         let (rendered, held) = memory::peak(|| render(file, &one, &mut out));
         rendered?;
-        let mut whole = |options| seconds(|| render(file, &options, &mut out));
-        let nothing = RenderOptions::new().parallel(false).prefix(0);
+        let mut whole = |options| seconds(|| render(file, options, &mut out));
+        let nothing = one.clone().prefix(0);
         let mut stream = StreamDecoder::new();
         stream.feed(file)?;
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
-        let small = RenderOptions::new().parallel(false).size(width, height);
+        let small = one.clone().size(width, height);
         let samples = picture.rgb.len();
         let tenth = &file[..file.len() / 10];
-        let preview = RenderOptions::new()
-            .parallel(false)
-            .size(picture.width / PREVIEW, picture.height / PREVIEW);
+        let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
             coded.bytes,
             coded.distortion.psnr,
-            whole(one)?,
-            whole(RenderOptions::new())?,
+            whole(&one)?,
+            whole(&RenderOptions::new())?,
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut vec![0; samples])?))?,
             seconds(|| thumbnail(file, &small))?,
-            seconds(|| beginning(tenth, &RenderOptions::new().parallel(false)))?,
+            seconds(|| beginning(tenth, &one))?,
             seconds(|| beginning(tenth, &preview))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
             held,
