@@ -69,8 +69,8 @@ impl Model {
     #[inline(always)]
     pub(crate) fn update(&mut self, search: impl Search, symbol: usize) {
         let rate = RATES[usize::from(self.seen)];
-        self.seen = self.seen.saturating_add(1);
-        search.approach(&mut self.starts, &TARGETS[symbol], rate);
+        self.seen += u8::from(self.seen < SLOWER_AFTER[1]);
+        search.approach(&mut self.starts, &TARGETS[symbol % SYMBOLS], rate);
     }
 
     #[cfg(all(test, feature = "encode"))]
@@ -148,6 +148,7 @@ impl<'a, S: Search> Decoder<'a, S> {
     }
 
     /// Whether all bytes were used and led back to where the encoder began.
+    #[inline(always)]
     pub(crate) fn is_complete(&self) -> bool {
         !self.refused && self.used == self.words.len() && self.state == LEAST_STATE
     }
@@ -155,7 +156,12 @@ impl<'a, S: Search> Decoder<'a, S> {
     /// The next word; zeros after the last.
     #[inline(always)]
     fn next(&self) -> u32 {
-        self.words.get(self.used).map_or(0, |&word| u16::from_le_bytes(word).into())
+        // No `map_or`: it would also ask whether there is a reference.
+        if self.used < self.words.len() {
+            u16::from_le_bytes(self.words[self.used]).into()
+        } else {
+            0
+        }
     }
 
     /// Takes a word if the state needs one. Whether it does is as good as random, so there is no

@@ -121,8 +121,9 @@ fearless_simd::kernel!(
         use core::arch::x86_64 as arch;
 
         use arch::{
-            __m128i, _mm_cmpgt_epi16, _mm_cvtsi128_si32, _mm_min_epu16, _mm_minpos_epu16,
-            _mm_movemask_epi8, _mm_packs_epi16, _mm_set1_epi16, _mm_sub_epi16,
+            __m128i, _mm_cmpgt_epi16, _mm_cvtsi128_si32, _mm_max_epu16, _mm_min_epu16,
+            _mm_minpos_epu16, _mm_movemask_epi8, _mm_packs_epi16, _mm_set1_epi16, _mm_sub_epi16,
+            _mm_xor_si128,
         };
         use fearless_simd::i16x8;
 
@@ -132,18 +133,21 @@ fearless_simd::kernel!(
             let eight = starts[first..].first_chunk().expect("seventeen in all");
             i16x8::load_array_ref(avx2, eight).into()
         };
-        // Of what lies on the wrong side the distance wraps around to 2^15 and more.
-        let least = |a: __m128i, b: __m128i| {
-            let least = _mm_minpos_epu16(_mm_min_epu16(a, b));
-            _mm_cvtsi128_si32(least) as u32 & 0xffff
+        let least = |distances| {
+            let least = _mm_cvtsi128_si32(_mm_minpos_epu16(distances));
+            least as u32 & ((1 << SCALE_BITS) - 1)
         };
         let at = _mm_set1_epi16(share as i16);
         let (low, high) = (eight_from(0), eight_from(8));
-        let offset = least(_mm_sub_epi16(at, low), _mm_sub_epi16(at, high));
-        let next = _mm_set1_epi16((share + 1) as i16);
-        let rest = least(_mm_sub_epi16(low, next), _mm_sub_epi16(high, next));
-        // The last symbol's shares end with all.
-        let rest = rest.min((1 << SCALE_BITS) - 1 - share);
+        // How far each start lies before the share; of one that lies after it this wraps around, to
+        // 2^15 and more. All bits turned, it is how many shares lie between, and the other way
+        // round.
+        let (before_low, before_high) = (_mm_sub_epi16(at, low), _mm_sub_epi16(at, high));
+        let offset = least(_mm_min_epu16(before_low, before_high));
+        let turned = _mm_xor_si128(_mm_max_epu16(before_low, before_high), _mm_set1_epi16(-1));
+        // No start lies after the last symbol's shares: the largest distance is that from 0, and
+        // without its highest bit that to 2^15.
+        let rest = least(turned);
         let later = _mm_packs_epi16(_mm_cmpgt_epi16(low, at), _mm_cmpgt_epi16(high, at));
         let symbol = (SYMBOLS as u32 - 1) - (_mm_movemask_epi8(later) as u32).count_ones();
         Found { symbol, offset, size: offset + rest + 1 }

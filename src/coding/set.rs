@@ -318,6 +318,7 @@ impl<'a> SetCoding<'a> {
 }
 
 /// Refuses what a decoder refused, or did not read to its end.
+#[inline(always)]
 fn checked<S: Search>(decoder: &Decoder<'_, S>) -> Result<(), DecodeError> {
     if decoder.is_complete() {
         return Ok(());
@@ -368,9 +369,9 @@ fn signed(coder: &mut impl Coder, context: usize, shift: u32, value: i32) -> i32
     decoded << shift | plain(coder, shift, value as u32 & ((1 << shift) - 1)) as i32
 }
 
-/// Codes a number by its length (Elias, 1975).
-#[cold]
-#[inline(never)]
+/// Codes a number by its length (Elias, 1975). Rare, but what a function that stands apart has a
+/// reference to cannot stay in registers.
+#[inline(always)]
 fn excess(coder: &mut impl Coder, value: u32) -> u32 {
     let length = coder.symbol(context::EXCESS, value.saturating_add(1).ilog2().min(BEYOND));
     let low = plain(coder, length, value.wrapping_add(1) & ((1 << length) - 1));
