@@ -38,10 +38,10 @@ fn sums<S: Simd>(simd: S, gaussians: &[[f32; 8]]) -> [f32; 16] {
     let x = f32x16::from_fn(simd, |column| column as f32);
     for &[i11, w, i22, dx, dy, red, green, blue] in gaussians {
         let (u, slant) = ((x - dx) * i11, (x - dx) * w);
-        let squared = u * u;
+        let column = f32x16::splat(simd, 1.0) - u * u;
         for (row, sums) in sums.iter_mut().enumerate() {
             let v = slant + i22 * (row as f32 - dy);
-            let root = (f32x16::splat(simd, 1.0) - (squared + v * v) * 0.125).max(0.0);
+            let root = (column - v * v).max(0.0);
             let weight = root * root * (root * root);
             sums[0] += weight * red;
             sums[1] += weight * green;

@@ -260,7 +260,7 @@ trait TrainingKernel: Copy {
 impl TrainingKernel for kernel_simd::Exponential {
     #[inline(always)]
     fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let weight = kernel_simd::Weight::weight(self, simd, q);
+        let weight = self.at(simd, q);
         (weight, weight)
     }
 

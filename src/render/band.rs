@@ -7,6 +7,7 @@ use core::ops::Range;
 
 use super::footprint::LANES;
 use super::groups::{Group, Groups, MOST_TOGETHER};
+use super::kernel::Kernel;
 use super::splat::{Block, Splat};
 use super::tile::{Backend, TILE_PIXELS};
 use super::tiling::{Columns, Extent, Grid};
@@ -148,7 +149,7 @@ impl Band {
         band: usize,
         gaussians: &[Gaussian],
         view: &View,
-        cutoff: f32,
+        kernel: Kernel,
         backend: Backend,
     ) {
         let first = band * BAND_ROWS;
@@ -161,7 +162,7 @@ impl Band {
             let block = self.blocks.last_mut().expect("it was just added");
             for (splat, &index) in block.iter_mut().zip(members) {
                 if let Some(drawn) = Splat::new(&gaussians[index as usize], view) {
-                    *splat = drawn;
+                    *splat = drawn.scaled(kernel.scale());
                 }
             }
         }
@@ -172,7 +173,7 @@ impl Band {
         }
         let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
         let splats = self.blocks.as_flattened();
-        bands.grid.columns_of(backend, splats, cutoff, rows, |splat, row, columns| {
+        bands.grid.columns_of(backend, splats, kernel.cutoff(), rows, |splat, row, columns| {
             self.columns[row - first][splat / LANES] = *columns;
         });
     }

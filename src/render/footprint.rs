@@ -26,7 +26,7 @@ impl Ellipses {
     }
 }
 
-/// Outlines that hold every pixel at which a *computed* q is at most a cut-off: ellipses a little
+/// Outlines that hold every pixel with a *computed* weight where q is at most a cut-off: ellipses a little
 /// larger than that. One lane for each of several splats, for loops that become vector code.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footprints {

@@ -202,14 +202,7 @@ impl Job<'_> {
     /// Renders one band in the memory of an earlier one, and hands each tile over with its first
     /// column in the region and its first row in the band.
     fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
-        memory.fill(
-            &self.bands,
-            band,
-            self.gaussians,
-            &self.view,
-            self.kernel.cutoff(),
-            self.backend,
-        );
+        memory.fill(&self.bands, band, self.gaussians, &self.view, self.kernel, self.backend);
         match self.channels {
             1 => self.band_of::<1>(memory, band, write),
             2 => self.band_of::<2>(memory, band, write),

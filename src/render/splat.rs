@@ -5,8 +5,8 @@ use super::view::View;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
 
-/// One Gaussian in output pixels: q = (i11 dx)^2 + (w dx + i22 dy)^2 with
-/// (dx, dy) = pixel centre - (x, y) (spec, sections 9.2 and 9.3).
+/// One Gaussian in output pixels: at a distance of (dx, dy) from its centre (x, y) lies the point
+/// (u, v) = (i11 dx, w dx + i22 dy) of its kernel (spec, sections 9.2 and 9.3).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     pub(crate) x: f32,
@@ -82,11 +82,16 @@ impl Splat {
         Some((center, [wide11, wide21, wide22], Some(amplitude)))
     }
 
-    /// The squared Mahalanobis distance of the pixel centre (px, py).
-    pub(crate) fn q(&self, px: f32, py: f32) -> f32 {
+    /// The same with all distances multiplied.
+    #[inline(always)]
+    pub(super) fn scaled(self, scale: f32) -> Self {
+        let Self { i11, w, i22, .. } = self;
+        Self { i11: i11 * scale, w: w * scale, i22: i22 * scale, ..self }
+    }
+
+    /// Where the pixel centre (px, py) lies in the kernel.
+    pub(super) fn uv(&self, px: f32, py: f32) -> (f32, f32) {
         let (dx, dy) = (px - self.x, py - self.y);
-        let u = self.i11 * dx;
-        let v = self.w * dx + self.i22 * dy;
-        u * u + v * v
+        (self.i11 * dx, self.w * dx + self.i22 * dy)
     }
 }

@@ -89,7 +89,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
                 for column in 0..TILE_WIDTH {
                     let px = (self.origin.0 as usize + column) as f32 + 0.5;
                     let py = (self.origin.1 as usize + row) as f32 + 0.5;
-                    let weight = self.kernel.weight(splat.q(px, py));
+                    let weight = self.kernel.weight(splat.uv(px, py));
                     for (plane, color) in planes.iter_mut().zip(splat.color) {
                         plane[row][column] += color * weight;
                     }
@@ -112,14 +112,13 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         for (block, lane) in self.members {
             let splat = &self.blocks[block][lane];
             let dx = px - splat.x;
-            let u = dx * splat.i11;
-            let (u2, slant) = (u * u, dx * splat.w);
+            let (column, slant) = (kernel.column(simd, dx * splat.i11), dx * splat.w);
             // Through memory: a row takes its number from there within an addition, where taking it
             // from a register would need instructions that compete with the arithmetic.
             let shifts = core::hint::black_box(((py - splat.y) * splat.i22).to_array());
             for row in 0..TILE_HEIGHT {
                 let v = slant + shifts[row];
-                let weight = kernel.weight(simd, u2 + v * v);
+                let weight = kernel.weight(simd, column, v);
                 for (sums, color) in sums.iter_mut().zip(splat.color) {
                     sums[row] += weight * color;
                 }
@@ -201,7 +200,8 @@ mod tests {
             let view = View::new((64, 64), (64, 64), region);
             let splats = shapes.into_iter().filter_map(|([x, y], l11, l21, l22, color)| {
                 let center = [x + far as f32, y];
-                Splat::new(&Gaussian { center, cholesky: [l11, l21, l22], color }, &view)
+                let gaussian = Gaussian { center, cholesky: [l11, l21, l22], color };
+                Splat::new(&gaussian, &view)
             });
             let origin = (far + tile.0 * TILE_WIDTH as u32, tile.1 * TILE_HEIGHT as u32);
             (splats.collect(), origin, cutoff)

@@ -110,6 +110,8 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
         }
         let (i11, i22) = (1.0 / l11, 1.0 / l22);
         let w = -((l21 * i11) * i22);
+        let scale_of_kernel = if header.kernel == EXPONENTIAL { 1.0 } else { 0.353_553_38 };
+        let [i11, w, i22] = [i11, w, i22].map(|factor| factor * scale_of_kernel);
         let (x, y) = (center[0] * scale[0], center[1] * scale[1]);
         for row in 0..height {
             for column in 0..width {
@@ -117,12 +119,12 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
                 let dy = ((top + row) as f32 + 0.5) - y;
                 let u = i11 * dx;
                 let v = w * dx + i22 * dy;
-                let q = u * u + v * v;
                 let weight = if header.kernel == EXPONENTIAL {
+                    let q = u * u + v * v;
                     if q <= header.cutoff { exp(q * -0.5) } else { 0.0 }
                 } else {
-                    let t = if q < 8.0 { 1.0 - q * 0.125 } else { 0.0 };
-                    (t * t) * (t * t)
+                    let t = (1.0 - u * u) - v * v;
+                    if t > 0.0 { (t * t) * (t * t) } else { 0.0 }
                 };
                 for (plane, color) in planes.iter_mut().zip(&color) {
                     plane[(row * width + column) as usize] += color * weight;
