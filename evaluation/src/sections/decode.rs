@@ -122,7 +122,6 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = one.clone().size(width, height);
-        let samples = picture.rgb.len();
         let tenth = &file[..file.len() / 10];
         let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
@@ -131,10 +130,10 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
             whole(&one)?,
             whole(&RenderOptions::new())?,
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
-            seconds(|| Ok(picture_of().render_u8(&nothing, &mut vec![0; samples])?))?,
-            seconds(|| thumbnail(file, &small))?,
-            seconds(|| beginning(tenth, &one))?,
-            seconds(|| beginning(tenth, &preview))?,
+            seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
+            seconds(|| thumbnail(file, &small, &mut out))?,
+            seconds(|| beginning(tenth, &one, &mut out))?,
+            seconds(|| beginning(tenth, &preview, &mut out))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
             held,
             coded.report.gaussians.into(),
@@ -162,13 +161,14 @@ fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
     gip::median_seconds(REPEATS, work)
 }
 
-/// Decodes and renders as much of a file as shows.
-fn thumbnail(file: &[u8], options: &RenderOptions) -> Result<()> {
+/// Decodes and renders as much of a file as shows, into the first of the samples.
+fn thumbnail(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
     let mut decoder = Decoder::new(file)?;
     let (width, height) = options.output_size(decoder.header());
     decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
     let picture = decoder.picture();
-    Ok(picture.render_u8(options, &mut vec![0; picture.output_len(options)?])?)
+    let length = picture.output_len(options)?;
+    Ok(picture.render_u8(options, &mut samples[..length])?)
 }
 
 /// Decodes and renders a file.
@@ -178,11 +178,11 @@ fn render(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()
     Ok(decoder.decode_into(samples)?)
 }
 
-/// Decodes and renders what the beginning of a file has.
-fn beginning(bytes: &[u8], options: &RenderOptions) -> Result<()> {
+/// Decodes and renders what the beginning of a file has, into the first of the samples.
+fn beginning(bytes: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
     gip::open(bytes, |picture| {
-        let mut samples = vec![0; picture.output_len(options)?];
-        Ok(picture.render_u8(options, &mut samples)?)
+        let length = picture.output_len(options)?;
+        Ok(picture.render_u8(options, &mut samples[..length])?)
     })
 }
 
