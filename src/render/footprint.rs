@@ -26,8 +26,9 @@ impl Ellipses {
     }
 }
 
-/// Outlines that hold every pixel whose *computed* weight is not 0: ellipses a little larger than where
-/// q is at most a cut-off. One lane for each of several splats, for loops that become vector code.
+/// Outlines that hold every pixel whose *computed* weight is not 0: ellipses a little larger than
+/// where q is at most a cut-off. One lane for each of several splats, for loops that become vector
+/// code.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footprints {
     x: [f32; LANES],

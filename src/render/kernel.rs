@@ -48,7 +48,7 @@ impl Kernel {
         }
     }
 
-    /// The weight at a point at scaled distances; they may be infinite.
+    /// The weight at a point (u, v), in scaled distances, which may be infinite.
     pub(super) fn weight(self, (u, v): (f32, f32)) -> f32 {
         match self {
             Self::Exponential { cutoff } => {
