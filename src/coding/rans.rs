@@ -214,8 +214,9 @@ impl<S: Search> Coder for Decoder<'_, S> {
 #[derive(Debug)]
 pub(crate) struct Encoder<'a> {
     models: &'a mut [Model],
-    /// For each symbol its first share, how many it has, and out of how many as a power of two.
-    shares: Vec<(u16, u16, u8)>,
+    /// For each symbol its first share, how many it has, and out of how many as a power of two: in
+    /// pieces, since they take more memory than all else that a file is made from.
+    shares: Vec<Vec<(u16, u16, u8)>>,
 }
 
 #[cfg(feature = "encode")]
@@ -225,11 +226,19 @@ impl<'a> Encoder<'a> {
         Self { models, shares: Vec::new() }
     }
 
+    fn push(&mut self, share: (u16, u16, u8)) {
+        const PIECE: usize = 1 << 12;
+        if self.shares.last().is_none_or(|piece| piece.len() == PIECE) {
+            self.shares.push(Vec::with_capacity(PIECE));
+        }
+        self.shares.last_mut().expect("there is one now").push(share);
+    }
+
     /// The bytes.
     pub(crate) fn finish(self) -> Vec<u8> {
         let mut state = LEAST_STATE;
         let mut words: Vec<u16> = Vec::new();
-        for &(start, size, scale) in self.shares.iter().rev() {
+        for &(start, size, scale) in self.shares.iter().flatten().rev() {
             let (start, size, scale) = (u32::from(start), u64::from(size), u32::from(scale));
             if u64::from(state) >= size << (32 - scale) {
                 words.push(state as u16);
@@ -248,14 +257,14 @@ impl Coder for Encoder<'_> {
     fn symbol(&mut self, context: usize, symbol: u32) -> u32 {
         let model = &mut self.models[context];
         let (start, size) = shares_of(&model.starts, symbol as usize);
-        self.shares.push((start as u16, size as u16, SCALE_BITS as u8));
         model.update(Portable, symbol as usize);
+        self.push((start as u16, size as u16, SCALE_BITS as u8));
         symbol
     }
 
     fn bits(&mut self, count: u32, value: u32) -> u32 {
         assert!(count <= MAX_BITS && value >> count == 0, "a value wider than its bits");
-        self.shares.push((value as u16, 1, count as u8));
+        self.push((value as u16, 1, count as u8));
         value
     }
 

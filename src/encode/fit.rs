@@ -246,6 +246,8 @@ impl<'a> Fit<'a> {
         let view = View::identity(self.raster.width as u32, self.raster.height as u32);
         let (chart, quantizers) = (self.bounds.chart, &self.quantizers);
         let components = 5 + self.raster.channels;
+        self.splats.clear();
+        self.splats.reserve_exact(self.parameters.len());
         self.parameters
             .values
             .par_iter()
@@ -321,9 +323,8 @@ impl<'a> Fit<'a> {
         observer.poll()?;
         let newcomers = site.newcomers(count, &mut self.rng);
         observer.poll()?;
-        for row in newcomers {
-            self.parameters.push(row);
-        }
+        self.splats = Vec::new();
+        self.parameters.extend(&newcomers);
         self.parameters.sort();
         self.restarted();
         Ok(())
@@ -396,6 +397,7 @@ impl<'a> Fit<'a> {
         self.remember();
         self.binned_for = 0;
         self.pass.unbin();
+        self.splats = Vec::new();
         Ok(())
     }
 
@@ -408,7 +410,9 @@ impl<'a> Fit<'a> {
                 quantizers: None,
             });
             best.error = self.error;
-            best.rows.clone_from(&self.parameters.values);
+            best.rows.clear();
+            best.rows.reserve_exact(self.parameters.len());
+            best.rows.extend_from_slice(&self.parameters.values);
             best.quantizers.clone_from(&self.quantizers);
         }
     }

@@ -75,6 +75,8 @@ impl Pass {
     /// Says which splats touch which tile. Good for passes over the same splats while they change
     /// little, too: near the cut-off a splat weighs next to nothing.
     pub(crate) fn bin(&mut self, raster: &Raster, splats: &[Splat], kernel: Kernel) {
+        // Slots are most of what a Gaussian takes: they make room for what is needed meanwhile.
+        self.slots = Vec::new();
         self.ends.clear();
         self.ends.resize(splats.len(), 0);
         self.positions.clear();
@@ -94,10 +96,7 @@ impl Pass {
             last = last.max(*end);
             *end = last;
         }
-        let slots = self.positions.len() * slots_per_span(raster.channels);
-        // Little more than is needed: slots are most of what a Gaussian takes.
-        self.slots.reserve_exact((slots + slots / 8).saturating_sub(self.slots.len()));
-        self.slots.resize(slots, Slot::default());
+        self.slots = vec![Slot::default(); self.positions.len() * slots_per_span(raster.channels)];
     }
 
     /// Kernel evaluations of a pass with these bins.

@@ -86,10 +86,12 @@ impl Parameters {
         self.values.len()
     }
 
-    /// Adds a Gaussian.
-    pub(crate) fn push(&mut self, row: Row) {
-        self.values.push(row);
-        self.moments.push(Moments::NEW);
+    /// Adds Gaussians, and no room for more.
+    pub(crate) fn extend(&mut self, rows: &[Row]) {
+        self.values.reserve_exact(rows.len());
+        self.values.extend_from_slice(rows);
+        self.moments.reserve_exact(rows.len());
+        self.moments.resize(self.values.len(), Moments::NEW);
     }
 
     /// Goes back to other values, for as many Gaussians as they are; Adam starts anew.
