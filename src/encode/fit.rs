@@ -311,7 +311,7 @@ impl<'a> Fit<'a> {
             return Ok(());
         }
         // They are of no use to the new population, and room for the map of distortions.
-        self.pass.unbin();
+        self.unbin();
         let site = Site {
             options: &self.training.densification,
             filter: self.training.filter,
@@ -323,7 +323,6 @@ impl<'a> Fit<'a> {
         observer.poll()?;
         let newcomers = site.newcomers(count, &mut self.rng);
         observer.poll()?;
-        self.splats = Vec::new();
         self.parameters.extend(&newcomers);
         self.parameters.sort();
         self.restarted();
@@ -396,9 +395,14 @@ impl<'a> Fit<'a> {
         self.forward(observer)?;
         self.remember();
         self.binned_for = 0;
+        self.unbin();
+        Ok(())
+    }
+
+    /// Gives back what passes need and the next one makes anew.
+    fn unbin(&mut self) {
         self.pass.unbin();
         self.splats = Vec::new();
-        Ok(())
     }
 
     /// Keeps the values of the last pass if they are the best so far.
@@ -410,6 +414,7 @@ impl<'a> Fit<'a> {
                 quantizers: None,
             });
             best.error = self.error;
+            // Without room for more, which `clone_from` would take.
             best.rows.clear();
             best.rows.reserve_exact(self.parameters.len());
             best.rows.extend_from_slice(&self.parameters.values);
