@@ -394,12 +394,15 @@ impl StreamDecoder {
         let coding = SetCoding::new(lattice, header);
         let before = self.gaussians.len();
         let allowed = header.gaussians - before as u32;
+        let (count, bytes) = SetCoding::counted(payload, allowed)?;
         let gaussians = &mut self.gaussians;
-        let outcome =
-            coding.read(payload, allowed, models, self.account.as_mut(), |code, shape| {
-                grow(gaussians, 1, header.gaussians as usize);
-                gaussians.push(lattice.gaussian(&code, shape, &coding.grid, header.color));
-            });
+        // Room for all at once, as far as the bytes make it likely that they will come: moving from
+        // place to place takes longer than filling it.
+        grow(gaussians, count.min(bytes.len()), header.gaussians as usize);
+        let outcome = coding.read(count, bytes, models, self.account.as_mut(), |code, shape| {
+            grow(gaussians, 1, header.gaussians as usize);
+            gaussians.push(lattice.gaussian(&code, shape, &coding.grid, header.color));
+        });
         if outcome.is_err() {
             self.gaussians.truncate(before);
         }

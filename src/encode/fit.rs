@@ -18,7 +18,7 @@ use super::training::{Portion, Training};
 use super::{EncodeError, Precision};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::quantizer::Quantizer;
-use crate::render::{Splat, View};
+use crate::render::Splat;
 
 /// How much the error is expected to fall by training alone, once growth has ended.
 const FORESEEN: f64 = 0.75;
@@ -243,7 +243,6 @@ impl<'a> Fit<'a> {
 
     /// Renders what the file would hold now, and takes the gradient.
     fn forward(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let view = View::identity(self.raster.width as u32, self.raster.height as u32);
         let (chart, quantizers) = (self.bounds.chart, &self.quantizers);
         let components = 5 + self.raster.channels;
         self.splats.clear();
@@ -255,7 +254,7 @@ impl<'a> Fit<'a> {
             .map(|row| {
                 let row = decoded(quantizers.as_ref(), row);
                 let gaussian = Gaussian::from_components(&row[..components], chart);
-                Splat::new(&gaussian, &view).unwrap_or(Splat::NOWHERE)
+                Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
             })
             .collect_into_vec(&mut self.splats);
         let kernel = self.training.kernel;

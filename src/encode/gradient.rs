@@ -442,7 +442,6 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::gaussian::{Chart, Gaussian, MAX_COMPONENTS};
-    use crate::render::View;
     use crate::testing::simd_levels;
 
     const WIDTH: u32 = 37;
@@ -548,12 +547,11 @@ mod tests {
         kernel: Kernel,
         raster: &Raster,
     ) -> Vec<[f32; MAX_COMPONENTS]> {
-        let view = View::identity(WIDTH, HEIGHT);
         let splats: Vec<_> = rows
             .iter()
             .map(|row| {
                 let gaussian = Gaussian::from_components(&row[..5 + raster.channels], chart);
-                Splat::new(&gaussian, &view).expect("the scene is sound")
+                Splat::new(&gaussian).expect("the scene is sound")
             })
             .collect();
         let mut pass = Pass::new(raster);
@@ -626,12 +624,9 @@ mod tests {
         let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
         let raster = Raster::new(&source);
         let rows = scene(Chart::Cholesky, 3, &mut rng);
-        let view = View::identity(WIDTH, HEIGHT);
         let splats: Vec<_> = rows
             .iter()
-            .filter_map(|row| {
-                Splat::new(&Gaussian::from_components(&row[..8], Chart::Cholesky), &view)
-            })
+            .filter_map(|row| Splat::new(&Gaussian::from_components(&row[..8], Chart::Cholesky)))
             .collect();
         let run = |level| {
             let mut pass = Pass { level, ..Pass::new(&raster) };
@@ -666,7 +661,7 @@ mod tests {
         let raster = Raster::new(&source);
         let gaussian =
             Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
-        let splat = Splat::new(&gaussian, &View::identity(5, 3)).expect("it is sound");
+        let splat = Splat::new(&gaussian).expect("it is sound");
         let mut pass = Pass::new(&raster);
         let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
         assert_eq!(error, 0.0);

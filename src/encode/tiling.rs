@@ -1,8 +1,9 @@
 //! Which splats touch which row of tiles, rebuilt again and again while they move.
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
-use crate::render::{Backend, Grid, Region, Splat};
+use crate::render::{Grid, Region, Splat};
 
 /// Splats that one thread bins in one go.
 const PIECE: usize = 256;
@@ -38,8 +39,8 @@ impl Tiling {
             .enumerate()
             .map(|(piece, splats)| {
                 let mut placed = Vec::new();
-                let (backend, rows) = (Backend::fastest(), 0..grid.rows);
-                grid.columns_of(backend, splats, cutoff, rows, |block, row, [first, end]| {
+                let (level, rows) = (Level::new(), 0..grid.rows);
+                grid.columns_of(level, splats, cutoff, rows, |block, row, [first, end]| {
                     let first_splat = (piece * PIECE + block) as u32;
                     for (splat, (&first, &end)) in (first_splat..).zip(first.iter().zip(end)) {
                         if first < end {

@@ -5,12 +5,17 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+#[cfg(feature = "std")]
+use fearless_simd::dispatch;
+
 use super::footprint::LANES;
 use super::groups::{Group, Groups, MOST_TOGETHER};
 use super::kernel::Kernel;
-use super::splat::{Block, Splat};
+use super::splat::{Block, block_of};
 use super::tile::{Backend, TILE_PIXELS};
-use super::tiling::{Columns, Extent, Grid};
+#[cfg(feature = "std")]
+use super::tiling::truncated_at_once;
+use super::tiling::{Columns, Extent, Grid, truncated};
 use super::view::View;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
@@ -152,30 +157,51 @@ impl Band {
         kernel: Kernel,
         backend: Backend,
     ) {
+        match backend {
+            Backend::Reference => self.fill_with(bands, band, gaussians, view, kernel, truncated),
+            #[cfg(feature = "std")]
+            Backend::Simd(level) => dispatch!(level, simd => self.fill_with(
+                bands,
+                band,
+                gaussians,
+                view,
+                kernel,
+                #[inline(always)]
+                |values| truncated_at_once(simd, values),
+            )),
+        }
+    }
+
+    #[inline(always)]
+    fn fill_with(
+        &mut self,
+        bands: &Bands,
+        band: usize,
+        gaussians: &[Gaussian],
+        view: &View,
+        kernel: Kernel,
+        truncated: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
+    ) {
         let first = band * BAND_ROWS;
+        let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
         let members = &bands.members[bands.starts[band]..bands.starts[band + 1]];
         let blocks = members.len().div_ceil(LANES);
         self.blocks.clear();
         self.blocks.reserve_exact(blocks);
-        for members in members.chunks(LANES) {
-            self.blocks.push([Splat::NOWHERE; LANES]);
-            let block = self.blocks.last_mut().expect("it was just added");
-            for (splat, &index) in block.iter_mut().zip(members) {
-                if let Some(drawn) = Splat::new(&gaussians[index as usize], view) {
-                    *splat = drawn.scaled(kernel.scale());
-                }
-            }
-        }
         for columns in &mut self.columns {
             columns.clear();
             columns.reserve_exact(blocks);
             columns.resize(blocks, [[0; LANES]; 2]);
         }
-        let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
-        let splats = self.blocks.as_flattened();
-        bands.grid.columns_of(backend, splats, kernel.cutoff(), rows, |splat, row, columns| {
-            self.columns[row - first][splat / LANES] = *columns;
-        });
+        for (index, members) in members.chunks(LANES).enumerate() {
+            let gaussians = members.iter().map(|&index| &gaussians[index as usize]);
+            let (block, ellipses) = block_of(gaussians, view, kernel.scale());
+            self.blocks.push(block);
+            let rows = rows.clone();
+            bands.grid.columns_with(&ellipses, kernel.cutoff(), rows, truncated, |row, columns| {
+                self.columns[row - first][index] = *columns;
+            });
+        }
     }
 
     /// The splats of the band, and those of each tile of one of its rows, which has so many.

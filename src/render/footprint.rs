@@ -1,5 +1,9 @@
 //! Where splats may show: sixteen at a time, in plain loops over lanes that become vector code.
 
+#[cfg(feature = "encode")]
+use super::splat::Splat;
+use super::view::View;
+use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
 
 /// Splats whose footprints are found at the same time.
@@ -8,8 +12,8 @@ pub(super) const LANES: usize = 16;
 /// Centres and Cholesky factors, one lane for each of several ellipses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ellipses {
-    center: [[f32; LANES]; 2],
-    cholesky: [[f32; LANES]; 3],
+    pub(super) center: [[f32; LANES]; 2],
+    pub(super) cholesky: [[f32; LANES]; 3],
 }
 
 impl Ellipses {
@@ -17,12 +21,62 @@ impl Ellipses {
     pub(super) const NOWHERE: Self =
         Self { center: [[-4e9; LANES]; 2], cholesky: [[1.0; LANES], [0.0; LANES], [1.0; LANES]] };
 
+    /// A Gaussian in output pixels, not widened yet.
     #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, center: [f32; 2], cholesky: [f32; 3]) {
-        let [x, y] = &mut self.center;
-        (x[lane], y[lane]) = (center[0], center[1]);
+    pub(super) fn set(&mut self, lane: usize, gaussian: &Gaussian, view: &View) {
+        let [sx, sy] = view.scale;
+        let Gaussian { center: [cx, cy], cholesky: [l11, l21, l22], .. } = gaussian;
+        let ([x, y], [a, b, c]) = (&mut self.center, &mut self.cholesky);
+        (x[lane], y[lane]) = (cx * sx, cy * sy);
+        (a[lane], b[lane], c[lane]) = (l11 * sx, l21 * sy, l22 * sy);
+    }
+
+    #[cfg(feature = "encode")]
+    #[inline(always)]
+    pub(super) fn of(splats: &[Splat]) -> Self {
+        let mut all = Self::NOWHERE;
+        let ([x, y], [l11, l21, l22]) = (&mut all.center, &mut all.cholesky);
+        for (lane, splat) in splats.iter().enumerate() {
+            (x[lane], y[lane]) = (splat.x, splat.y);
+            [l11[lane], l21[lane], l22[lane]] = splat.cholesky;
+        }
+        all
+    }
+
+    /// Widens them by the filter of a view, if it has one. Returns by what that changes amplitudes:
+    /// it keeps the integral, so that they fall as the area grows (spec, section 9.2).
+    #[inline(always)]
+    pub(super) fn widen(&mut self, view: &View) -> [f32; LANES] {
+        let mut amplitudes = [1.0; LANES];
+        if view.filter == [0.0; 2] {
+            return amplitudes;
+        }
+        let [fx, fy] = view.filter;
         let [l11, l21, l22] = &mut self.cholesky;
-        (l11[lane], l21[lane], l22[lane]) = (cholesky[0], cholesky[1], cholesky[2]);
+        for lane in 0..LANES {
+            let (a, b, c) = (l11[lane], l21[lane], l22[lane]);
+            let wide11 = math::sqrt(a * a + fx);
+            let wide21 = (a * b) / wide11;
+            // yy + fy - wide21^2 without its cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
+            let rest = b / wide11;
+            let wide22 = math::sqrt((c * c + fy) + (rest * rest) * fx);
+            amplitudes[lane] = (a / wide11) * (c / wide22);
+            (l11[lane], l21[lane], l22[lane]) = (wide11, wide21, wide22);
+        }
+        amplitudes
+    }
+
+    /// The inverses (i11, w, i22) of the Cholesky factors, multiplied by `scale`.
+    #[inline(always)]
+    pub(super) fn inverse_cholesky(&self, scale: f32) -> [[f32; LANES]; 3] {
+        let [l11, l21, l22] = &self.cholesky;
+        let mut inverse = [[0.0; LANES]; 3];
+        let [i11, w, i22] = &mut inverse;
+        for lane in 0..LANES {
+            let [a, b, c] = inverse_cholesky([l11[lane], l21[lane], l22[lane]]);
+            (i11[lane], w[lane], i22[lane]) = (a * scale, b * scale, c * scale);
+        }
+        inverse
     }
 }
 

@@ -1,9 +1,10 @@
 //! A Gaussian as the inner loop wants it, and where on the output it may be visible.
 
-use super::footprint::LANES;
+use super::footprint::{Ellipses, LANES};
 use super::view::View;
-use crate::gaussian::{Gaussian, inverse_cholesky};
-use crate::math;
+use crate::gaussian::Gaussian;
+#[cfg(any(test, feature = "encode"))]
+use crate::gaussian::inverse_cholesky;
 
 /// One Gaussian in output pixels: at a distance of (dx, dy) from its centre (x, y) lies the point
 /// (u, v) = (i11 dx, w dx + i22 dy) of its kernel (spec, sections 9.2 and 9.3).
@@ -22,12 +23,35 @@ pub(crate) struct Splat {
 /// Splats that stand together in the file; at the end some that touch nothing.
 pub(crate) type Block = [Splat; LANES];
 
-/// A block of at most so many splats.
-#[cfg(all(test, feature = "std"))]
-pub(super) fn block_of(splats: &[Splat]) -> Block {
+/// The splats of at most so many Gaussians, all of which are drawn, with all distances multiplied by
+/// `scale`; and their outlines.
+#[inline(always)]
+pub(super) fn block_of<'a>(
+    gaussians: impl Iterator<Item = &'a Gaussian> + Clone,
+    view: &View,
+    scale: f32,
+) -> (Block, Ellipses) {
+    let mut ellipses = Ellipses::NOWHERE;
+    for (lane, gaussian) in gaussians.clone().enumerate() {
+        ellipses.set(lane, gaussian, view);
+    }
+    let amplitudes = ellipses.widen(view);
+    let inverse = ellipses.inverse_cholesky(scale);
+    let (Ellipses { center: [x, y], cholesky: [l11, l21, l22] }, [i11, w, i22]) =
+        (&ellipses, &inverse);
     let mut block = [Splat::NOWHERE; LANES];
-    block[..splats.len()].copy_from_slice(splats);
-    block
+    for (lane, (splat, gaussian)) in block.iter_mut().zip(gaussians).enumerate() {
+        *splat = Splat {
+            x: x[lane],
+            y: y[lane],
+            i11: i11[lane],
+            w: w[lane],
+            i22: i22[lane],
+            color: gaussian.color.map(|c| c * amplitudes[lane]),
+            cholesky: [l11[lane], l21[lane], l22[lane]],
+        };
+    }
+    (block, ellipses)
 }
 
 impl Splat {
@@ -42,51 +66,13 @@ impl Splat {
         cholesky: [1.0, 0.0, 1.0],
     };
 
-    /// `None` for a Gaussian that is not drawn.
+    /// A Gaussian in a picture of the stored size; `None` for one that is not drawn.
+    #[cfg(any(test, feature = "encode"))]
     #[inline(always)]
-    pub(crate) fn new(gaussian: &Gaussian, view: &View) -> Option<Self> {
-        let ([x, y], cholesky, amplitude) = Self::outline(gaussian, view)?;
+    pub(crate) fn new(gaussian: &Gaussian) -> Option<Self> {
+        let Gaussian { center: [x, y], cholesky, color } = *gaussian;
         let [i11, w, i22] = inverse_cholesky(cholesky);
-        let color = match amplitude {
-            Some(amplitude) => gaussian.color.map(|c| c * amplitude),
-            None => gaussian.color,
-        };
-        Some(Self { x, y, i11, w, i22, color, cholesky })
-    }
-
-    /// The centre and the Cholesky factor in output pixels, and by what widening changed the
-    /// amplitude, if anything. `None` for a Gaussian that is not drawn.
-    #[inline(always)]
-    pub(super) fn outline(
-        gaussian: &Gaussian,
-        view: &View,
-    ) -> Option<([f32; 2], [f32; 3], Option<f32>)> {
-        if !gaussian.is_drawable() {
-            return None;
-        }
-        let [sx, sy] = view.scale;
-        let center = [gaussian.center[0] * sx, gaussian.center[1] * sy];
-        let [l11, l21, l22] = gaussian.cholesky;
-        let [l11, l21, l22] = [l11 * sx, l21 * sy, l22 * sy];
-        if view.filter == [0.0; 2] {
-            return Some((center, [l11, l21, l22], None));
-        }
-        let [fx, fy] = view.filter;
-        let wide11 = math::sqrt(l11 * l11 + fx);
-        let wide21 = (l11 * l21) / wide11;
-        // yy + fy - wide21^2 without its cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
-        let rest = l21 / wide11;
-        let wide22 = math::sqrt((l22 * l22 + fy) + (rest * rest) * fx);
-        // Widening keeps the integral, so the amplitude falls as the area grows.
-        let amplitude = (l11 / wide11) * (l22 / wide22);
-        Some((center, [wide11, wide21, wide22], Some(amplitude)))
-    }
-
-    /// The same with all distances multiplied.
-    #[inline(always)]
-    pub(super) fn scaled(self, scale: f32) -> Self {
-        let Self { i11, w, i22, .. } = self;
-        Self { i11: i11 * scale, w: w * scale, i22: i22 * scale, ..self }
+        gaussian.is_drawable().then_some(Self { x, y, i11, w, i22, color, cholesky })
     }
 
     /// Where the pixel centre (px, py) lies in the kernel.

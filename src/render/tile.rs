@@ -150,8 +150,7 @@ mod tests {
     use crate::gaussian::Gaussian;
     use crate::render::footprint::LANES;
     use crate::render::groups::Group;
-    use crate::render::splat::{Splat, block_of};
-    use crate::render::view::{Region, View};
+    use crate::render::splat::Splat;
     use crate::testing::{config, simd_levels};
 
     /// How many values at a level have other bits than the reference's, and of how many.
@@ -161,7 +160,13 @@ mod tests {
         origin: (u32, u32),
         kernel: Kernel,
     ) -> [usize; 2] {
-        let blocks: Vec<Block> = splats.chunks(LANES).map(block_of).collect();
+        let blocks: Vec<Block> = (splats.chunks(LANES))
+            .map(|splats| {
+                let mut block = [Splat::NOWHERE; LANES];
+                block[..splats.len()].copy_from_slice(splats);
+                block
+            })
+            .collect();
         let groups: Vec<Group> =
             (0..=blocks.len() as u32).map(|block| Group { block, members: 0xffff }).collect();
         let members = Members::new(&groups);
@@ -196,12 +201,10 @@ mod tests {
         let cutoff = prop_oneof![Just(64.0_f32), Just(11.082_527), 0.001_f32..64.0];
         let far = prop_oneof![Just(0_u32), Just(1 << 22)];
         (shapes, (0_u32..4, 0_u32..8), far, cutoff).prop_map(|(shapes, tile, far, cutoff)| {
-            let region = Region { x: 0, y: 0, width: 64, height: 64 };
-            let view = View::new((64, 64), (64, 64), region);
             let splats = shapes.into_iter().filter_map(|([x, y], l11, l21, l22, color)| {
                 let center = [x + far as f32, y];
                 let gaussian = Gaussian { center, cholesky: [l11, l21, l22], color };
-                Splat::new(&gaussian, &view)
+                Splat::new(&gaussian)
             });
             let origin = (far + tile.0 * TILE_WIDTH as u32, tile.1 * TILE_HEIGHT as u32);
             (splats.collect(), origin, cutoff)

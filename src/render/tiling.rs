@@ -2,10 +2,13 @@
 
 use core::ops::Range;
 
+#[cfg(feature = "encode")]
+use fearless_simd::Level;
 #[cfg(feature = "std")]
 use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*};
 
 use super::footprint::{Ellipses, Footprints, LANES, larger, smaller};
+#[cfg(feature = "encode")]
 use super::splat::Splat;
 use super::tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
 use super::view::{Region, View};
@@ -34,60 +37,56 @@ impl Grid {
 
     /// Tells which tiles splats touch in some rows of tiles, if any: block by block of splats, the
     /// first of the block, and row by row.
+    #[cfg(feature = "encode")]
     pub(crate) fn columns_of(
         &self,
-        backend: Backend,
+        level: Level,
         splats: &[Splat],
         cutoff: f32,
         rows: Range<usize>,
-        tell: impl FnMut(usize, usize, &Columns),
+        mut tell: impl FnMut(usize, usize, &Columns),
     ) {
-        match backend {
-            Backend::Reference => self.columns_with(splats, cutoff, rows, truncated, tell),
-            #[cfg(feature = "std")]
-            Backend::Simd(level) => dispatch!(level, simd => self.columns_with(
-                splats,
-                cutoff,
-                rows,
-                #[inline(always)]
-                |values| truncated_at_once(simd, values),
-                tell,
-            )),
-        }
+        dispatch!(level, simd => {
+            for (block, splats) in splats.chunks(LANES).enumerate() {
+                self.columns_with(
+                    &Ellipses::of(splats),
+                    cutoff,
+                    rows.clone(),
+                    #[inline(always)]
+                    |values| truncated_at_once(simd, values),
+                    |row, columns| tell(block * LANES, row, columns),
+                );
+            }
+        });
     }
 
+    /// Tells which tiles ellipses touch in some rows of tiles, row by row, if any.
     #[inline(always)]
-    fn columns_with(
+    pub(super) fn columns_with(
         &self,
-        splats: &[Splat],
+        ellipses: &Ellipses,
         cutoff: f32,
         rows: Range<usize>,
         truncated: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
-        mut tell: impl FnMut(usize, usize, &Columns),
+        mut tell: impl FnMut(usize, &Columns),
     ) {
         let Region { x, y, width, height } = self.region;
-        for (block, splats) in splats.chunks(LANES).enumerate() {
-            let mut ellipses = Ellipses::NOWHERE;
-            for (lane, splat) in splats.iter().enumerate() {
-                ellipses.set(lane, [splat.x, splat.y], splat.cholesky);
+        let footprints = Footprints::new(ellipses, cutoff);
+        let [first_row, end_row] = tiles(footprints.rows(), y, height, TILE_HEIGHT, truncated);
+        let lowest = first_row.into_iter().fold(i32::MAX, i32::min) as usize;
+        let highest = end_row.into_iter().fold(0, i32::max) as usize;
+        for row in rows.start.max(lowest)..rows.end.min(highest) {
+            let top = y as f32 + (row * TILE_HEIGHT) as f32 + 0.5;
+            let ends = footprints.columns(top, top + (TILE_HEIGHT - 1) as f32);
+            let [first, end] = tiles(ends, x, width, TILE_WIDTH, truncated);
+            let mut columns = [[0; LANES]; 2];
+            for lane in 0..LANES {
+                let touched = first_row[lane] <= row as i32 && (row as i32) < end_row[lane];
+                let end = if touched { end[lane] } else { 0 };
+                columns[0][lane] = first[lane].min(end) as u32;
+                columns[1][lane] = end as u32;
             }
-            let footprints = Footprints::new(&ellipses, cutoff);
-            let [first_row, end_row] = tiles(footprints.rows(), y, height, TILE_HEIGHT, truncated);
-            let lowest = first_row.into_iter().fold(i32::MAX, i32::min) as usize;
-            let highest = end_row.into_iter().fold(0, i32::max) as usize;
-            for row in rows.start.max(lowest)..rows.end.min(highest) {
-                let top = y as f32 + (row * TILE_HEIGHT) as f32 + 0.5;
-                let ends = footprints.columns(top, top + (TILE_HEIGHT - 1) as f32);
-                let [first, end] = tiles(ends, x, width, TILE_WIDTH, truncated);
-                let mut columns = [[0; LANES]; 2];
-                for lane in 0..LANES {
-                    let touched = first_row[lane] <= row as i32 && (row as i32) < end_row[lane];
-                    let end = if touched { end[lane] } else { 0 };
-                    columns[0][lane] = first[lane].min(end) as u32;
-                    columns[1][lane] = end as u32;
-                }
-                tell(block * LANES, row, &columns);
-            }
+            tell(row, &columns);
         }
     }
 
@@ -123,10 +122,11 @@ impl Grid {
     ) -> [Extent; LANES] {
         let mut ellipses = Ellipses::NOWHERE;
         for (lane, gaussian) in gaussians.iter().enumerate() {
-            if let Some((center, cholesky, _)) = Splat::outline(gaussian, view) {
-                ellipses.set(lane, center, cholesky);
+            if gaussian.is_drawable() {
+                ellipses.set(lane, gaussian, view);
             }
         }
+        ellipses.widen(view);
         let footprints = Footprints::new(&ellipses, cutoff);
         let [first, end] =
             tiles(footprints.rows(), self.region.y, self.region.height, TILE_HEIGHT, truncated);
@@ -184,13 +184,13 @@ fn tiles(
 }
 
 /// Integers from numbers that are near enough to zero, rounded towards it.
-fn truncated(values: [f32; LANES]) -> [i32; LANES] {
+pub(super) fn truncated(values: [f32; LANES]) -> [i32; LANES] {
     values.map(|value| value as i32)
 }
 
 /// [`truncated`], all at once.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn truncated_at_once<S: Simd>(simd: S, values: [f32; LANES]) -> [i32; LANES] {
+pub(super) fn truncated_at_once<S: Simd>(simd: S, values: [f32; LANES]) -> [i32; LANES] {
     i32x16::truncate_from(f32x16::load_array(simd, values)).to_array()
 }

@@ -189,10 +189,4 @@ impl View {
         let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / 12.0 } else { 0.0 });
         Self { scale, filter, region }
     }
-
-    /// The whole picture at its stored size.
-    #[cfg(feature = "encode")]
-    pub(crate) fn identity(width: u32, height: u32) -> Self {
-        Self { scale: [1.0; 2], filter: [0.0; 2], region: Region { x: 0, y: 0, width, height } }
-    }
 }
