@@ -1,6 +1,7 @@
 //! The lattice of Gaussians that coding 1 can store: codes to values, with steps as fine as a
 //! Gaussian is strong (spec, sections 7.4 and 7.5).
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use byteorder::{ByteOrder, LittleEndian};
@@ -73,14 +74,19 @@ impl Exponentials {
     const CLASSES: u32 = 6;
 
     fn new(step: f32) -> Self {
-        let mut likely = Vec::new();
+        let mut likely = vec![0.0; (Self::LIKELY as usize) * ((1 << Self::CLASSES) - 1)];
         Backend::fastest().run(
             #[inline(always)]
             || {
+                let mut rest = likely.as_mut_slice();
                 for class in 0..Self::CLASSES {
                     let (count, step) = (Self::LIKELY << class, step * fineness(class));
+                    let (values, later) = rest.split_at_mut(count as usize);
+                    rest = later;
                     let first = -(count as i32 / 2);
-                    likely.extend((0..count as i32).map(|index| Self::exp(first + index, step)));
+                    for (code, value) in (first..).zip(values) {
+                        *value = Self::exp(code, step);
+                    }
                 }
             },
         );
