@@ -71,11 +71,13 @@ impl Groups {
     /// row.
     pub(crate) fn sort(&mut self, backend: Backend, columns: usize, blocks: &[Columns]) {
         match backend {
-            Backend::Reference => self.sort_with(columns, blocks, touching),
+            Backend::Reference => self.sort_with(columns, blocks, touched, touching),
             #[cfg(feature = "std")]
             Backend::Simd(level) => dispatch!(level, simd => self.sort_with(
                 columns,
                 blocks,
+                #[inline(always)]
+                |block| touched_at_once(simd, block),
                 #[inline(always)]
                 |block, tile| touching_at_once(simd, block, tile),
             )),
@@ -87,6 +89,7 @@ impl Groups {
         &mut self,
         columns: usize,
         blocks: &[Columns],
+        touched: impl Fn(&Columns) -> Range<u32>,
         touching: impl Fn(&Columns, u32) -> u32,
     ) {
         // First how many more groups a tile has than the one before it, then how many those before
@@ -97,6 +100,7 @@ impl Groups {
         for block in blocks {
             for_each_part(
                 block,
+                touched(block),
                 #[inline(always)]
                 |_, tiles: Range<u32>| {
                     starts[tiles.start as usize] = starts[tiles.start as usize].wrapping_add(1);
@@ -120,6 +124,7 @@ impl Groups {
         for (index, block) in (0..).zip(blocks) {
             for_each_part(
                 block,
+                touched(block),
                 #[inline(always)]
                 |part, tiles: Range<u32>| {
                     for tile in tiles {
@@ -142,17 +147,16 @@ impl Groups {
 /// Calls `each` with splats of a block, a bit for each, and the tiles that they may touch: all at
 /// once, or one by one where they are too far from each other.
 #[inline(always)]
-fn for_each_part([first, end]: &Columns, mut each: impl FnMut(u32, Range<u32>)) {
-    let (mut low, mut high) = (u32::MAX, 0);
-    for lane in 0..LANES {
-        low = low.min(if first[lane] < end[lane] { first[lane] } else { u32::MAX });
-        high = high.max(end[lane]);
-    }
-    if low >= high {
+fn for_each_part(
+    [first, end]: &Columns,
+    touched: Range<u32>,
+    mut each: impl FnMut(u32, Range<u32>),
+) {
+    if touched.is_empty() {
         return;
     }
-    if high - low <= MOST_TOGETHER {
-        each(u32::MAX, low..high);
+    if touched.end - touched.start <= MOST_TOGETHER {
+        each(u32::MAX, touched);
         return;
     }
     for lane in 0..LANES {
@@ -160,6 +164,25 @@ fn for_each_part([first, end]: &Columns, mut each: impl FnMut(u32, Range<u32>)) 
             each(1 << lane, first[lane]..end[lane]);
         }
     }
+}
+
+/// From the first tile that splats of a block touch to the last. Empty where none does.
+fn touched([first, end]: &Columns) -> Range<u32> {
+    let (mut low, mut high) = (u32::MAX, 0);
+    for lane in 0..LANES {
+        low = low.min(if first[lane] < end[lane] { first[lane] } else { u32::MAX });
+        high = high.max(end[lane]);
+    }
+    low..high
+}
+
+/// [`touched`], all at once.
+#[cfg(feature = "std")]
+#[inline(always)]
+fn touched_at_once<S: Simd>(simd: S, [first, end]: &Columns) -> Range<u32> {
+    let [first, end] = [first, end].map(|tiles| u32x16::load_array_ref(simd, tiles));
+    let none = u32x16::splat(simd, u32::MAX);
+    first.simd_lt(end).select(first, none).reduce_min()..end.reduce_max()
 }
 
 /// The splats of a block that touch a tile, a bit for each.
