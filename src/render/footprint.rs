@@ -31,6 +31,7 @@ impl Ellipses {
         (a[lane], b[lane], c[lane]) = (l11 * sx, l21 * sy, l22 * sy);
     }
 
+    /// Those of at most so many splats.
     #[cfg(feature = "encode")]
     #[inline(always)]
     pub(super) fn of(splats: &[Splat]) -> Self {

@@ -30,7 +30,7 @@ use band::{BAND_ROWS, Band, Bands};
 use output::Place;
 use tile::Tile;
 pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
-pub(crate) use view::View;
+use view::View;
 
 use crate::container::Header;
 use crate::error::{DecodeError, LimitKind};
