@@ -13,7 +13,7 @@ pub(super) const LANES: usize = 16;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ellipses {
     pub(super) center: [[f32; LANES]; 2],
-    pub(super) cholesky: [[f32; LANES]; 3],
+    cholesky: [[f32; LANES]; 3],
 }
 
 impl Ellipses {
@@ -36,11 +36,13 @@ impl Ellipses {
     #[inline(always)]
     pub(super) fn of(splats: &[Splat]) -> Self {
         let mut all = Self::NOWHERE;
-        let ([x, y], [l11, l21, l22]) = (&mut all.center, &mut all.cholesky);
+        let ([x, y], [i11, w, i22]) = (&mut all.center, &mut all.cholesky);
         for (lane, splat) in splats.iter().enumerate() {
             (x[lane], y[lane]) = (splat.x, splat.y);
-            [l11[lane], l21[lane], l22[lane]] = splat.cholesky;
+            (i11[lane], w[lane], i22[lane]) = (splat.i11, splat.w, splat.i22);
         }
+        // The inverse of the inverse.
+        all.cholesky = all.inverse_cholesky(1.0);
         all
     }
 

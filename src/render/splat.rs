@@ -3,7 +3,7 @@
 use super::footprint::{Ellipses, LANES};
 use super::view::View;
 use crate::gaussian::Gaussian;
-#[cfg(any(test, feature = "encode"))]
+#[cfg(any(feature = "encode", all(test, feature = "std")))]
 use crate::gaussian::inverse_cholesky;
 
 /// One Gaussian in output pixels: at a distance of (dx, dy) from its centre (x, y) lies the point
@@ -16,8 +16,6 @@ pub(crate) struct Splat {
     pub(crate) w: f32,
     pub(crate) i22: f32,
     pub(crate) color: [f32; 4],
-    /// The Cholesky factor in output pixels, for its footprint.
-    pub(super) cholesky: [f32; 3],
 }
 
 /// Splats that stand together in the file; at the end some that touch nothing.
@@ -37,8 +35,7 @@ pub(super) fn block_of<'a>(
     }
     let amplitudes = ellipses.widen(view);
     let inverse = ellipses.inverse_cholesky(scale);
-    let (Ellipses { center: [x, y], cholesky: [l11, l21, l22] }, [i11, w, i22]) =
-        (&ellipses, &inverse);
+    let ([x, y], [i11, w, i22]) = (&ellipses.center, &inverse);
     let mut block = [Splat::NOWHERE; LANES];
     for (lane, (splat, gaussian)) in block.iter_mut().zip(gaussians).enumerate() {
         *splat = Splat {
@@ -48,7 +45,6 @@ pub(super) fn block_of<'a>(
             w: w[lane],
             i22: i22[lane],
             color: gaussian.color.map(|c| c * amplitudes[lane]),
-            cholesky: [l11[lane], l21[lane], l22[lane]],
         };
     }
     (block, ellipses)
@@ -56,23 +52,16 @@ pub(super) fn block_of<'a>(
 
 impl Splat {
     /// A splat that touches no picture: in place of a Gaussian that is not drawn.
-    pub(crate) const NOWHERE: Self = Self {
-        x: -4e9,
-        y: -4e9,
-        i11: 1.0,
-        w: 0.0,
-        i22: 1.0,
-        color: [0.0; 4],
-        cholesky: [1.0, 0.0, 1.0],
-    };
+    pub(crate) const NOWHERE: Self =
+        Self { x: -4e9, y: -4e9, i11: 1.0, w: 0.0, i22: 1.0, color: [0.0; 4] };
 
     /// A Gaussian in a picture of the stored size; `None` for one that is not drawn.
-    #[cfg(any(test, feature = "encode"))]
+    #[cfg(any(feature = "encode", all(test, feature = "std")))]
     #[inline(always)]
     pub(crate) fn new(gaussian: &Gaussian) -> Option<Self> {
         let Gaussian { center: [x, y], cholesky, color } = *gaussian;
         let [i11, w, i22] = inverse_cholesky(cholesky);
-        gaussian.is_drawable().then_some(Self { x, y, i11, w, i22, color, cholesky })
+        gaussian.is_drawable().then_some(Self { x, y, i11, w, i22, color })
     }
 
     /// Where the pixel centre (px, py) lies in the kernel.
