@@ -149,6 +149,12 @@ impl Bench {
     }
 }
 
+/// The version of baselines whose times are compared with those of a codec: taken anew with every
+/// version of it, since only times of the same machine in the same state can be compared.
+pub(crate) fn beside(product: &str, versions: &str) -> String {
+    format!("{versions}, beside {product}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

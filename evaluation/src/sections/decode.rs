@@ -6,7 +6,7 @@ use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target}
 use super::rate::Files;
 use super::speed::nearest;
 use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
-use crate::bench::Bench;
+use crate::bench::{Bench, beside};
 use crate::gip;
 use crate::kernel;
 use crate::memory;
@@ -255,11 +255,12 @@ fn theirs(
         ["codec", "quality", "image"],
         ["bpp", "psnr", "decode_seconds"],
     )?;
+    let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let setting = nearest(other.settings, rate, |setting| {
         Ok(files.baseline(worker, &versions, other, setting, picture)?.rate)
     })?;
-    store.get(&versions, [other.id, setting, &picture.name], || {
+    store.get(&beside(&product, &versions), [other.id, setting, &picture.name], || {
         let coded = worker.code(other.id, setting, picture, Some(1), [1, REPEATS as u32])?;
         Ok([picture.rate(coded.bytes), coded.distortion.psnr, coded.decode_seconds])
     })

@@ -6,7 +6,7 @@ use image_gip::Target;
 use super::growth;
 use super::rate::Files;
 use crate::baselines::{BASELINES, DESCRIPTION};
-use crate::bench::Bench;
+use crate::bench::{Bench, beside};
 use crate::gip;
 use crate::pictures::Picture;
 use crate::plot::{Corner, Plot, Scale, Series};
@@ -122,7 +122,7 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         rows.push(row(baseline.name, &settings.join(", "), &pictures, |index, threads| {
             let (setting, picture) = (settings[index], &pictures[index]);
             let key = [baseline.id, setting, called(threads), &picture.name];
-            store.get(&versions, key, || {
+            store.get(&beside(&product, &versions), key, || {
                 let coded = worker.code(baseline.id, setting, picture, threads, [REPEATS; 2])?;
                 let times = [coded.encode_seconds, coded.decode_seconds];
                 Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
