@@ -41,17 +41,17 @@ use crate::container::Metadata;
 use crate::render::Kernel;
 
 /// Iterations by effort, from 1 to 9, and passes over the codes of coded Gaussians: where time is
-/// short, iterations gain more.
+/// short, iterations gain more, and in the end they gain little without the passes.
 const EFFORTS: [(u32, u32); 9] = [
     (60, 2),
     (90, 2),
     (180, 2),
     (300, 4),
     (600, 8),
-    (1_200, 8),
-    (2_400, 8),
-    (4_800, 8),
-    (9_600, 8),
+    (1_200, 12),
+    (2_400, 16),
+    (4_800, 16),
+    (9_600, 16),
 ];
 /// Fewest iterations where the error decides how many Gaussians there are: after fewer, it would take
 /// far too many.
