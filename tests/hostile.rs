@@ -5,6 +5,7 @@ mod common;
 use core::time::Duration;
 
 use cap::Cap;
+use common::memory::peak;
 use common::{
     CHOLESKY, Entry, File, Ghdr, RGB, RGBA, SIGNATURE, chunk, decode_pieces, decode_valid,
 };
@@ -21,18 +22,6 @@ static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
 fn alone() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-/// Bytes that are allocated while `work` runs, beyond those before, at their highest.
-fn peak<T>(work: impl FnOnce() -> T) -> (T, u64) {
-    // The peak cannot be set back; a block as large as the peak makes room above it.
-    let before = MEMORY.allocated();
-    let filler = vec![0_u8; MEMORY.max_allocated().saturating_sub(before) + 1];
-    let before = MEMORY.max_allocated();
-    let result = work();
-    let peak = MEMORY.max_allocated() - before;
-    drop(filler);
-    (result, peak as u64)
 }
 
 fn limits(change: impl FnOnce(&mut Limits)) -> Limits {
@@ -56,7 +45,7 @@ fn refusal(bytes: &[u8], limits: Limits) -> (LimitKind, u64, u64) {
 /// The same, with less than so many bytes held.
 #[track_caller]
 fn refusal_within(most: u64, bytes: &[u8], limits: Limits) -> (LimitKind, u64, u64) {
-    let ((_, result), peak) = peak(|| decode_pieces([bytes], limits));
+    let ((_, result), peak) = peak(&MEMORY, || decode_pieces([bytes], limits));
     match result.expect_err("a limit is exceeded") {
         DecodeError::Limit { kind, wanted, allowed } => {
             assert!(wanted > allowed && peak < most, "{kind}: {wanted}, {peak} bytes held");
@@ -99,7 +88,8 @@ fn declared_lengths_take_no_memory() {
     let most = (1_u32 << 31) - 1;
     for kind in [b"iCCP", b"tEXt", b"prVt"] {
         let bytes = [header(|_| ()).as_slice(), &most.to_le_bytes(), kind, &[b'x'; 5000]].concat();
-        let ((_, result), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::none()));
+        let ((_, result), peak) =
+            peak(&MEMORY, || decode_pieces([bytes.as_slice()], Limits::none()));
         assert!(result.expect_err("incomplete").is_unexpected_end());
         assert!(peak < 12_000, "{peak} bytes held");
     }
@@ -112,7 +102,8 @@ fn declared_lengths_take_no_memory() {
     let length = (4 + 6 * count / 8).to_le_bytes();
     let layer = [&length[..], b"GAUS", &count.to_le_bytes(), &[0xAA; 300]].concat();
     let bytes = [start, chunk(b"QNTZ", &entries), layer].concat();
-    let ((decoder, _), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::default()));
+    let ((decoder, _), peak) =
+        peak(&MEMORY, || decode_pieces([bytes.as_slice()], Limits::default()));
     assert_eq!(decoder.gaussians().len(), 400);
     assert!(peak < 60_000, "{peak} bytes held");
 }
@@ -125,7 +116,7 @@ fn a_layer_of_coding_1_takes_memory_as_it_arrives() {
     let most = (1_u32 << 31) - 1;
     let layer = [&most.to_le_bytes()[..], b"GAUS", &(1_u32 << 22).to_le_bytes(), &[7; 5000]];
     let bytes = [start.as_slice(), &layer.concat()].concat();
-    let ((_, result), peak) = peak(|| decode_pieces([bytes.as_slice()], Limits::none()));
+    let ((_, result), peak) = peak(&MEMORY, || decode_pieces([bytes.as_slice()], Limits::none()));
     assert!(result.expect_err("incomplete").is_unexpected_end());
     // Models of all contexts take 13 kB, tables of exponentials 8 kB, whatever the file.
     const HELD: u64 = 24_000;
@@ -200,7 +191,7 @@ fn the_memory_limit_holds() {
     let mut attempt = |max_memory: u64| {
         let limits = limits(|l| l.max_memory = max_memory);
         let options = RenderOptions::new().parallel(false);
-        peak(|| {
+        peak(&MEMORY, || {
             let mut decoder = StreamDecoder::with_limits(limits);
             decoder.feed(&bytes)?;
             decoder.picture().expect("a complete file").render_u8(&options, &mut out)
@@ -296,7 +287,7 @@ fn a_hostile_set_costs_no_more_than_its_limits_say() {
     let mut rendered = 0;
     for (name, bytes) in hostile_set() {
         let start = Instant::now();
-        let (_, peak) = peak(|| {
+        let (_, peak) = peak(&MEMORY, || {
             let (decoder, _) = decode_pieces([bytes.as_slice()], allowed.clone());
             // What came before the flaw can still be shown.
             let Some(picture) = decoder.picture() else { return };

@@ -2,9 +2,12 @@
 //! same time would count, too.
 #![cfg(feature = "encode")]
 
+mod common;
+
 use std::alloc::System;
 
 use cap::Cap;
+use common::memory::peak;
 use image_gip::{ColorModel, Encoder, Precision, Source, Target};
 
 #[global_allocator]
@@ -34,12 +37,8 @@ fn a_pixel_takes_40_bytes_and_a_gaussian_300() {
                 .with_target(Target::Gaussians(gaussians))
                 .with_precision(precision)
                 .with_threads(Some(2));
-            // The peak cannot be set back; a block as large as the peak makes room above it.
-            let filler = vec![0_u8; MEMORY.max_allocated() - MEMORY.allocated() + 1];
-            let before = MEMORY.max_allocated();
-            let encoded = encoder.encode(&source).expect("a sound picture");
-            let peak = (MEMORY.max_allocated() - before) as u64;
-            drop(filler);
+            let (encoded, peak) = peak(&MEMORY, || encoder.encode(&source));
+            let encoded = encoded.expect("a sound picture");
             let case = format!("{width}x{height}, {gaussians} Gaussians, {precision:?}");
             let found = encoded.report.gaussians;
             assert!(found > gaussians / 2, "{case}: only {found} are used");

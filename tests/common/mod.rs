@@ -6,6 +6,7 @@
 pub(crate) mod coding1;
 pub(crate) mod entropy;
 mod exp;
+pub(crate) mod memory;
 pub(crate) mod oracle;
 
 use coding1::Code;
