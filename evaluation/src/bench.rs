@@ -1,15 +1,15 @@
 //! What all sections share: pictures, stores, baselines, and the report.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::baselines::Worker;
 use crate::pictures::{self, Picture};
 use crate::sections::Section;
 use crate::store::Store;
-use crate::{gip, provenance};
+use crate::{gip, provenance, report};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
@@ -106,8 +106,9 @@ impl Bench {
         Ok((self.worker.insert(worker), versions))
     }
 
-    /// Writes the text of a section, with where it comes from, for this and later reports.
-    pub(crate) fn keep(&self, section: Section, text: &str) -> Result<()> {
+    /// Puts the text of a section into the report, with where it comes from. Returns the report's
+    /// path.
+    pub(crate) fn keep(&self, section: Section, text: &str) -> Result<PathBuf> {
         let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
         let mut from = format!(
             "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
@@ -126,25 +127,12 @@ impl Bench {
         if self.quick {
             from.push_str("- A quick run: few pictures and settings\n");
         }
-        fs::write(self.path(&section.file()), format!("## {}\n\n{from}\n{text}", section.title()))?;
-        Ok(())
-    }
-
-    /// Puts the report together from the sections that have been kept.
-    pub(crate) fn write_report(&self) -> Result<PathBuf> {
-        let mut report = String::from(
-            "# image-gip, measured\n\nWritten by `evaluation/`, whose README has the command. The \
-             run leaves every single measurement as CSV beside this file. Sizes are those of whole \
-             files. PSNR is over all samples of the decoded 8-bit RGB picture, unless stated \
-             otherwise.\n",
-        );
-        for section in Section::ALL {
-            if let Ok(text) = fs::read_to_string(self.path(&section.file())) {
-                report.push_str(&format!("\n{}\n", text.trim_end()));
-            }
-        }
         let path = self.path("report.md");
-        fs::write(&path, report)?;
+        let before = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+            before => before.with_context(|| format!("cannot read {}", path.display()))?,
+        };
+        fs::write(&path, report::with(&before, section, &format!("{from}\n{text}")))?;
         Ok(path)
     }
 }

@@ -9,6 +9,7 @@ mod memory;
 mod pictures;
 mod plot;
 mod provenance;
+mod report;
 mod sections;
 mod store;
 mod table;
@@ -63,10 +64,9 @@ fn main() -> Result<()> {
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
         let text = section.measure(&mut bench)?;
-        bench.keep(section, &text)?;
+        let report = bench.keep(section, &text)?;
+        eprintln!("{} (after {:.0} s)", report.display(), start.elapsed().as_secs_f64());
     }
-    let report = bench.write_report()?;
-    eprintln!("{} (after {:.0} s)", report.display(), start.elapsed().as_secs_f64());
     Ok(())
 }
 

@@ -63,11 +63,6 @@ impl Section {
         }
     }
 
-    /// Where its text is kept.
-    pub(crate) fn file(self) -> String {
-        format!("{self}.md")
-    }
-
     pub(crate) fn measure(self, bench: &mut Bench) -> Result<String> {
         match self {
             Self::Representation => representation::measure(bench),
