@@ -198,13 +198,11 @@ fn the_memory_limit_holds() {
         })
     };
     let mut succeeded = 0;
-    for max_memory in (0..30).map(|step| step * 400_000) {
+    for max_memory in (0..40).map(|step| step * 400_000) {
         let (result, peak) = attempt(max_memory);
         // The limit speaks of what grows with the file; the rest is a few kilobytes.
         assert!(peak <= max_memory + 20_000, "{peak} bytes held, {max_memory} allowed");
         match result {
-            // Still enough; more would change nothing.
-            Ok(()) if succeeded == 1 => return,
             Ok(()) => succeeded += 1,
             Err(DecodeError::Limit { kind: LimitKind::Memory, wanted, allowed }) => {
                 assert!(succeeded == 0 && wanted > allowed && allowed == max_memory);
@@ -212,7 +210,7 @@ fn the_memory_limit_holds() {
             Err(error) => panic!("{error}"),
         }
     }
-    panic!("the limit is far too strict");
+    assert!(succeeded > 10, "the limit is far too strict: {succeeded}");
 }
 
 #[test]
