@@ -16,7 +16,7 @@ pub(crate) fn with(report: &str, section: Section, text: &str) -> String {
     for each in Section::ALL {
         let text = if each == section { Some(text) } else { text_of(report, each) };
         if let Some(text) = text {
-            all.push_str(&format!("\n{}\n{}\n", heading(each), text.trim_end()));
+            all.push_str(&format!("{}{}\n", heading(each), text.trim_end()));
         }
     }
     all
@@ -24,13 +24,13 @@ pub(crate) fn with(report: &str, section: Section, text: &str) -> String {
 
 /// What a report has under a section's heading, up to the next of its kind.
 fn text_of(report: &str, section: Section) -> Option<&str> {
-    let (_, rest) = report.split_once(&format!("\n{}\n", heading(section)))?;
+    let (_, rest) = report.split_once(&heading(section))?;
     Some(rest.split_once("\n## ").map_or(rest, |(text, _)| text))
 }
 
-/// A line and what parts it from the text.
+/// A line, and the empty ones before and after it.
 fn heading(section: Section) -> String {
-    format!("## {}\n", section.title())
+    format!("\n## {}\n\n", section.title())
 }
 
 #[cfg(test)]
