@@ -132,7 +132,10 @@ impl Bench {
             Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             before => before.with_context(|| format!("cannot read {}", path.display()))?,
         };
-        fs::write(&path, report::with(&before, section, &format!("{from}\n{text}")))?;
+        // In its place once it is whole: the other sections are kept nowhere else.
+        let whole = self.path("report.md.new");
+        fs::write(&whole, report::with(&before, section, &format!("{from}\n{text}")))?;
+        fs::rename(whole, &path)?;
         Ok(path)
     }
 }
