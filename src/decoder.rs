@@ -396,8 +396,8 @@ impl StreamDecoder {
         let allowed = header.gaussians - before as u32;
         let (count, bytes) = SetCoding::counted(payload, allowed)?;
         let gaussians = &mut self.gaussians;
-        // Room for all at once, as far as the bytes make it likely that they will come: moving from
-        // place to place takes longer than filling it.
+        // Room for all at once, as far as the bytes make it likely that they will come: what moves
+        // as it grows is held twice meanwhile.
         grow(gaussians, count.min(bytes.len()), header.gaussians as usize);
         let outcome = coding.read(count, bytes, models, self.account.as_mut(), |code, shape| {
             grow(gaussians, 1, header.gaussians as usize);

@@ -24,6 +24,14 @@ use crate::limits::Limits;
 /// Rows of tiles in a band.
 pub(crate) const BAND_ROWS: usize = 4;
 
+/// What is drawn, and how it is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scene<'a> {
+    pub(crate) gaussians: &'a [Gaussian],
+    pub(crate) view: View,
+    pub(crate) kernel: Kernel,
+}
+
 /// Which Gaussians may show in which band.
 #[derive(Debug)]
 pub(crate) struct Bands {
@@ -37,14 +45,13 @@ impl Bands {
     /// Sorts Gaussians by band; `held` is what the caller already holds, in bytes, and `threads`
     /// how many will render.
     pub(crate) fn new(
-        gaussians: &[Gaussian],
-        view: &View,
-        cutoff: f32,
+        scene: &Scene<'_>,
         backend: Backend,
         limits: &Limits,
         held: u64,
         threads: usize,
     ) -> Result<Self, DecodeError> {
+        let Scene { gaussians, view, kernel } = scene;
         let grid = Grid::new(view.region);
         let bands = grid.rows.div_ceil(BAND_ROWS);
         let by_band = (bands as u64 + 1) * (size_of::<usize>() + size_of::<Load>()) as u64;
@@ -57,7 +64,7 @@ impl Bands {
         let mut reaches = Vec::with_capacity(gaussians.len());
         let mut work = 0;
         for gaussians in gaussians.chunks(LANES) {
-            let extents = grid.extents(backend, gaussians, view, cutoff);
+            let extents = grid.extents(backend, gaussians, view, kernel.cutoff());
             for &Extent { first, end, columns } in &extents[..gaussians.len()] {
                 work += u64::from(end - first) * u64::from(columns) * TILE_PIXELS as u64;
                 // Every band counts as work, so that hostile shapes cannot keep this loop busy.
@@ -148,24 +155,14 @@ pub(crate) struct Band {
 
 impl Band {
     /// Prepares the splats of a band, in the memory of an earlier one.
-    pub(crate) fn fill(
-        &mut self,
-        bands: &Bands,
-        band: usize,
-        gaussians: &[Gaussian],
-        view: &View,
-        kernel: Kernel,
-        backend: Backend,
-    ) {
+    pub(crate) fn fill(&mut self, bands: &Bands, band: usize, scene: &Scene<'_>, backend: Backend) {
         match backend {
-            Backend::Reference => self.fill_with(bands, band, gaussians, view, kernel, truncated),
+            Backend::Reference => self.fill_with(bands, band, scene, truncated),
             #[cfg(feature = "std")]
             Backend::Simd(level) => dispatch!(level, simd => self.fill_with(
                 bands,
                 band,
-                gaussians,
-                view,
-                kernel,
+                scene,
                 #[inline(always)]
                 |values| truncated_at_once(simd, values),
             )),
@@ -177,9 +174,7 @@ impl Band {
         &mut self,
         bands: &Bands,
         band: usize,
-        gaussians: &[Gaussian],
-        view: &View,
-        kernel: Kernel,
+        Scene { gaussians, view, kernel }: &Scene<'_>,
         truncated: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
     ) {
         let first = band * BAND_ROWS;

@@ -26,11 +26,10 @@ pub(crate) use tile::centers;
 #[cfg(feature = "encode")]
 pub(crate) use tiling::Grid;
 
-use band::{BAND_ROWS, Band, Bands};
+use band::{BAND_ROWS, Band, Bands, Scene};
 use output::Place;
 use tile::Tile;
 pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
-use view::View;
 
 use crate::container::Header;
 use crate::error::{DecodeError, LimitKind};
@@ -121,8 +120,8 @@ impl<'a> Picture<'a> {
         out: &mut [f32],
     ) -> Result<(), DecodeError> {
         let job = self.prepare(options, out.len())?;
-        let width = job.view.region.width as usize;
-        let pixels = width * job.view.region.height as usize;
+        let width = job.scene.view.region.width as usize;
+        let pixels = width * job.scene.view.region.height as usize;
         let mut planes: Vec<&mut [f32]> = out.chunks_exact_mut(pixels).collect();
         let mut strips = Vec::with_capacity(job.bands.count());
         for band in 0..job.bands.count() {
@@ -144,7 +143,7 @@ impl<'a> Picture<'a> {
 
     fn render<T: Sample>(&self, options: &RenderOptions, out: &mut [T]) -> Result<(), DecodeError> {
         let job = self.prepare(options, out.len())?;
-        let stride = job.view.region.width as usize * job.sources.len();
+        let stride = job.scene.view.region.width as usize * job.sources.len();
         let strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
         for_each(options.parallel, strips, |memory, (band, strip)| {
             job.band(memory, band, |planes, x, y| {
@@ -170,13 +169,11 @@ impl<'a> Picture<'a> {
         let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP;
         let (held, threads) = (self.held + strips, threads(options.parallel));
         let kernel = self.header.kernel;
-        let (cutoff, backend) = (kernel.cutoff(), options.backend);
-        let bands = Bands::new(gaussians, &view, cutoff, backend, self.limits, held, threads)?;
+        let (scene, backend) = (Scene { gaussians, view, kernel }, options.backend);
+        let bands = Bands::new(&scene, backend, self.limits, held, threads)?;
         Ok(Job {
-            gaussians,
-            view,
+            scene,
             bands,
-            kernel,
             channels: self.header.color.channels(),
             sources: output::sources(self.header.color, color),
             base: self.header.base(),
@@ -187,10 +184,8 @@ impl<'a> Picture<'a> {
 
 /// A rendering that was checked and can no longer fail.
 struct Job<'a> {
-    gaussians: &'a [Gaussian],
-    view: View,
+    scene: Scene<'a>,
     bands: Bands,
-    kernel: Kernel,
     channels: usize,
     /// See [`output::sources`].
     sources: &'static [Option<usize>],
@@ -202,7 +197,7 @@ impl Job<'_> {
     /// Renders one band in the memory of an earlier one, and hands each tile over with its first
     /// column in the region and its first row in the band.
     fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
-        memory.fill(&self.bands, band, self.gaussians, &self.view, self.kernel, self.backend);
+        memory.fill(&self.bands, band, &self.scene, self.backend);
         match self.channels {
             1 => self.band_of::<1>(memory, band, write),
             2 => self.band_of::<2>(memory, band, write),
@@ -221,13 +216,13 @@ impl Job<'_> {
         let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
         for row in 0..self.bands.rows(band) {
             let y = row * TILE_HEIGHT;
-            let top = self.view.region.y + (band * BAND_HEIGHT + y) as u32;
+            let top = self.scene.view.region.y + (band * BAND_HEIGHT + y) as u32;
             let (groups, blocks) = memory.row(self.backend, self.bands.columns(), row);
             for column in 0..self.bands.columns() {
                 let x = column * TILE_WIDTH;
-                let origin = (self.view.region.x + x as u32, top);
+                let origin = (self.scene.view.region.x + x as u32, top);
                 let members = groups.members(column);
-                Tile { origin, base, blocks, members, kernel: self.kernel }
+                Tile { origin, base, blocks, members, kernel: self.scene.kernel }
                     .render(self.backend, &mut planes);
                 write(&planes, x, y);
             }
