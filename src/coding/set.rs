@@ -224,28 +224,30 @@ impl<'a> SetCoding<'a> {
     #[inline(always)]
     fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {
         coder.begin(Attribute::Position);
-        let mut cells = alloc::vec![(self.grid.whole(), 0..count); MOST_CELLS];
-        let mut waiting = 1;
+        // How many Gaussians each has. Those that wait have none of those that are done.
+        let mut cells = [(self.grid.whole(), count as u32); MOST_CELLS];
+        let (mut waiting, mut done) = (1, 0);
         while waiting > 0 {
             waiting -= 1;
-            let (cell, Range { start, end }) = cells[waiting].clone();
-            let is_split = end - start > 1 || !self.grid.is_within_root(&cell);
+            let (cell, count) = cells[waiting];
+            let is_split = count > 1 || !self.grid.is_within_root(&cell);
             match self.grid.split(&cell).filter(|_| is_split) {
                 Some((axis, parts)) => {
-                    let first = members.partition(start..end, axis, parts[1].corner[axis]);
-                    let first = count_of(coder, (end - start) as u32, first as u32) as usize;
+                    let all = done..done + count as usize;
+                    let first = members.partition(all, axis, parts[1].corner[axis]);
+                    let first = count_of(coder, count, first as u32);
                     // The last one comes first. Whether one is empty is as good as random, so there
                     // is no branch to be foreseen.
-                    for (part, range) in [(1, start + first..end), (0, start..start + first)] {
-                        let is_empty = range.is_empty();
-                        cells[waiting] = (parts[part], range);
-                        waiting += usize::from(!is_empty);
+                    for (part, count) in [(1, count - first), (0, first)] {
+                        cells[waiting] = (parts[part], count);
+                        waiting += usize::from(count > 0);
                     }
                 }
                 None => {
-                    for index in start..end {
-                        let (code, shape) = self.gaussian(coder, &cell, members.get(index));
-                        members.set(index, code, &shape, &cell);
+                    for _ in 0..count {
+                        let (code, shape) = self.gaussian(coder, &cell, members.get(done));
+                        members.set(done, code, &shape, &cell);
+                        done += 1;
                     }
                 }
             }
