@@ -315,11 +315,29 @@ pub(crate) struct Grid {
     rows: u32,
 }
 
-/// A rectangle of the grid, in units.
+/// Several roots, in units.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Roots {
+    corner: [u32; 2],
+    sides: [u32; 2],
+}
+
+/// A root or a part of one: a square, or twice as high as wide.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
+    /// In units.
     pub(crate) corner: [u32; 2],
-    pub(crate) sides: [u32; 2],
+    /// Logarithm to base 2 of the area in square pixels.
+    pub(crate) level: u32,
+}
+
+/// Two parts of something, and the axis along which the second follows the first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Split<T> {
+    pub(crate) axis: usize,
+    /// Where the second begins along the axis.
+    pub(crate) middle: u32,
+    pub(crate) parts: [T; 2],
 }
 
 impl Grid {
@@ -331,35 +349,24 @@ impl Grid {
     }
 
     /// All of it.
-    pub(crate) fn whole(&self) -> Cell {
-        Cell { corner: [0; 2], sides: [self.columns * self.root, self.rows * self.root] }
+    pub(crate) fn whole(&self) -> Roots {
+        Roots { corner: [0; 2], sides: [self.columns * self.root, self.rows * self.root] }
     }
 
-    /// The longer side of a cell, where it is split, and the two parts. `None` for a pixel.
-    pub(crate) fn split(&self, cell: &Cell) -> Option<(usize, [Cell; 2])> {
-        let axis = usize::from(cell.sides[1] > cell.sides[0]);
-        let side = cell.sides[axis];
-        if side <= UNITS_PER_PIXEL {
-            return None;
+    /// Splits the longer side of several roots; gives the cell of a single one.
+    pub(crate) fn split(&self, roots: &Roots) -> Result<Split<Roots>, Cell> {
+        let Roots { corner, sides } = *roots;
+        let axis = usize::from(sides[1] > sides[0]);
+        if sides[axis] == self.root {
+            return Err(Cell { corner, level: 2 * (self.root / UNITS_PER_PIXEL).ilog2() });
         }
-        // Whole roots first.
-        let first =
-            if side > self.root { (side / self.root).div_ceil(2) * self.root } else { side / 2 };
-        // All ones along the axis. Which it is is as good as random, so there is no branch to be
-        // foreseen.
-        let along = [(axis as u32).wrapping_sub(1), 0_u32.wrapping_sub(axis as u32)];
-        let mut parts = [*cell; 2];
-        for (axis, along) in along.into_iter().enumerate() {
-            parts[0].sides[axis] -= (side - first) & along;
-            parts[1].sides[axis] -= first & along;
-            parts[1].corner[axis] += first & along;
-        }
-        Some((axis, parts))
-    }
-
-    /// Whether a cell lies within one root: its sides are powers of two then.
-    pub(crate) fn is_within_root(&self, cell: &Cell) -> bool {
-        cell.sides.iter().all(|&side| side <= self.root)
+        let first = (sides[axis] / self.root).div_ceil(2) * self.root;
+        let middle = corner[axis] + first;
+        let mut parts = [*roots; 2];
+        parts[0].sides[axis] = first;
+        parts[1].sides[axis] -= first;
+        parts[1].corner[axis] = middle;
+        Ok(Split { axis, middle, parts })
     }
 
     /// The point that a centre's units stand for, in pixels.
@@ -394,27 +401,40 @@ impl Grid {
 }
 
 impl Cell {
-    /// Logarithm to base 2 of the area in square pixels; for cells within a root.
-    pub(crate) fn level(&self) -> u32 {
-        self.sides.iter().map(|side| side.ilog2()).sum::<u32>() - 2 * UNITS_PER_PIXEL.ilog2()
+    /// Halves the longer side; `None` for a pixel.
+    pub(crate) fn split(&self) -> Option<Split<Self>> {
+        let level = self.level.checked_sub(1)?;
+        let [x, y] = self.corner;
+        let axis = (self.level % 2) as usize;
+        let half = 1 << (self.side(axis) - 1);
+        // Which axis it is is as good as random, so there is no branch to be foreseen.
+        let (right, down) = if axis == 0 { (half, 0) } else { (0, half) };
+        let corner = [x + right, y + down];
+        let parts = [self.corner, corner].map(|corner| Self { corner, level });
+        Some(Split { axis, middle: corner[axis], parts })
     }
 
-    /// How many bits a position within the cell takes along each axis, for cells within a root.
+    /// Logarithm to base 2 of a side in units.
+    fn side(&self, axis: usize) -> u32 {
+        (self.level + axis as u32) / 2 + UNITS_PER_PIXEL.ilog2()
+    }
+
+    /// How many bits a position within the cell takes along each axis.
     pub(crate) fn bits(&self, fineness: [i32; 2]) -> [u32; 2] {
         core::array::from_fn(|axis| {
-            let pixels = self.sides[axis].ilog2() as i32 - UNITS_PER_PIXEL.ilog2() as i32;
+            let pixels = self.side(axis) as i32 - UNITS_PER_PIXEL.ilog2() as i32;
             (pixels + fineness[axis]).max(0) as u32
         })
     }
 
     /// Which of 2^bits parts a unit lies in, along an axis.
     pub(crate) fn part(&self, axis: usize, bits: u32, unit: u32) -> u32 {
-        unit.wrapping_sub(self.corner[axis]) >> (self.sides[axis].ilog2() - bits)
+        unit.wrapping_sub(self.corner[axis]) >> (self.side(axis) - bits)
     }
 
     /// The middle of one of 2^bits parts along an axis.
     pub(crate) fn middle(&self, axis: usize, bits: u32, part: u32) -> u32 {
-        let shift = self.sides[axis].ilog2() - bits;
+        let shift = self.side(axis) - bits;
         self.corner[axis] + (part << shift) + (1 << shift >> 1)
     }
 }

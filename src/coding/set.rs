@@ -22,7 +22,7 @@ use super::search::Search;
 use super::tables;
 use crate::container::{ChunkType, Header};
 use crate::error::DecodeError;
-use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS, Shape};
+use crate::lattice::{self, Cell, Code, Grid, Lattice, MAX_CLASS, Shape, Split};
 
 /// Bytes of payload before the coded Gaussians: how many they are.
 pub(crate) const LAYER_PREFIX: usize = 4;
@@ -70,8 +70,8 @@ const FEW: usize = SYMBOLS;
 const BEYOND: u32 = SYMBOLS as u32 - 1;
 /// Signed symbols stand for -7 to 7.
 const SIGNED: i32 = 7;
-/// Cells that may wait: every split, of which each halves a side of 2^32 at most, leaves one more.
-const MOST_CELLS: usize = 2 * 32 + 2;
+/// Parts that may wait: every split, of which each halves a side of 2^32 at most, leaves one more.
+const MOST_WAITING: usize = 2 * 32 + 2;
 /// The size that a Gaussian is expected to have, from the level of the cell that it has for
 /// itself: logarithm for a pixel, and what every doubling of the area adds.
 const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
@@ -219,45 +219,74 @@ impl<'a> SetCoding<'a> {
         cost.bits
     }
 
-    /// Walks through the tree of cells, first parts first, and codes every Gaussian in the cell
-    /// that it has for itself.
+    /// Walks through the tree, first parts first: to every root that has Gaussians, and through its
+    /// cells.
     #[inline(always)]
     fn walk(&self, coder: &mut impl Coder, count: usize, members: &mut impl Members) {
         coder.begin(Attribute::Position);
-        // How many Gaussians each has. Those that wait have none of those that are done.
-        let mut cells = [(self.grid.whole(), count as u32); MOST_CELLS];
-        let (mut waiting, mut done) = (1, 0);
-        while waiting > 0 {
-            waiting -= 1;
-            let (cell, count) = cells[waiting];
-            let is_split = count > 1 || !self.grid.is_within_root(&cell);
-            match self.grid.split(&cell).filter(|_| is_split) {
-                Some((axis, parts)) => {
-                    let all = done..done + count as usize;
-                    let first = members.partition(all, axis, parts[1].corner[axis]);
-                    let first = count_of(coder, count, first as u32);
-                    // The last one comes first. Whether one is empty is as good as random, so there
-                    // is no branch to be foreseen.
-                    for (part, count) in [(1, count - first), (0, first)] {
-                        cells[waiting] = (parts[part], count);
-                        waiting += usize::from(count > 0);
+        // With how many Gaussians each has. Those that wait have none of those that are done.
+        let mut waiting = [(self.grid.whole(), count as u32); MOST_WAITING];
+        let (mut length, mut done) = (1, 0);
+        while length > 0 {
+            length -= 1;
+            let (roots, count) = waiting[length];
+            match self.grid.split(&roots) {
+                Ok(split) => {
+                    let counts = counts_of(coder, members, &split, done, count);
+                    // The last one comes first.
+                    for part in [1, 0] {
+                        waiting[length] = (split.parts[part], counts[part]);
+                        length += usize::from(counts[part] > 0);
                     }
                 }
-                None => {
-                    for _ in 0..count {
-                        let (code, shape) = self.gaussian(coder, &cell, members.get(done));
-                        members.set(done, code, &shape, &cell);
-                        done += 1;
-                    }
-                }
+                Err(root) => done = self.walk_root(coder, root, count, done, members),
             }
+        }
+    }
+
+    /// Walks through the cells of a root, and codes every Gaussian in the one that it has for
+    /// itself. `done` Gaussians came before; returns how many did in the end.
+    #[inline(always)]
+    fn walk_root(
+        &self,
+        coder: &mut impl Coder,
+        root: Cell,
+        count: u32,
+        mut done: usize,
+        members: &mut impl Members,
+    ) -> usize {
+        let mut waiting = [(root, 0); MOST_WAITING];
+        let mut length = 0;
+        let (mut cell, mut count) = (root, count);
+        loop {
+            while count > 1
+                && let Some(split) = cell.split()
+            {
+                let counts = counts_of(coder, members, &split, done, count);
+                // Whether a part is empty is as good as random, so there is no branch to be
+                // foreseen.
+                let next = usize::from(counts[0] == 0);
+                waiting[length] = (split.parts[1], counts[1]);
+                length += usize::from(counts[0] > 0 && counts[1] > 0);
+                (cell, count) = (split.parts[next], counts[next]);
+            }
+            for _ in 0..count {
+                let (code, shape) = self.gaussian(coder, &cell, members.get(done));
+                members.set(done, code, &shape, &cell);
+                done += 1;
+            }
+            if length == 0 {
+                return done;
+            }
+            length -= 1;
+            (cell, count) = waiting[length];
         }
     }
 
     /// Codes a Gaussian within a cell.
     #[inline(always)]
     fn gaussian(&self, coder: &mut impl Coder, cell: &Cell, known: Code) -> (Code, Shape) {
-        let mut code = self.attributes(coder, cell.level(), known);
+        let mut code = self.attributes(coder, cell.level, known);
         let shape = self.lattice.shape(&code);
         let fineness = self.lattice.fineness_of_position(code.class, &shape);
         coder.begin(Attribute::Position);
@@ -333,9 +362,23 @@ fn checked<S: Search>(decoder: &Decoder<'_, S>) -> Result<(), DecodeError> {
     Err(DecodeError::malformed(ChunkType::GAUS, "the coded Gaussians do not add up"))
 }
 
-/// Codes how many of `count` Gaussians are in the first part of a cell.
+/// Codes how many of `count` Gaussians are in each of two parts, after `done` others.
 #[inline(always)]
-fn count_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
+fn counts_of<T>(
+    coder: &mut impl Coder,
+    members: &mut impl Members,
+    split: &Split<T>,
+    done: usize,
+    count: u32,
+) -> [u32; 2] {
+    let first = members.partition(done..done + count as usize, split.axis, split.middle);
+    let first = first_of(coder, count, first as u32);
+    [first, count - first]
+}
+
+/// Codes how many of `count` Gaussians are in the first of two parts.
+#[inline(always)]
+fn first_of(coder: &mut impl Coder, count: u32, first: u32) -> u32 {
     const SHARES: u64 = SYMBOLS as u64;
     if count < FEW as u32 {
         let coded = coder.symbol(context::FEW + count as usize, first);
@@ -442,7 +485,7 @@ impl Members for Known<'_> {
 
     fn set(&mut self, index: usize, code: Code, _: &Shape, cell: &Cell) {
         self.codes[index] = code;
-        self.levels.push(cell.level());
+        self.levels.push(cell.level);
     }
 }
 
