@@ -11,7 +11,7 @@ use fearless_simd::dispatch;
 use super::footprint::LANES;
 use super::groups::{Group, Groups, MOST_TOGETHER};
 use super::kernel::Kernel;
-use super::splat::{Block, block_of};
+use super::splat::{Block, Splat, fill};
 use super::tile::{Backend, TILE_PIXELS};
 #[cfg(feature = "std")]
 use super::tiling::truncated_at_once;
@@ -183,15 +183,15 @@ impl Band {
         let blocks = members.len().div_ceil(LANES);
         self.blocks.clear();
         self.blocks.reserve_exact(blocks);
+        self.blocks.resize(blocks, [Splat::NOWHERE; LANES]);
         for columns in &mut self.columns {
             columns.clear();
             columns.reserve_exact(blocks);
             columns.resize(blocks, [[0; LANES]; 2]);
         }
-        for (index, members) in members.chunks(LANES).enumerate() {
+        for (index, (members, block)) in members.chunks(LANES).zip(&mut self.blocks).enumerate() {
             let gaussians = members.iter().map(|&index| &gaussians[index as usize]);
-            let (block, ellipses) = block_of(gaussians, view, kernel.scale());
-            self.blocks.push(block);
+            let ellipses = fill(block, gaussians, view, kernel.scale());
             let rows = rows.clone();
             bands.grid.columns_with(&ellipses, kernel.cutoff(), rows, truncated, |row, columns| {
                 self.columns[row - first][index] = *columns;

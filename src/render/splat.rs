@@ -21,14 +21,15 @@ pub(crate) struct Splat {
 /// Splats that stand together in the file; at the end some that touch nothing.
 pub(crate) type Block = [Splat; LANES];
 
-/// The splats of at most so many Gaussians, all of which are drawn, with all distances multiplied by
-/// `scale`; and their outlines.
+/// Puts the splats of at most so many Gaussians, all of which are drawn, first into a block, with all
+/// distances multiplied by `scale`. Returns their outlines.
 #[inline(always)]
-pub(super) fn block_of<'a>(
+pub(super) fn fill<'a>(
+    block: &mut Block,
     gaussians: impl Iterator<Item = &'a Gaussian> + Clone,
     view: &View,
     scale: f32,
-) -> (Block, Ellipses) {
+) -> Ellipses {
     let mut ellipses = Ellipses::NOWHERE;
     for (lane, gaussian) in gaussians.clone().enumerate() {
         ellipses.set(lane, gaussian, view);
@@ -36,7 +37,6 @@ pub(super) fn block_of<'a>(
     let amplitudes = ellipses.widen(view);
     let inverse = ellipses.inverse_cholesky(scale);
     let ([x, y], [i11, w, i22]) = (&ellipses.center, &inverse);
-    let mut block = [Splat::NOWHERE; LANES];
     for (lane, (splat, gaussian)) in block.iter_mut().zip(gaussians).enumerate() {
         *splat = Splat {
             x: x[lane],
@@ -47,7 +47,7 @@ pub(super) fn block_of<'a>(
             color: gaussian.color.map(|c| c * amplitudes[lane]),
         };
     }
-    (block, ellipses)
+    ellipses
 }
 
 impl Splat {
