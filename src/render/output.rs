@@ -1,7 +1,7 @@
 //! Float planes to samples (spec, sections 9.5 and 9.6).
 
 #[cfg(feature = "std")]
-use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u8x16, u8x64};
 
 use super::tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
 use crate::color::ColorModel;
@@ -19,6 +19,16 @@ pub(crate) trait Sample: Copy + Send {
     fn from_unit(value: f32) -> Self {
         Self::from_integer((value.clamp(0.0, 1.0) * Self::SCALE + 0.5) as i32)
     }
+
+    /// The pixels of a row of a tile, from the numbers that the samples of each channel can be.
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    fn pixels<S: Simd, const CHANNELS: usize>(
+        _: S,
+        channels: [i32x16<S>; CHANNELS],
+    ) -> [[Self; CHANNELS]; TILE_WIDTH] {
+        one_by_one(channels)
+    }
 }
 
 impl Sample for u8 {
@@ -28,6 +38,59 @@ impl Sample for u8 {
     fn from_integer(value: i32) -> Self {
         value as Self
     }
+
+    /// A word for each pixel: bytes that are put in place one by one become vector code on few
+    /// machines.
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    fn pixels<S: Simd, const CHANNELS: usize>(
+        simd: S,
+        channels: [i32x16<S>; CHANNELS],
+    ) -> [[Self; CHANNELS]; TILE_WIDTH] {
+        if CHANNELS < 3 {
+            return one_by_one(channels);
+        }
+        let mut words = channels[0];
+        for (channel, samples) in channels.into_iter().enumerate().skip(1) {
+            words |= samples << (8 * channel as u32);
+        }
+        let order = u8x64::block_splat(u8x16::load_array(simd, word_order(CHANNELS)));
+        let bytes = words.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(order).to_array();
+        let mut pixels = [[0; CHANNELS]; TILE_WIDTH];
+        let blocks = pixels.as_flattened_mut().chunks_exact_mut(4 * CHANNELS);
+        for (samples, bytes) in blocks.zip(bytes.as_chunks::<16>().0) {
+            samples.copy_from_slice(&bytes[..4 * CHANNELS]);
+        }
+        pixels
+    }
+}
+
+/// Of four words, each of a pixel with its first channel lowest: the bytes in the order of samples.
+#[cfg(feature = "std")]
+const fn word_order(channels: usize) -> [u8; 16] {
+    let mut order = [0; 16];
+    let mut place = 0;
+    while place < 4 * channels {
+        let byte = place % channels;
+        let byte = if cfg!(target_endian = "little") { byte } else { 3 - byte };
+        order[place] = (place / channels * 4 + byte) as u8;
+        place += 1;
+    }
+    order
+}
+
+#[cfg(feature = "std")]
+#[inline(always)]
+fn one_by_one<S: Simd, T: Sample, const CHANNELS: usize>(
+    channels: [i32x16<S>; CHANNELS],
+) -> [[T; CHANNELS]; TILE_WIDTH] {
+    let mut pixels = [[T::OPAQUE; CHANNELS]; TILE_WIDTH];
+    for (channel, samples) in channels.into_iter().enumerate() {
+        for (pixel, sample) in pixels.iter_mut().zip(samples.to_array()) {
+            pixel[channel] = T::from_integer(sample);
+        }
+    }
+    pixels
 }
 
 impl Sample for u16 {
@@ -88,69 +151,65 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
     place: Place<'_, T>,
 ) {
     match backend {
-        Backend::Reference => {
-            write_rows(planes, sources, place, |line| line.map(T::from_unit));
-        }
+        Backend::Reference => write_rows(place, |row| pixels(planes, sources, row)),
         #[cfg(feature = "std")]
-        Backend::Simd(level) => dispatch!(level, simd => {
-            write_rows(planes, sources, place, #[inline(always)] |line| samples(simd, line));
-        }),
+        Backend::Simd(level) => dispatch!(level, simd => write_rows(
+            place,
+            #[inline(always)]
+            |row| pixels_at_once(simd, planes, sources, row),
+        )),
     }
 }
 
 #[inline(always)]
 fn write_rows<T: Sample, const CHANNELS: usize>(
-    planes: &[Plane],
-    sources: [Option<usize>; CHANNELS],
     Place { x, rows, stride }: Place<'_, T>,
-    convert: impl Fn(&[f32; TILE_WIDTH]) -> [T; TILE_WIDTH],
+    pixels: impl Fn(usize) -> [[T; CHANNELS]; TILE_WIDTH],
 ) {
     let rows = rows.chunks_mut(stride).take(TILE_HEIGHT);
     let tiles = rows.map(|samples| samples[x * CHANNELS..].as_chunks_mut().0);
     if stride / CHANNELS - x >= TILE_WIDTH {
         // Nearly all: copies of known length.
         for (row, samples) in tiles.enumerate() {
-            *samples.first_chunk_mut().expect("a whole tile") =
-                interleaved(planes, sources, row, &convert);
+            *samples.first_chunk_mut().expect("a whole tile") = pixels(row);
         }
     } else {
         for (row, samples) in tiles.enumerate() {
-            let pixels = interleaved(planes, sources, row, &convert);
-            samples.copy_from_slice(&pixels[..samples.len()]);
+            samples.copy_from_slice(&pixels(row)[..samples.len()]);
         }
     }
 }
 
 /// The pixels of a row of a tile.
-#[inline(always)]
-fn interleaved<T: Sample, const CHANNELS: usize>(
+fn pixels<T: Sample, const CHANNELS: usize>(
     planes: &[Plane],
     sources: [Option<usize>; CHANNELS],
     row: usize,
-    convert: impl Fn(&[f32; TILE_WIDTH]) -> [T; TILE_WIDTH],
 ) -> [[T; CHANNELS]; TILE_WIDTH] {
-    let mut pixels = [[T::OPAQUE; CHANNELS]; TILE_WIDTH];
-    for (channel, source) in sources.into_iter().enumerate() {
-        if let Some(plane) = source {
-            let line = convert(&planes[plane][row]);
-            for (pixel, sample) in pixels.iter_mut().zip(line) {
-                pixel[channel] = sample;
-            }
-        }
-    }
-    pixels
+    let sample = |source: Option<usize>, column: usize| {
+        source.map_or(T::OPAQUE, |plane| T::from_unit(planes[plane][row][column]))
+    };
+    core::array::from_fn(|column| sources.map(|source| sample(source, column)))
 }
 
-/// [`Sample::from_unit`], sixteen at a time and bit for bit.
+/// [`pixels`], all at once and bit for bit.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn samples<S: Simd, T: Sample>(simd: S, line: &[f32; TILE_WIDTH]) -> [T; TILE_WIDTH] {
-    let scaled = f32x16::load_array_ref(simd, line).max(0.0).min(1.0) * T::SCALE + 0.5;
-    let mut samples = [T::OPAQUE; TILE_WIDTH];
-    for (sample, value) in samples.iter_mut().zip(i32x16::truncate_from(scaled).to_array()) {
-        *sample = T::from_integer(value);
+fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
+    simd: S,
+    planes: &[Plane],
+    sources: [Option<usize>; CHANNELS],
+    row: usize,
+) -> [[T; CHANNELS]; TILE_WIDTH] {
+    let mut channels = [i32x16::splat(simd, T::SCALE as i32); CHANNELS];
+    for (channel, source) in sources.into_iter().enumerate() {
+        if let Some(plane) = source {
+            let line = f32x16::load_array_ref(simd, &planes[plane][row]);
+            let scaled = line.max(0.0).min(1.0) * T::SCALE + 0.5;
+            channels[channel] = i32x16::truncate_from(scaled);
+        }
     }
-    samples
+    T::pixels(simd, channels)
 }
 
 /// Copies a tile to planes; (x, y) is its first pixel, `width` the length of a row.
