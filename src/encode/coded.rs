@@ -199,7 +199,7 @@ impl<'a> Coder<'a> {
         let step = self.first_step(gaussians, step, aim, observer)?;
         let (mut coded, mut off, step) = self.aimed(gaussians, step, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            self.shorten(&mut coded, bytes);
+            self.shorten(&mut coded, bytes, observer)?;
             return Ok(coded);
         }
         if aim.miss(off) > 0.0 {
@@ -338,6 +338,7 @@ impl<'a> Coder<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
+        observer.poll()?;
         let file = self.layout.write_set(coded);
         Ok(match aim {
             Aim::Size { most } => (file.len() as f64 / most).log2(),
@@ -351,10 +352,18 @@ impl<'a> Coder<'a> {
     }
 
     /// Removes the weakest Gaussians until the file has at most so many bytes.
-    fn shorten(&self, coded: &mut Coded, bytes: u64) {
+    fn shorten(
+        &self,
+        coded: &mut Coded,
+        bytes: u64,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         loop {
+            observer.poll()?;
             let size = self.layout.write_set(coded).len() as u64;
-            let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else { break };
+            let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else {
+                return Ok(());
+            };
             // Four bytes a Gaussian, and at least one.
             let count = excess.div_ceil(4).min(coded.codes.len() as u64) as usize;
             coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
@@ -432,6 +441,7 @@ impl<'a> Coder<'a> {
             }
         }
         // For the file's order and centres.
+        observer.poll()?;
         self.walked(coded);
         Ok(())
     }
