@@ -110,7 +110,8 @@ impl<'a> Picture<'a> {
     }
 
     /// Renders planes of `f32`, one after the other: all of the first channel, then all of the
-    /// second. 1.0 is a full sample; values are neither clamped nor rounded.
+    /// second. 1.0 is a full sample; values are neither clamped nor rounded. Where a source is
+    /// black or white they may lie far beyond: encoders know that integer samples are clamped.
     ///
     /// # Errors
     /// As [`Picture::render_u8`].
