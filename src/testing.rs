@@ -13,8 +13,9 @@ pub(crate) fn config(cases: u32) -> Config {
 #[cfg(feature = "std")]
 pub(crate) fn simd_levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();
-    let mut levels =
-        vec![("best", best), ("baseline", Level::baseline()), ("fallback", Level::fallback())];
+    let mut levels = vec![("best", best), ("baseline", Level::baseline())];
+    #[cfg(target_arch = "x86")]
+    levels.push(("fallback", Level::fallback()));
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
         let more = [

@@ -641,7 +641,7 @@ mod tests {
             });
             gradients.map(u64::from).chain([error.to_bits()]).collect()
         };
-        let expected = run(Level::fallback());
+        let expected = run(Level::baseline());
         assert!(expected.0 > 0.0);
         let expected = bits(expected);
         for (name, level) in simd_levels() {

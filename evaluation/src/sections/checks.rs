@@ -75,11 +75,11 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
          the formulas, for every parameter of twelve Gaussians (round ones, slanted ones, needles) \
          per cell. The largest error in f32, relative to the gradient's magnitude plus 0.1, from \
          the product's own tests.\n{}\nWorst: {worst:.1e} ({at}).\n\n### SIMD levels\n\nCompared \
-         with: scalar code, at every level that this machine has; `best` is what the codec takes \
-         here, `baseline` what it may take without asking the processor, `fallback` no SIMD at \
-         all. Samples are those of random Gaussians of every size, gradients those of the \
-         encoder's pass. All counts of differing values must be zero, from the product's own \
-         tests.\n{}\nLevels that differ: {}.\n",
+         with: scalar code for samples, the level that needs no asking of the processor for \
+         gradients, at every level that this machine has; `best` is what the codec takes here, \
+         `baseline` what it may take unasked. Samples are those of random Gaussians of every size, \
+         gradients those of the encoder's pass. All counts of differing values must be zero, from \
+         the product's own tests.\n{}\nLevels that differ: {}.\n",
         gradients.finish(),
         levels.finish(),
         list(unequal.into_iter()),
