@@ -94,6 +94,8 @@ mod quantizer;
 mod render;
 #[cfg(all(test, feature = "decode"))]
 mod testing;
+#[cfg(feature = "decode")]
+mod threads;
 
 #[cfg(all(feature = "encode", feature = "image"))]
 pub use crate::image::GipEncoder;

@@ -20,6 +20,7 @@ use super::view::View;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
+use crate::threads;
 
 /// Rows of tiles in a band.
 pub(crate) const BAND_ROWS: usize = 4;
@@ -32,34 +33,107 @@ pub(crate) struct Scene<'a> {
     pub(crate) kernel: Kernel,
 }
 
+/// Fewest Gaussians that are sorted by another thread.
+const LEAST_APART: usize = 512;
+
 /// Which Gaussians may show in which band.
 #[derive(Debug)]
 pub(crate) struct Bands {
     grid: Grid,
+    /// In file order, of some Gaussians each: one for each thread.
+    parts: Vec<Part>,
+}
+
+/// Which of some Gaussians may show in which band.
+#[derive(Debug)]
+struct Part {
     /// `members[starts[b]..starts[b + 1]]` are those of band b, in file order.
     starts: Vec<usize>,
     members: Vec<u32>,
 }
 
 impl Bands {
-    /// Sorts Gaussians by band; `held` is what the caller already holds, in bytes, and `threads`
-    /// how many will render.
+    /// Sorts Gaussians by band; `held` is what the caller already holds, in bytes.
     pub(crate) fn new(
         scene: &Scene<'_>,
         backend: Backend,
         limits: &Limits,
         held: u64,
-        threads: usize,
+        parallel: bool,
     ) -> Result<Self, DecodeError> {
-        let Scene { gaussians, view, kernel } = scene;
-        let grid = Grid::new(view.region);
+        let gaussians = scene.gaussians;
+        let grid = Grid::new(scene.view.region);
+        let threads = threads::count(parallel);
+        let apart = gaussians.len().div_ceil(threads).max(LEAST_APART).next_multiple_of(LANES);
+        let parts = gaussians.chunks(apart).map(|gaussians| Scene { gaussians, ..*scene });
         let bands = grid.rows.div_ceil(BAND_ROWS);
         let by_band = (bands as u64 + 1) * (size_of::<usize>() + size_of::<Load>()) as u64;
         let by_gaussian = gaussians.len() as u64 * size_of::<Range<u32>>() as u64;
-        let held = held + by_band + by_gaussian;
+        let held = held + by_band * parts.len() as u64 + by_gaussian;
         limits.check_memory(held)?;
-        let mut starts = vec![0_usize; bands + 1];
-        // By how much the load changes from one band to the next.
+        let reaches = threads::map(parallel, parts, |scene| {
+            Reaches::new(&scene, &grid, bands, backend, limits)
+        });
+        let reaches = reaches.into_iter().collect::<Result<Vec<_>, _>>()?;
+        limits.check_work(reaches.iter().map(|reaches| reaches.work).sum())?;
+        let mut loads = vec![Load::default(); reaches.len()];
+        let (mut members, mut most) = (0, 0);
+        for band in 0..bands {
+            for (load, reaches) in loads.iter_mut().zip(&reaches) {
+                load.add(reaches.changes[band]);
+            }
+            members += loads.iter().map(|load| load.members).sum::<u64>();
+            most = most.max(loads.iter().map(|load| load.memory(grid.columns)).sum());
+        }
+        let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<Group>();
+        let per_thread = most + columns as u64;
+        let memory = members * size_of::<u32>() as u64;
+        limits.check_memory(held + memory + per_thread * threads.min(bands) as u64)?;
+        let firsts = (0..).step_by(apart);
+        let parts = threads::map(parallel, reaches.into_iter().zip(firsts), |(reaches, first)| {
+            Part::new(&reaches, first)
+        });
+        Ok(Self { grid, parts })
+    }
+
+    /// The members of a band, in file order.
+    fn members(&self, band: usize) -> impl Iterator<Item = &[u32]> {
+        self.parts.iter().map(move |part| &part.members[part.starts[band]..part.starts[band + 1]])
+    }
+
+    pub(crate) fn columns(&self) -> usize {
+        self.grid.columns
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.grid.rows.div_ceil(BAND_ROWS)
+    }
+
+    /// How many rows of tiles a band has: the last one may have fewer.
+    pub(crate) fn rows(&self, band: usize) -> usize {
+        BAND_ROWS.min(self.grid.rows - band * BAND_ROWS)
+    }
+}
+
+/// In which bands some Gaussians may show.
+#[derive(Debug)]
+struct Reaches {
+    /// For each Gaussian.
+    bands: Vec<Range<u32>>,
+    /// By how much the load changes from one band to the next.
+    changes: Vec<Load>,
+    /// Most kernel evaluations.
+    work: u64,
+}
+
+impl Reaches {
+    fn new(
+        Scene { gaussians, view, kernel }: &Scene<'_>,
+        grid: &Grid,
+        bands: usize,
+        backend: Backend,
+        limits: &Limits,
+    ) -> Result<Self, DecodeError> {
         let mut changes = vec![Load::default(); bands + 1];
         let mut reaches = Vec::with_capacity(gaussians.len());
         let mut work = 0;
@@ -77,21 +151,25 @@ impl Bands {
                 reaches.push(reach);
             }
         }
-        let (mut total, mut most, mut load) = (0, 0, Load::default());
-        for (start, change) in starts.iter_mut().zip(changes) {
+        Ok(Self { bands: reaches, changes, work })
+    }
+}
+
+impl Part {
+    /// Sorts Gaussians, the `first` of which has this index.
+    fn new(reaches: &Reaches, first: u32) -> Self {
+        let (mut total, mut load) = (0, Load::default());
+        let starts = reaches.changes.iter().map(|&change| {
             load.add(change);
-            *start = total;
+            let start = total;
             total += load.members as usize;
-            most = most.max(load.memory(grid.columns));
-        }
-        let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<Group>();
-        let per_thread = most + columns as u64;
-        let memory = total as u64 * size_of::<u32>() as u64;
-        limits.check_memory(held + memory + per_thread * threads.min(bands) as u64)?;
+            start
+        });
+        let mut starts: Vec<usize> = starts.collect();
         let mut members = vec![0; total];
         // `starts[b]` runs through its band's members and ends where the next begins; shift it
         // back afterwards.
-        for (index, reach) in (0..).zip(&reaches) {
+        for (index, reach) in (first..).zip(&reaches.bands) {
             for start in &mut starts[reach.start as usize..reach.end as usize] {
                 members[*start] = index;
                 *start += 1;
@@ -99,20 +177,7 @@ impl Bands {
         }
         starts.rotate_right(1);
         starts[0] = 0;
-        Ok(Self { grid, starts, members })
-    }
-
-    pub(crate) fn columns(&self) -> usize {
-        self.grid.columns
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    /// How many rows of tiles a band has: the last one may have fewer.
-    pub(crate) fn rows(&self, band: usize) -> usize {
-        BAND_ROWS.min(self.grid.rows - band * BAND_ROWS)
+        Self { starts, members }
     }
 }
 
@@ -179,8 +244,7 @@ impl Band {
     ) {
         let first = band * BAND_ROWS;
         let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
-        let members = &bands.members[bands.starts[band]..bands.starts[band + 1]];
-        let blocks = members.len().div_ceil(LANES);
+        let blocks = bands.members(band).map(|members| members.len().div_ceil(LANES)).sum();
         self.blocks.clear();
         self.blocks.reserve_exact(blocks);
         self.blocks.resize(blocks, [Splat::NOWHERE; LANES]);
@@ -189,7 +253,8 @@ impl Band {
             columns.reserve_exact(blocks);
             columns.resize(blocks, [[0; LANES]; 2]);
         }
-        for (index, (members, block)) in members.chunks(LANES).zip(&mut self.blocks).enumerate() {
+        let members = bands.members(band).flat_map(|members| members.chunks(LANES));
+        for (index, (members, block)) in members.zip(&mut self.blocks).enumerate() {
             let gaussians = members.iter().map(|&index| &gaussians[index as usize]);
             let ellipses = fill(block, gaussians, view, kernel.scale());
             let rows = rows.clone();

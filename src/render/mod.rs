@@ -35,6 +35,7 @@ use crate::container::Header;
 use crate::error::{DecodeError, LimitKind};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
+use crate::threads;
 
 /// Rows of pixels in a band.
 const BAND_HEIGHT: usize = BAND_ROWS * TILE_HEIGHT;
@@ -134,7 +135,7 @@ impl<'a> Picture<'a> {
             });
             strips.push((band, strip.collect::<Vec<_>>()));
         }
-        for_each(options.parallel, strips, |memory, (band, mut strip)| {
+        threads::for_each(options.parallel, strips, |memory: &mut Band, (band, mut strip)| {
             job.band(memory, band, |planes, x, y| {
                 output::write_planes(planes, (x, y), job.sources, &mut strip, width);
             });
@@ -146,7 +147,7 @@ impl<'a> Picture<'a> {
         let job = self.prepare(options, out.len())?;
         let stride = job.scene.view.region.width as usize * job.sources.len();
         let strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
-        for_each(options.parallel, strips, |memory, (band, strip)| {
+        threads::for_each(options.parallel, strips, |memory: &mut Band, (band, strip)| {
             job.band(memory, band, |planes, x, y| {
                 let place = Place { x, rows: &mut strip[y * stride..], stride };
                 output::write_interleaved(job.backend, planes, job.sources, place);
@@ -168,10 +169,9 @@ impl<'a> Picture<'a> {
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
         let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP;
-        let (held, threads) = (self.held + strips, threads(options.parallel));
-        let kernel = self.header.kernel;
+        let (held, kernel) = (self.held + strips, self.header.kernel);
         let (scene, backend) = (Scene { gaussians, view, kernel }, options.backend);
-        let bands = Bands::new(&scene, backend, self.limits, held, threads)?;
+        let bands = Bands::new(&scene, backend, self.limits, held, options.parallel)?;
         Ok(Job {
             scene,
             bands,
@@ -229,47 +229,4 @@ impl Job<'_> {
             }
         }
     }
-}
-
-/// How many threads [`for_each`] uses.
-fn threads(parallel: bool) -> usize {
-    #[cfg(feature = "rayon")]
-    if parallel {
-        return rayon::current_num_threads();
-    }
-    let _ = parallel;
-    1
-}
-
-/// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
-/// lends its memory from one item to the next.
-fn for_each<T: Send>(parallel: bool, items: Vec<T>, work: impl Fn(&mut Band, T) + Send + Sync) {
-    #[cfg(feature = "rayon")]
-    if parallel {
-        on_threads(items, work);
-        return;
-    }
-    let _ = parallel;
-    let mut memory = Band::default();
-    items.into_iter().for_each(|item| work(&mut memory, item));
-}
-
-#[cfg(feature = "rayon")]
-fn on_threads<T: Send>(items: Vec<T>, work: impl Fn(&mut Band, T) + Send + Sync) {
-    let others = threads(true).min(items.len()).saturating_sub(1);
-    let items = std::sync::Mutex::new(items.into_iter());
-    let next = || items.lock().expect("taking an item does not panic").next();
-    let run = || {
-        let mut memory = Band::default();
-        while let Some(item) = next() {
-            work(&mut memory, item);
-        }
-    };
-    // Threads of the pool may have to wake up first; this one does not wait for them.
-    rayon::in_place_scope(|scope| {
-        for _ in 0..others {
-            scope.spawn(|_| run());
-        }
-        run();
-    });
 }

@@ -1,0 +1,91 @@
+//! Work on this thread alone, or also on others of the current `rayon` pool.
+
+use alloc::vec::Vec;
+#[cfg(feature = "rayon")]
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+/// How many threads [`for_each`] uses at most.
+pub(crate) fn count(parallel: bool) -> usize {
+    #[cfg(feature = "rayon")]
+    if parallel {
+        return rayon::current_num_threads();
+    }
+    let _ = parallel;
+    1
+}
+
+/// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
+/// lends its memory from one item to the next.
+pub(crate) fn for_each<M: Default, T: Send>(
+    parallel: bool,
+    items: Vec<T>,
+    work: impl Fn(&mut M, T) + Send + Sync,
+) {
+    #[cfg(feature = "rayon")]
+    if parallel && items.len() > 1 {
+        on_threads(items, work);
+        return;
+    }
+    let _ = parallel;
+    let mut memory = M::default();
+    items.into_iter().for_each(|item| work(&mut memory, item));
+}
+
+/// What `work` makes of every item, in their order.
+pub(crate) fn map<T: Send, R: Send>(
+    parallel: bool,
+    items: impl Iterator<Item = T>,
+    work: impl Fn(T) -> R + Send + Sync,
+) -> Vec<R> {
+    let items: Vec<T> = items.collect();
+    let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
+    let items = items.into_iter().zip(&mut results).collect();
+    for_each(parallel, items, |(): &mut (), (item, result)| *result = Some(work(item)));
+    results.into_iter().map(|result| result.expect("every item was worked on")).collect()
+}
+
+/// Counts a thread as busy as long as it lives.
+#[cfg(feature = "rayon")]
+struct Busy<'a>(&'a AtomicUsize);
+
+#[cfg(feature = "rayon")]
+impl<'a> Busy<'a> {
+    fn new(threads: &'a AtomicUsize) -> Self {
+        threads.fetch_add(1, Ordering::Relaxed);
+        Self(threads)
+    }
+}
+
+#[cfg(feature = "rayon")]
+impl Drop for Busy<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[cfg(feature = "rayon")]
+fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send + Sync) {
+    let others = count(true).min(items.len()).saturating_sub(1);
+    let items = std::sync::Mutex::new(items.into_iter());
+    let next = || items.lock().expect("taking an item does not panic").next();
+    let busy = AtomicUsize::new(0);
+    let run = || {
+        let _busy = Busy::new(&busy);
+        let mut memory = M::default();
+        while let Some(item) = next() {
+            work(&mut memory, item);
+        }
+    };
+    // Threads of the pool may have to wake up first; this one does not wait for them.
+    rayon::in_place_scope(|scope| {
+        for _ in 0..others {
+            scope.spawn(|_| run());
+        }
+        run();
+        // What is left is under way and soon done. To fall asleep until then takes longer, and so
+        // does it to wake up the others for what comes next.
+        while busy.load(Ordering::Relaxed) > 0 {
+            std::thread::yield_now();
+        }
+    });
+}
