@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::coding::account::AttributeBits;
 use crate::coding::fixed::LayerReader;
-use crate::coding::set::{Models, SetCoding};
+use crate::coding::layers::Layers;
 use crate::container::{ChunkType, Coding, Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
@@ -20,7 +20,7 @@ const MAX_SMALL_CHUNK: u32 = 108;
 /// Most types that [`StreamDecoder::chunks`] tells apart: types are the file's own choice.
 const MAX_CHUNK_KINDS: usize = 64;
 
-/// Decodes bytes as they arrive, in pieces of any size.
+/// Decodes bytes as they arrive, in pieces of any size, on the caller's thread.
 ///
 /// After any piece it can give the [`Picture`] so far. It allocates as bytes arrive, never on the
 /// word of a declared count.
@@ -51,7 +51,9 @@ pub struct StreamDecoder {
     /// Of coding 0.
     quantizers: Vec<Quantizer>,
     /// Of coding 1.
-    lattice: Option<(Lattice, Models)>,
+    lattice: Option<Lattice>,
+    /// Layers of coding 1 that have arrived and were not decoded yet.
+    waiting: Layers,
     metadata: Metadata,
     gaussians: Vec<Gaussian>,
     /// Bits of the Gaussians of coding 1, where asked for.
@@ -117,6 +119,7 @@ impl StreamDecoder {
             header: None,
             quantizers: Vec::new(),
             lattice: None,
+            waiting: Layers::default(),
             metadata: Metadata::default(),
             gaussians: Vec::new(),
             account: None,
@@ -169,8 +172,14 @@ impl StreamDecoder {
     /// or exceeds a limit. The decoder cannot go on then, but [`StreamDecoder::picture`] still
     /// gives what had been decoded; Gaussians of a layer whose CRC is wrong are dropped.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<usize, DecodeError> {
+        self.take(bytes, false)
+    }
+
+    /// Like [`StreamDecoder::feed`], but layers of coding 1 may have to wait for
+    /// [`StreamDecoder::decode_waiting`].
+    fn take(&mut self, bytes: &[u8], may_wait: bool) -> Result<usize, DecodeError> {
         let mut input = bytes;
-        match self.advance(&mut input) {
+        match self.advance(&mut input, may_wait) {
             Ok(()) => Ok(bytes.len() - input.len()),
             Err(error) => {
                 if let Stage::Layer(_, before) = self.stage {
@@ -217,7 +226,7 @@ impl StreamDecoder {
     /// (spec, section 7.5). Empty until they have arrived, and with [`Coding::Fixed`].
     #[must_use]
     pub fn steps(&self) -> Vec<f32> {
-        self.lattice.as_ref().map_or_else(Vec::new, |(lattice, _)| lattice.steps())
+        self.lattice.as_ref().map_or_else(Vec::new, Lattice::steps)
     }
 
     /// The metadata that has arrived. All of it stands before the first Gaussian.
@@ -249,10 +258,13 @@ impl StreamDecoder {
     /// Whether the first layer has begun: header and metadata are complete.
     #[cfg(feature = "std")]
     fn has_begun(&self) -> bool {
-        matches!(self.stage, Stage::Layer(..) | Stage::Complete) || self.layers > 0
+        matches!(self.stage, Stage::Layer(..) | Stage::Complete)
+            || self.layers > 0
+            || self.parser.current() == Some(ChunkType::GAUS)
     }
 
-    fn advance(&mut self, input: &mut &[u8]) -> Result<(), DecodeError> {
+    /// Reads what there is. Layers of coding 1 may wait, to be decoded side by side.
+    fn advance(&mut self, input: &mut &[u8], may_wait: bool) -> Result<(), DecodeError> {
         match self.stage {
             Stage::Failed => return Err(DecodeError::AlreadyFailed),
             Stage::Complete => return Ok(()),
@@ -261,10 +273,23 @@ impl StreamDecoder {
         loop {
             match self.parser.next(input)? {
                 Event::NeedMore => return Ok(()),
-                Event::Begin(chunk, length) => self.stage = self.begin(chunk, length)?,
+                Event::Begin(chunk, length) => {
+                    let stage = match self.begin(chunk, length) {
+                        Err(DecodeError::Limit { .. }) if self.waiting.count() > 0 => {
+                            // What waits need not take memory any longer.
+                            self.decode_waiting(false)?;
+                            self.begin(chunk, length)
+                        }
+                        stage => stage,
+                    };
+                    self.stage = stage?;
+                }
                 Event::Payload(payload) => self.payload(payload)?,
                 Event::Complete(chunk, length) => {
                     self.complete(chunk)?;
+                    if !may_wait {
+                        self.decode_waiting(false)?;
+                    }
                     self.count(chunk, length);
                     if matches!(self.stage, Stage::Complete) {
                         return Ok(());
@@ -311,7 +336,7 @@ impl StreamDecoder {
     fn collected(&self, length: u32) -> Result<Stage, DecodeError> {
         let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
         let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
-        self.limits.check_memory(self.metadata.size() + declared)?;
+        self.limits.check_memory(self.metadata.size() + self.waiting.size() + declared)?;
         Ok(collect(length))
     }
 
@@ -354,13 +379,15 @@ impl StreamDecoder {
                     }
                     Coding::Set => {
                         let lattice = Lattice::parse(payload, header.color.channels())?;
-                        self.lattice = Some((lattice, Models::default()));
+                        self.lattice = Some(lattice);
                     }
                 }
             }
             (ChunkType::GAUS, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
-                self.read_set(&payload)?;
+                let declared = self.header.as_ref().map_or(0, |header| header.gaussians);
+                let allowed = declared - self.arrived() as u32;
+                self.waiting.push(payload, allowed)?;
                 self.layers += 1;
             }
             (_, Stage::Collect { payload, .. }) => {
@@ -373,7 +400,7 @@ impl StreamDecoder {
             }
             (ChunkType::GEND, _) => {
                 let declared = self.header.as_ref().map(|h| (h.layers, h.gaussians as usize));
-                if declared != Some((self.layers, self.gaussians.len())) {
+                if declared != Some((self.layers, self.arrived())) {
                     let reason = "fewer layers or Gaussians than the header declares";
                     return Err(DecodeError::malformed(chunk, reason));
                 }
@@ -386,27 +413,28 @@ impl StreamDecoder {
         Ok(())
     }
 
-    /// Reads a layer of coding 1.
-    fn read_set(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
-        let (Some(header), Some((lattice, models))) = (&self.header, &mut self.lattice) else {
+    /// How many Gaussians have arrived, decoded or not.
+    fn arrived(&self) -> usize {
+        self.gaussians.len() + self.waiting.count()
+    }
+
+    /// Decodes the layers that wait, up to the first that is not sound.
+    fn decode_waiting(&mut self, parallel: bool) -> Result<(), DecodeError> {
+        let (Some(header), Some(lattice)) = (&self.header, &self.lattice) else {
             return Ok(());
         };
-        let coding = SetCoding::new(lattice, header);
+        let waiting = core::mem::take(&mut self.waiting);
         let before = self.gaussians.len();
-        let allowed = header.gaussians - before as u32;
-        let (count, bytes) = SetCoding::counted(payload, allowed)?;
-        let gaussians = &mut self.gaussians;
-        // Room for all at once, as far as the bytes make it likely that they will come: what moves
-        // as it grows is held twice meanwhile.
-        grow(gaussians, count.min(bytes.len()), header.gaussians as usize);
-        let outcome = coding.read(count, bytes, models, self.account.as_mut(), |code, shape| {
-            grow(gaussians, 1, header.gaussians as usize);
-            gaussians.push(lattice.gaussian(&code, shape, &coding.grid, header.color));
-        });
-        if outcome.is_err() {
-            self.gaussians.truncate(before);
-        }
-        outcome
+        let count = waiting.count();
+        grow(&mut self.gaussians, count, header.gaussians as usize);
+        self.gaussians.resize(before + count, Gaussian::NOTHING);
+        let places = &mut self.gaussians[before..];
+        let account = self.account.as_mut();
+        waiting.decode(header, lattice, account, parallel, places).map_err(|(sound, error)| {
+            self.gaussians.truncate(before + sound);
+            self.stage = Stage::Failed;
+            error
+        })
     }
 
     /// Checks what a header declares against the limits.
@@ -447,7 +475,8 @@ fn grow<T>(items: &mut Vec<T>, additional: usize, declared: usize) {
     }
 }
 
-/// Decodes from any reader, in one pass and without seeking.
+/// Decodes from any reader, in one pass and without seeking, on the threads that
+/// [`RenderOptions::parallel`](crate::RenderOptions::parallel) allows.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), image_gip::DecodeError> {
@@ -503,7 +532,7 @@ impl<R: std::io::Read> Decoder<R> {
         self.stream.metadata()
     }
 
-    /// The push decoder inside, with all that has arrived.
+    /// The push decoder inside, with all that was decoded.
     #[must_use]
     pub fn stream(&self) -> &StreamDecoder {
         &self.stream
@@ -517,7 +546,8 @@ impl<R: std::io::Read> Decoder<R> {
         self.stream.set_limits(limits)
     }
 
-    /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes.
+    /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes, and
+    /// whether threads are used from here on.
     pub fn set_options(&mut self, options: crate::render::RenderOptions) {
         self.options = options;
     }
@@ -534,10 +564,7 @@ impl<R: std::io::Read> Decoder<R> {
     /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
     /// decoded until then.
     pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
-        while !self.stream.is_complete() {
-            self.read_some()?;
-        }
-        Ok(())
+        self.read_until(StreamDecoder::is_complete)
     }
 
     /// Reads until so many Gaussians have arrived, or all: enough layers for a thumbnail, with
@@ -546,10 +573,7 @@ impl<R: std::io::Read> Decoder<R> {
     /// # Errors
     /// As [`Decoder::read_to_end`].
     pub fn read_at_least(&mut self, gaussians: u32) -> Result<(), DecodeError> {
-        while self.stream.gaussians().len() < gaussians as usize && !self.stream.is_complete() {
-            self.read_some()?;
-        }
-        Ok(())
+        self.read_until(|stream| stream.arrived() >= gaussians as usize || stream.is_complete())
     }
 
     /// The picture so far.
@@ -577,13 +601,23 @@ impl<R: std::io::Read> Decoder<R> {
         self.picture().render_u16(&self.options, out)
     }
 
-    /// Feeds one piece of the file to the push decoder.
+    /// Reads until something is reached, then decodes what has arrived.
+    fn read_until(&mut self, reached: impl Fn(&StreamDecoder) -> bool) -> Result<(), DecodeError> {
+        let mut outcome = Ok(());
+        while outcome.is_ok() && !reached(&self.stream) {
+            outcome = self.read_some();
+        }
+        // What was wrong with what came earlier is to be told.
+        self.stream.decode_waiting(self.options.is_parallel()).and(outcome)
+    }
+
+    /// Takes one piece of the file.
     fn read_some(&mut self) -> Result<(), DecodeError> {
         let mut buffer = [0; 8192];
         loop {
             match self.reader.read(&mut buffer) {
                 Ok(0) => return self.stream.finish(),
-                Ok(length) => return self.stream.feed(&buffer[..length]).map(|_| ()),
+                Ok(length) => return self.stream.take(&buffer[..length], true).map(|_| ()),
                 Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error.into()),
             }

@@ -29,6 +29,10 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
+    /// One that adds nothing.
+    pub(crate) const NOTHING: Self =
+        Self { center: [0.0; 2], cholesky: [1.0, 0.0, 1.0], color: [0.0; 4] };
+
     /// The covariance (xx, xy, yy) in square pixels.
     #[must_use]
     pub fn covariance(&self) -> [f32; 3] {

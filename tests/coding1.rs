@@ -4,7 +4,7 @@
 mod common;
 
 use common::coding1::{self, Code, Grid};
-use common::entropy::{self, Models, Op};
+use common::entropy::{self, Op};
 use common::{File, Ghdr, Random, bits, cases, chunk, decode_pieces, of_chunks, steps};
 use image_gip::{ChunkType, DecodeError, Limits, StreamDecoder};
 use proptest::prelude::*;
@@ -91,7 +91,7 @@ fn compare(header: &Ghdr, steps: &[f32], payload: &[u8]) {
     let count = payload.first_chunk().map_or(1, |count| u32::from_le_bytes(*count));
     let header = Ghdr { coding: 1, gaussians: count.max(1), layers: 1, ..*header };
     let (decoder, result) = decode(&with_payload(&header, steps, payload));
-    match (coding1::read(header.sides(), steps, &mut Models::new(), payload), result) {
+    match (coding1::read(header.sides(), steps, payload), result) {
         (Ok(layer), Ok(())) => {
             assert_eq!(oracle_bits(&layer.values), bits(decoder.gaussians()));
         }
@@ -110,7 +110,7 @@ fn layer(seed: u64) -> (Ghdr, Vec<f32>, u32, Vec<Op>) {
 }
 
 fn payload(count: u32, ops: &[Op]) -> Vec<u8> {
-    [&count.to_le_bytes()[..], &entropy::encode(&mut Models::new(), ops)].concat()
+    [&count.to_le_bytes()[..], &entropy::encode(ops)].concat()
 }
 
 proptest! {
@@ -119,14 +119,13 @@ proptest! {
     fn what_the_oracle_writes_is_read_alike(seed: u64) {
         let file = random_file(seed);
         let sets = file.sets.as_ref().expect("coding 1");
-        let (mut written, mut read) = (Models::new(), Models::new());
         let mut values = Vec::new();
         for layer in &sets.layers {
             let mut codes = layer.clone();
             let ops = coding1::write(file.header.sides(), &sets.steps, &mut codes);
             let count = (codes.len() as u32).to_le_bytes();
-            let payload = [&count[..], &entropy::encode(&mut written, &ops)].concat();
-            let layer = coding1::read(file.header.sides(), &sets.steps, &mut read, &payload);
+            let payload = [&count[..], &entropy::encode(&ops)].concat();
+            let layer = coding1::read(file.header.sides(), &sets.steps, &payload);
             let layer = layer.expect("what the oracle wrote");
             prop_assert_eq!(layer.ops, ops);
             prop_assert_eq!(layer.codes, codes);

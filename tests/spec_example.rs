@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::entropy::{Models, Op};
+use common::entropy::Op;
 use common::{coding1, decode_valid};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
@@ -148,7 +148,7 @@ fn the_symbols_of_coding_1_are_those_in_the_bytes() {
     let (quantizers, layer) = (8 + 48 + 8, 8 + 48 + 40 + 8);
     let steps = file[quantizers..quantizers + 28].as_chunks().0;
     let steps: Vec<f32> = steps.iter().map(|step| f32::from_le_bytes(*step)).collect();
-    let layer = coding1::read([6, 4], &steps, &mut Models::new(), &file[layer..layer + 20]);
+    let layer = coding1::read([6, 4], &steps, &file[layer..layer + 20]);
     let layer = layer.expect("a sound layer");
     let found = layer.ops.iter().zip(&layer.states[1..]).filter_map(|(op, state)| {
         let (read, value) = match op {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use image_gip::{ColorModel, Encoder, RenderOptions, Report, Source, StreamDecoder};
+use image_gip::{ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder};
 
 use crate::memory;
 use crate::pictures::{Distortion, Picture};
@@ -81,12 +81,11 @@ pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
 
 /// The samples of a file.
 fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
-    let options = RenderOptions::new().parallel(parallel);
-    open(file, |picture| {
-        let mut samples = vec![0; picture.output_len(&options)?];
-        picture.render_u8(&options, &mut samples)?;
-        Ok(samples)
-    })
+    let mut decoder = Decoder::new(file)?;
+    decoder.set_options(RenderOptions::new().parallel(parallel));
+    let mut samples = vec![0; decoder.output_len().context("too many samples")?];
+    decoder.decode_into(&mut samples)?;
+    Ok(samples)
 }
 
 /// Most bytes that decoding holds beside the file, the samples included.

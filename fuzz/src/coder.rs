@@ -3,7 +3,7 @@
 use arbitrary::Arbitrary;
 use image_gip::fuzzing::{Item, contexts, decode, encode};
 
-use crate::entropy::{self, Decoder, Models, Op};
+use crate::entropy::{self, Decoder, Op};
 
 /// What is coded, and bytes to be read in place of what the encoder makes of it.
 #[derive(Arbitrary, Debug)]
@@ -24,7 +24,7 @@ impl Case {
         let items: Vec<Item> = self.items.iter().map(Coded::item).collect();
         let ops: Vec<Op> = items.iter().map(op).collect();
         let bytes = encode(&items);
-        assert_eq!(bytes, entropy::encode(&mut Models::new(), &ops), "the encoders differ");
+        assert_eq!(bytes, entropy::encode(&ops), "the encoders differ");
         let values: Vec<u32> = items.iter().map(value).collect();
         assert_eq!(decode(&bytes, &items), (values, true), "what was encoded is not decoded");
 
@@ -66,8 +66,7 @@ fn value(item: &Item) -> u32 {
 
 /// What the other decoder reads.
 fn read(bytes: &[u8], ops: &[Op]) -> Result<Vec<u32>, &'static str> {
-    let mut models = Models::new();
-    let mut decoder = Decoder::new(&mut models, bytes)?;
+    let mut decoder = Decoder::new(bytes)?;
     let read = |op: &Op| match *op {
         Op::Symbol { context, .. } => decoder.symbol(context),
         Op::Bits { count, .. } => decoder.bits(count),

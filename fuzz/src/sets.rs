@@ -4,7 +4,7 @@ use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
 use crate::coding1::{self, Code, Grid};
-use crate::entropy::{self, Models};
+use crate::entropy;
 
 /// What a file of coding 1 has in place of quantizers and fixed codes.
 #[derive(Arbitrary, Debug)]
@@ -51,21 +51,20 @@ impl Sets {
     /// The payloads of `GAUS`, each with its number of Gaussians.
     pub fn layers(&self, sides: [u32; 2], channels: usize) -> Vec<(u32, Vec<u8>)> {
         let steps = self.steps(channels);
-        let mut models = Models::new();
-        let mut payload = |layer: &Layer| {
+        let payload = |layer: &Layer| {
             let (count, bytes) = match layer {
                 Layer::Bytes(count, bytes) => (u32::from(*count) + 1, bytes.clone()),
                 Layer::Gaussians(gaussians) => {
                     let code = |gaussian: &Gaussian| gaussian.code(sides, channels);
                     let mut codes: Vec<Code> = gaussians.iter().map(code).collect();
                     let ops = coding1::write(sides, &steps, &mut codes);
-                    (codes.len() as u32, entropy::encode(&mut models, &ops))
+                    (codes.len() as u32, entropy::encode(&ops))
                 }
             };
             (count, [&count.to_le_bytes()[..], &bytes].concat())
         };
         let filled = |layer: &&Layer| !matches!(layer, Layer::Gaussians(all) if all.is_empty());
-        self.layers.iter().filter(filled).map(&mut payload).collect()
+        self.layers.iter().filter(filled).map(payload).collect()
     }
 
     /// Checks that a decoder made of the layers what the tests' coder makes of them.
@@ -79,10 +78,10 @@ impl Sets {
         if matches!(error, Some(DecodeError::Limit { .. })) {
             return;
         }
-        let (steps, mut models) = (self.steps(channels), Models::new());
+        let steps = self.steps(channels);
         let (mut values, mut flaw) = (Vec::new(), None);
         for (_, payload) in self.layers(sides, channels) {
-            match coding1::read(sides, &steps, &mut models, &payload) {
+            match coding1::read(sides, &steps, &payload) {
                 Ok(layer) => values.extend(layer.values.concat()),
                 Err(found) => {
                     flaw = Some(found);

@@ -5,6 +5,7 @@ mod bits;
 pub(crate) mod fixed;
 #[cfg(all(fuzzing, feature = "encode"))]
 pub mod fuzzing;
+pub(crate) mod layers;
 mod rans;
 mod search;
 pub(crate) mod set;

@@ -76,16 +76,19 @@ const MOST_WAITING: usize = 2 * 32 + 2;
 /// itself: logarithm for a pixel, and what every doubling of the area adds.
 const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
 
-/// The models of all contexts, learning from layer to layer.
+/// The models of all contexts, learning within a layer.
 #[derive(Clone, Debug)]
 pub(crate) struct Models(Vec<Model>);
 
+/// A layer that was coded.
 #[cfg(feature = "encode")]
-impl Models {
+#[derive(Debug)]
+pub(crate) struct Layer {
+    pub(crate) payload: Vec<u8>,
+    /// Of the cell of each Gaussian.
+    pub(crate) levels: Vec<u32>,
     /// What symbols cost by what was learnt.
-    pub(crate) fn costs(&self) -> Costs {
-        self.0.iter().map(Model::costs).collect()
-    }
+    pub(crate) costs: Costs,
 }
 
 #[cfg(all(fuzzing, feature = "encode"))]
@@ -152,10 +155,10 @@ impl<'a> SetCoding<'a> {
         &self,
         count: usize,
         bytes: &[u8],
-        models: &mut Models,
         account: Option<&mut AttributeBits>,
         receive: impl FnMut(Code, &Shape),
     ) -> Result<(), DecodeError> {
+        let mut models = Models::default();
         let mut members = Unknown(receive);
         #[cfg(feature = "std")]
         if let Some(account) = account {
@@ -182,20 +185,52 @@ impl<'a> SetCoding<'a> {
         checked(&decoder)
     }
 
-    /// The payload of a layer; sorts `codes` as the file has them, and rounds their centres to
-    /// what it tells. The level of each one's cell is added to `levels`.
+    /// Codes a layer: sorts `codes` as the file has them, and rounds their centres to what it
+    /// tells.
     #[cfg(feature = "encode")]
-    pub(crate) fn write(
-        &self,
-        codes: &mut [Code],
-        levels: &mut Vec<u32>,
-        models: &mut Models,
-    ) -> Vec<u8> {
-        let mut encoder = super::rans::Encoder::new(&mut models.0);
-        self.walk(&mut encoder, codes.len(), &mut Known { codes, levels });
+    pub(crate) fn write(&self, codes: &mut [Code]) -> Layer {
+        let (mut models, mut levels) = (Models::default(), Vec::with_capacity(codes.len()));
         let mut payload = (codes.len() as u32).to_le_bytes().to_vec();
+        let mut encoder = super::rans::Encoder::new(&mut models.0);
+        self.walk(&mut encoder, codes.len(), &mut Known { codes, levels: &mut levels });
         payload.extend(encoder.finish());
-        payload
+        let costs = models.0.iter().map(Model::costs).collect();
+        Layer { payload, levels, costs }
+    }
+
+    /// Puts the `first` codes in front that come first in the order of the tree.
+    #[cfg(feature = "encode")]
+    pub(crate) fn cut(&self, codes: &mut [Code], first: usize) {
+        let mut range = 0..codes.len();
+        let mut levels = Vec::new();
+        let mut known = Known { codes, levels: &mut levels };
+        // Down the tree to where the cut is.
+        let mut narrow = |axis, middle| {
+            let middle = range.start + known.partition(range.clone(), axis, middle);
+            let second = usize::from(middle <= first);
+            range = if middle <= first { middle..range.end } else { range.start..middle };
+            (second, range.start == first)
+        };
+        let mut roots = self.grid.whole();
+        let mut cell = loop {
+            match self.grid.split(&roots) {
+                Ok(split) => {
+                    let (part, done) = narrow(split.axis, split.middle);
+                    if done {
+                        return;
+                    }
+                    roots = split.parts[part];
+                }
+                Err(root) => break root,
+            }
+        };
+        while let Some(split) = cell.split() {
+            let (part, done) = narrow(split.axis, split.middle);
+            if done {
+                return;
+            }
+            cell = split.parts[part];
+        }
     }
 
     /// The bits that a code takes in a cell of a level, without its share of the tree.
@@ -559,9 +594,9 @@ mod tests {
         let steps = of(b"QNTZ").next().expect("steps").1;
         let lattice = Lattice::parse(steps, channels).expect("sound");
         let coding = SetCoding::new(&lattice, &header);
-        let mut models = Models::default();
         let mut counts = vec![[0.0; SYMBOLS]; context::COUNT];
         for (_, payload) in of(b"GAUS") {
+            let mut models = Models::default();
             let count = u32::from_le_bytes(payload[..4].try_into().expect("four bytes"));
             let decoder = Decoder::new(&payload[4..], &mut models.0);
             let mut coder = Counting { coder: decoder, counts };
@@ -631,9 +666,8 @@ mod tests {
         ) {
             let lattice = lattice(channels);
             let coding = SetCoding { lattice: &lattice, grid: Grid::new(700, 400), channels };
-            let mut levels = Vec::new();
             let sent = codes.clone();
-            let payload = coding.write(&mut codes, &mut levels, &mut Models::default());
+            let Layer { payload, levels, .. } = coding.write(&mut codes);
             prop_assert_eq!(levels.len(), codes.len());
             // Centres move within their cells, all else stays.
             let sorted = |codes: &[Code]| {
@@ -646,14 +680,30 @@ mod tests {
             let mut read = Vec::new();
             let (count, bytes) =
                 SetCoding::counted(&payload, codes.len() as u32).expect("the count is right");
-            coding
-                .read(count, bytes, &mut Models::default(), None, |code, _| read.push(code))
-                .expect("sound");
+            coding.read(count, bytes, None, |code, _| read.push(code)).expect("sound");
             prop_assert_eq!(&read, &codes);
             // Written again, nothing moves any more.
-            levels.clear();
-            let again = coding.write(&mut codes, &mut levels, &mut Models::default());
-            prop_assert_eq!(again, payload);
+            prop_assert_eq!(coding.write(&mut codes).payload, payload);
+        }
+
+        #[test]
+        fn what_is_cut_off_comes_first(mut codes in codes(3), share in 0.0..=1.0) {
+            let lattice = lattice(3);
+            let coding = SetCoding { lattice: &lattice, grid: Grid::new(700, 400), channels: 3 };
+            coding.write(&mut codes);
+            let first = (share * codes.len() as f64) as usize;
+            // Those in one pixel have no order.
+            let pixels = |codes: &[Code]| {
+                let mut pixels: Vec<_> =
+                    codes.iter().map(|code| code.center.map(|unit| unit / 128)).collect();
+                pixels.sort_unstable();
+                pixels
+            };
+            let (front, back) = (pixels(&codes[..first]), pixels(&codes[first..]));
+            codes.reverse();
+            coding.cut(&mut codes, first);
+            prop_assert_eq!(pixels(&codes[..first]), front);
+            prop_assert_eq!(pixels(&codes[first..]), back);
         }
 
         #[test]
@@ -665,8 +715,7 @@ mod tests {
             let payload = [&count.to_le_bytes(), &bytes[..]].concat();
             let mut received = 0;
             if let Ok((count, bytes)) = SetCoding::counted(&payload, 1000) {
-                let models = &mut Models::default();
-                let _ = coding.read(count, bytes, models, None, |_, _| received += 1);
+                let _ = coding.read(count, bytes, None, |_, _| received += 1);
             }
             prop_assert!(received <= 1000);
         }

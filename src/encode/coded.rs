@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::EncodeError;
 use super::budget::Budget;
 use super::control::Finished;
-use super::descent::Descent;
+use super::descent::{Descent, Place};
 use super::fit::Fit;
 use super::layout::Layout;
 use super::options::Target;
@@ -16,7 +16,7 @@ use super::residuals::Residuals;
 use super::source::Source;
 use super::steering::{Aim, Search};
 use super::verify::{Verified, strips};
-use crate::coding::set::{Costs, Models, SetCoding};
+use crate::coding::set::{Layer, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 use crate::lattice::{Code, Grid, Lattice};
@@ -48,6 +48,10 @@ const MOST_TRIMMINGS: u32 = 32;
 const LAYERS: [f64; 2] = [0.045, 0.165];
 /// Fewest Gaussians that are worth layers.
 const LEAST_LAYERED: usize = 250;
+/// Fewest Gaussians that are worth being decoded side by side: the largest layer has half of them.
+const LEAST_CUT: usize = 2048;
+/// Most Gaussians in a layer, so that large pictures can use many threads.
+const MOST_TOGETHER: usize = 16_384;
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
 
@@ -96,43 +100,40 @@ impl Coded {
     }
 }
 
-/// Layers of coded Gaussians.
-#[derive(Debug)]
-pub(crate) struct Written {
-    pub(crate) payloads: Vec<Vec<u8>>,
-    /// Of the cell of each Gaussian.
-    levels: Vec<u32>,
-    /// As they are after the last layer.
-    models: Models,
+/// Codes Gaussians in layers; sorts and rounds them as a file has them.
+pub(crate) fn write_layers(coding: &SetCoding<'_>, codes: &mut [Code]) -> Vec<Layer> {
+    layers(coding, codes).into_par_iter().map(|codes| coding.write(codes)).collect()
 }
 
-/// Codes Gaussians in layers, the strongest first; sorts and rounds them as a file has them.
-pub(crate) fn write_layers(coding: &SetCoding<'_>, codes: &mut [Code]) -> Written {
-    let mut written =
-        Written { payloads: Vec::new(), levels: Vec::new(), models: Models::default() };
+/// Cuts codes into the layers of a file: the strongest ones first, the others by where they are.
+fn layers<'a>(coding: &SetCoding<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
+    let count = codes.len();
+    let mut layers = Vec::new();
     codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
     let mut rest = codes;
-    for count in layer_sizes(rest.len()) {
-        let (layer, later) = rest.split_at_mut(count);
-        rest = later;
-        let payload = coding.write(layer, &mut written.levels, &mut written.models);
-        written.payloads.push(payload);
+    if count >= LEAST_LAYERED {
+        for share in LAYERS {
+            let (layer, later) = rest.split_at_mut((share * count as f64) as usize);
+            layers.push(layer);
+            rest = later;
+        }
     }
-    written
+    let most = if count < LEAST_CUT { count } else { count.div_ceil(2).min(MOST_TOGETHER) };
+    while rest.len() > most {
+        coding.cut(rest, most);
+        let (layer, later) = rest.split_at_mut(most);
+        layers.push(layer);
+        rest = later;
+    }
+    if !rest.is_empty() {
+        layers.push(rest);
+    }
+    layers
 }
 
-/// The sizes of the layers of a file.
-fn layer_sizes(count: usize) -> Vec<usize> {
-    let mut sizes: Vec<usize> = if count < LEAST_LAYERED {
-        Vec::new()
-    } else {
-        LAYERS.iter().map(|share| (share * count as f64) as usize).collect()
-    };
-    let last = count - sizes.iter().sum::<usize>();
-    if last > 0 {
-        sizes.push(last);
-    }
-    sizes
+/// The places of a layer's codes.
+fn places(layer: &Layer) -> impl Iterator<Item = Place<'_>> {
+    layer.levels.iter().map(|&level| Place { level, costs: &layer.costs })
 }
 
 /// What fitted Gaussians are coded for.
@@ -276,7 +277,7 @@ impl<'a> Coder<'a> {
         for _ in 0..MOST_ROUNDINGS {
             observer.poll()?;
             let mut coded = self.rounded(gaussians, search.at);
-            self.walked(&mut coded);
+            self.written(&mut coded);
             let off = self.off(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
             search.tell(off);
             if off.abs() < CLOSE {
@@ -429,20 +430,23 @@ impl<'a> Coder<'a> {
         let mut residuals = Residuals::new(self.raster);
         for _ in 0..passes {
             observer.poll()?;
-            let (costs, levels, bits) = self.walked(coded);
+            let layers = self.written(coded);
+            let places: Vec<Place<'_>> = layers.iter().flat_map(places).collect();
             self.render(coded, &mut residuals, observer)?;
             let coding = self.coding(&coded.lattice);
-            let codes = coded.codes.iter().zip(&levels);
-            let own: f32 = codes.map(|(code, level)| coding.cost(*code, *level, &costs)).sum();
-            let tree = ((bits - own) / coded.codes.len().max(1) as f32).max(0.0);
-            let descent = Descent { coding, model: self.model, costs: &costs, tree, lambda };
-            if descent.pass(&mut residuals, &mut coded.codes, &levels, observer)? == 0 {
+            let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
+            let codes = coded.codes.iter().zip(&places);
+            let own: f32 =
+                codes.map(|(code, place)| coding.cost(*code, place.level, place.costs)).sum();
+            let tree = ((8.0 * bytes as f32 - own) / coded.codes.len().max(1) as f32).max(0.0);
+            let descent = Descent { coding, model: self.model, tree, lambda };
+            if descent.pass(&mut residuals, &mut coded.codes, &places, observer)? == 0 {
                 break;
             }
         }
         // For the file's order and centres.
         observer.poll()?;
-        self.walked(coded);
+        self.written(coded);
         Ok(())
     }
 
@@ -450,13 +454,9 @@ impl<'a> Coder<'a> {
         SetCoding::new(lattice, self.layout.header())
     }
 
-    /// Sorts and rounds the codes as the file has them; what symbols cost then, the levels of the
-    /// cells, and the bits of all.
-    fn walked(&self, coded: &mut Coded) -> (Costs, Vec<u32>, f32) {
-        let coding = self.coding(&coded.lattice);
-        let written = write_layers(&coding, &mut coded.codes);
-        let bytes = written.payloads.iter().map(Vec::len).sum::<usize>();
-        (written.models.costs(), written.levels, 8.0 * bytes as f32)
+    /// Codes what there is, which sorts and rounds the codes as the file has them.
+    fn written(&self, coded: &mut Coded) -> Vec<Layer> {
+        write_layers(&self.coding(&coded.lattice), &mut coded.codes)
     }
 
     /// Sets `residuals` to those of the codes, as the decoder renders them.
@@ -481,5 +481,32 @@ impl<'a> Coder<'a> {
             residuals.set(self.raster, region.y as usize, &planes);
         }
         observer.poll()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_the_gaussians_are_in_the_largest_layer_but_not_too_many() {
+        let lattice = rate::lattice(0.0, ColorModel::Rgb);
+        let coding = SetCoding { lattice: &lattice, grid: Grid::new(640, 480), channels: 3 };
+        for (count, largest, number) in
+            [(0, 0, 0), (249, 249, 1), (2047, 1618, 3), (6000, 3000, 4), (70_000, 16_384, 6)]
+        {
+            let mut random = fastrand::Rng::with_seed(count as u64);
+            let mut code = || Code {
+                color: [random.i32(-9..9), 0, 0, 0],
+                center: [random.u32(0..80_000), random.u32(0..60_000)],
+                ..Code::default()
+            };
+            let mut codes: Vec<Code> = (0..count).map(|_| code()).collect();
+            let layers = layers(&coding, &mut codes);
+            let sizes: Vec<usize> = layers.iter().map(|layer| layer.len()).collect();
+            assert_eq!(sizes.iter().sum::<usize>(), count);
+            assert_eq!(sizes.len(), number, "{sizes:?}");
+            assert_eq!(sizes.iter().max().copied().unwrap_or(0), largest, "{sizes:?}");
+        }
     }
 }

@@ -29,11 +29,19 @@ const MOST_TRIED: usize = 3;
 pub(crate) struct Descent<'a> {
     pub(crate) coding: SetCoding<'a>,
     pub(crate) model: ColorModel,
-    pub(crate) costs: &'a Costs,
     /// Bits of the tree of cells for each Gaussian.
     pub(crate) tree: f32,
     /// Squared error that a bit is worth.
     pub(crate) lambda: f32,
+}
+
+/// Where in a file a code stands, as far as that decides what it costs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place<'a> {
+    /// Of the code's cell.
+    pub(crate) level: u32,
+    /// Of the symbols in the code's layer.
+    pub(crate) costs: &'a Costs,
 }
 
 /// A Gaussian's best code, and the change of error and rate against leaving it out.
@@ -44,8 +52,8 @@ struct Choice {
 }
 
 impl Descent<'_> {
-    /// Looks at every Gaussian once, by `residuals`, and improves or removes it. The `levels` are
-    /// those of the codes' cells. How many were changed.
+    /// Looks at every Gaussian once, by `residuals`, and improves or removes it. The `places` are
+    /// those of the codes. How many were changed.
     ///
     /// Gaussians that do not touch are looked at side by side; the outcome is that of one after
     /// the other.
@@ -53,7 +61,7 @@ impl Descent<'_> {
         &self,
         residuals: &mut Residuals,
         codes: &mut Vec<Code>,
-        levels: &[u32],
+        places: &[Place<'_>],
         observer: &mut Observer<'_>,
     ) -> Result<usize, EncodeError> {
         let mut kept = vec![true; codes.len()];
@@ -66,7 +74,7 @@ impl Descent<'_> {
                 let chosen: Vec<Option<Code>> = part
                     .par_iter()
                     .map_init(Patch::default, |patch, &index| {
-                        self.choose(shared, patch, codes[index], levels[index])
+                        self.choose(shared, patch, codes[index], places[index])
                     })
                     .collect();
                 let mut changes = Vec::new();
@@ -135,20 +143,20 @@ impl Descent<'_> {
         residuals: &Residuals,
         patch: &mut Patch,
         code: Code,
-        level: u32,
+        place: Place<'_>,
     ) -> Option<Code> {
         let here = self.gaussian(&code);
         patch.load(residuals, &here).then_some(())?;
         let slopes = patch.slopes(&here, self.model);
-        let present = slopes.change.error + self.lambda * self.bits(code, level);
-        let promising = self.promising(&slopes, code, &here, level, present);
+        let present = slopes.change.error + self.lambda * self.bits(code, place);
+        let promising = self.promising(&slopes, code, &here, place, present);
         if promising.is_empty() && present < 0.0 {
             return Some(code);
         }
         patch.remove(&here);
-        let mut best = self.judged(patch, code, level);
+        let mut best = self.judged(patch, code, place);
         for candidate in promising {
-            if let Some(other) = self.recolored(patch, candidate, level)
+            if let Some(other) = self.recolored(patch, candidate, place)
                 && other.value < best.value
             {
                 best = other;
@@ -163,7 +171,7 @@ impl Descent<'_> {
         slopes: &Slopes,
         code: Code,
         here: &Gaussian,
-        level: u32,
+        place: Place<'_>,
         present: f32,
     ) -> Vec<Code> {
         let (lattice, model) = (self.coding.lattice, self.model);
@@ -171,11 +179,11 @@ impl Descent<'_> {
         let slant = l21 / l22;
         let amplitudes = code.color.iter().zip(&lattice.color);
         let strength: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
-        let recolored = self.with_best_colors(&slopes.change, code);
+        let recolored = self.with_best_colors(&slopes.change, code, place.costs);
         let error = slopes.change.with(recolored.color, lattice.color_units(&recolored));
         let mut found = Vec::new();
         if recolored != code {
-            found.push((error + self.lambda * self.bits(recolored, level), recolored));
+            found.push((error + self.lambda * self.bits(recolored, place), recolored));
         }
         if strength > 0.0 {
             let best = slopes.by_displacement.best(slant, strength, REACH);
@@ -186,7 +194,7 @@ impl Descent<'_> {
             for candidate in self.steps(recolored).chain(targeted) {
                 let way = Displacement::between(here, &self.gaussian(&candidate));
                 let change = slopes.by_displacement.change(&way, slant, strength);
-                found.push((error + change + self.lambda * self.bits(candidate, level), candidate));
+                found.push((error + change + self.lambda * self.bits(candidate, place), candidate));
             }
         }
         found.retain(|(value, _)| *value < present);
@@ -196,27 +204,27 @@ impl Descent<'_> {
     }
 
     /// What a code is worth as it is.
-    fn judged(&self, patch: &Patch, code: Code, level: u32) -> Choice {
+    fn judged(&self, patch: &Patch, code: Code, place: Place<'_>) -> Choice {
         let change = patch.change(&self.gaussian(&code), self.model);
-        Choice { code, value: change.error + self.lambda * self.bits(code, level) }
+        Choice { code, value: change.error + self.lambda * self.bits(code, place) }
     }
 
     /// What a code is worth with the best colours for its geometry.
-    fn recolored(&self, patch: &Patch, code: Code, level: u32) -> Option<Choice> {
+    fn recolored(&self, patch: &Patch, code: Code, place: Place<'_>) -> Option<Choice> {
         let change = patch.change(&self.gaussian(&code), self.model);
         if change.weight <= 0.0 {
             return None;
         }
-        let code = self.with_best_colors(&change, code);
+        let code = self.with_best_colors(&change, code, place.costs);
         if patch.is_clamped() {
-            return Some(self.judged(patch, code, level));
+            return Some(self.judged(patch, code, place));
         }
         let error = change.with(code.color, self.coding.lattice.color_units(&code));
-        Some(Choice { code, value: error + self.lambda * self.bits(code, level) })
+        Some(Choice { code, value: error + self.lambda * self.bits(code, place) })
     }
 
     /// A code with the best colours for its geometry, one axis after the other.
-    fn with_best_colors(&self, change: &Change, mut code: Code) -> Code {
+    fn with_best_colors(&self, change: &Change, mut code: Code, costs: &Costs) -> Code {
         let units = self.coding.lattice.color_units(&code);
         for (axis, &unit) in units.iter().enumerate().take(self.coding.channels) {
             // By what the error grows for a unit beside the best value.
@@ -230,19 +238,19 @@ impl Descent<'_> {
             let rounded = best.round() as i32;
             let nearer = rounded - rounded.signum();
             let candidates = [rounded, nearer, rounded + 1, rounded - 1, present, 0];
-            let costs = candidates.map(|value| {
+            let values = candidates.map(|value| {
                 code.color[axis] = value;
                 let off = value as f32 - best;
-                growth * off * off + self.lambda * self.coding.color_cost(&code, self.costs)
+                growth * off * off + self.lambda * self.coding.color_cost(&code, costs)
             });
-            let least = (0..costs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+            let least = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b]));
             code.color[axis] = candidates[least.expect("there are some")];
         }
         code
     }
 
-    fn bits(&self, code: Code, level: u32) -> f32 {
-        self.tree + self.coding.cost(code, level, self.costs)
+    fn bits(&self, code: Code, place: Place<'_>) -> f32 {
+        self.tree + self.coding.cost(code, place.level, place.costs)
     }
 
     /// A step up and down in each component of the geometry.

@@ -88,7 +88,8 @@ impl<'a> Layout<'a> {
     /// The file of coded Gaussians.
     pub(crate) fn write_set(&self, coded: &Coded) -> Vec<u8> {
         let coding = SetCoding::new(&coded.lattice, &self.header);
-        let payloads = write_layers(&coding, &mut coded.codes.clone()).payloads;
+        let layers = write_layers(&coding, &mut coded.codes.clone());
+        let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
         let header = Header {
             coding: Coding::Set,
             chart: Chart::Cholesky,

@@ -92,11 +92,18 @@ impl RenderOptions {
         self
     }
 
-    /// Whether to use the threads of the current `rayon` pool (default: yes). Without the feature
-    /// `rayon` there is one thread in any case. The result is the same bit for bit.
+    /// Whether to use the threads of the current `rayon` pool (default: yes), for rendering and in
+    /// a [`Decoder`](crate::Decoder) for layers of [`Coding::Set`](crate::Coding::Set) too.
+    /// Without the feature `rayon` there is one thread in any case. The result is the same bit for
+    /// bit.
     pub fn parallel(mut self, parallel: bool) -> Self {
         self.parallel = parallel;
         self
+    }
+
+    #[cfg(feature = "std")]
+    pub(crate) fn is_parallel(&self) -> bool {
+        self.parallel
     }
 
     /// Whether to use the plain reference code in place of the fast code (default: no). The

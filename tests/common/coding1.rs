@@ -1,7 +1,7 @@
 //! Layers of coding 1 (sections 7.4 and 7.5), written from `spec/gip.md` alone: a writer that turns
 //! codes into symbols and bits, and a reader that gives the codes and their values.
 
-use super::entropy::{Decoder, Encoder, Flaw, Models, Op};
+use super::entropy::{Decoder, Encoder, Flaw, Op};
 use super::exp::exp;
 
 /// The steps of `QNTZ` (section 5.3): position, size, ratio, slant, then the colour axes.
@@ -256,12 +256,7 @@ pub(crate) struct Layer {
 }
 
 /// Reads the payload of a `GAUS`, as if the header left room for any number of Gaussians.
-pub(crate) fn read(
-    sides: [u32; 2],
-    steps: &Steps,
-    models: &mut Models,
-    payload: &[u8],
-) -> Result<Layer, Flaw> {
+pub(crate) fn read(sides: [u32; 2], steps: &Steps, payload: &[u8]) -> Result<Layer, Flaw> {
     let (count, bytes) = payload.split_first_chunk().ok_or("no count")?;
     let count = u32::from_le_bytes(*count);
     if count == 0 {
@@ -270,7 +265,7 @@ pub(crate) fn read(
     if u64::from(count) > 4 * bytes.len() as u64 {
         return Err("more than four Gaussians for each byte");
     }
-    let mut decoder = Decoder::new(models, bytes)?;
+    let mut decoder = Decoder::new(bytes)?;
     let grid = Grid::new(sides);
     let mut layer = Layer::default();
     read_cell(&mut decoder, &grid, steps, grid.whole(), count, &mut layer)?;

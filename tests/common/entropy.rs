@@ -32,11 +32,11 @@ impl Model {
 
 /// One model for each context.
 #[derive(Clone, Debug)]
-pub(crate) struct Models(Vec<Model>);
+struct Models(Vec<Model>);
 
 impl Models {
     /// As the table of the specification says.
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         let table = include_str!("../../spec/coding1-models.tsv");
         let model = |line: &str| {
             let mut starts = [1 << 15; 17];
@@ -62,8 +62,9 @@ pub(crate) enum Op {
     },
 }
 
-/// The bytes from which a decoder reads `ops`.
-pub(crate) fn encode(models: &mut Models, ops: &[Op]) -> Vec<u8> {
+/// The bytes of a layer from which a decoder reads `ops`.
+pub(crate) fn encode(ops: &[Op]) -> Vec<u8> {
+    let mut models = Models::new();
     // The models learn forwards, but the last is coded first.
     let shares = ops.iter().map(|&op| match op {
         Op::Symbol { context, symbol } => {
@@ -93,7 +94,7 @@ pub(crate) fn encode(models: &mut Models, ops: &[Op]) -> Vec<u8> {
 
 /// The state and the words of a layer, while it is read.
 pub(crate) struct Decoder<'a> {
-    models: &'a mut Models,
+    models: Models,
     state: u32,
     words: &'a [u8],
     pub(crate) ops: Vec<Op>,
@@ -105,13 +106,13 @@ pub(crate) struct Decoder<'a> {
 pub(crate) type Flaw = &'static str;
 
 impl<'a> Decoder<'a> {
-    pub(crate) fn new(models: &'a mut Models, bytes: &'a [u8]) -> Result<Self, Flaw> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Result<Self, Flaw> {
         let (state, words) = bytes.split_first_chunk().ok_or("no state")?;
         let state = u32::from_le_bytes(*state);
         if state < 1 << 16 {
             return Err("the state begins below 2^16");
         }
-        Ok(Self { models, state, words, ops: Vec::new(), states: vec![state] })
+        Ok(Self { models: Models::new(), state, words, ops: Vec::new(), states: vec![state] })
     }
 
     /// After every symbol and every number of bits.

@@ -10,7 +10,6 @@ pub(crate) mod memory;
 pub(crate) mod oracle;
 
 use coding1::Code;
-use entropy::Models;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
 
 /// Section 4.1.
@@ -187,21 +186,19 @@ pub(crate) fn steps(steps: &[f32]) -> Vec<u8> {
 }
 
 impl Sets {
-    /// The payloads of `GAUS`; the models learn from one to the next.
+    /// The payloads of `GAUS`.
     fn payloads(&self, header: &Ghdr) -> Vec<Vec<u8>> {
-        let mut models = Models::new();
         let payload = |layer: &Vec<Code>| {
             let ops = coding1::write(header.sides(), &self.steps, &mut layer.clone());
             let count = (layer.len() as u32).to_le_bytes();
-            [&count[..], &entropy::encode(&mut models, &ops)].concat()
+            [&count[..], &entropy::encode(&ops)].concat()
         };
         self.layers.iter().map(payload).collect()
     }
 
     fn components(&self, header: &Ghdr) -> Vec<Vec<f32>> {
-        let mut models = Models::new();
         let values = |payload: Vec<u8>| {
-            let layer = coding1::read(header.sides(), &self.steps, &mut models, &payload);
+            let layer = coding1::read(header.sides(), &self.steps, &payload);
             layer.expect("what was just written").values
         };
         self.payloads(header).into_iter().flat_map(values).collect()

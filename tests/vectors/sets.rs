@@ -1,7 +1,7 @@
 //! The test vectors of coding 1.
 
 use super::common::coding1::{self, Code, Grid};
-use super::common::entropy::{self, Models, Op};
+use super::common::entropy::{self, Op};
 use super::common::{
     COVARIANCE, EXPONENTIAL, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks,
     steps,
@@ -306,7 +306,7 @@ pub(super) fn invalid() -> Vec<Vector> {
         codes
     };
     let first = vec![at(&gray, [8.0, 8.0], 9), at(&gray, [3.0, 12.0], -9)];
-    let file = File::of_sets(gray, usual_steps(GRAY), vec![first.clone(), second.clone()]);
+    let file = File::of_sets(gray, usual_steps(GRAY), vec![first, second.clone()]);
     let chunks = file.chunks();
     let usual_steps = usual_steps(GRAY);
     // GHDR, QNTZ, two layers, GEND; the second is damaged.
@@ -317,10 +317,7 @@ pub(super) fn invalid() -> Vec<Vector> {
     };
     // A layer that the oracle refuses as well, and says why.
     let refused = |name, shows, payload: &[u8], flaw: &str| {
-        let mut models = Models::new();
-        let first = &chunks[2][8..chunks[2].len() - 4];
-        coding1::read(gray.sides(), &usual_steps, &mut models, first).expect("a sound layer");
-        let found = coding1::read(gray.sides(), &usual_steps, &mut models, payload);
+        let found = coding1::read(gray.sides(), &usual_steps, payload);
         assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
         Vector::invalid(name, shows, replaced(3, chunk(b"GAUS", payload)))
     };
@@ -342,13 +339,10 @@ pub(super) fn invalid() -> Vec<Vector> {
     };
     // The second layer of other symbols.
     let with_ops = |change: &dyn Fn(&mut Vec<Op>)| {
-        let mut models = Models::new();
-        let ops = coding1::write(gray.sides(), &usual_steps, &mut first.clone());
-        entropy::encode(&mut models, &ops);
         let mut ops = coding1::write(gray.sides(), &usual_steps, &mut second.clone());
         change(&mut ops);
         let count = (second.len() as u32).to_le_bytes();
-        [&count[..], &entropy::encode(&mut models, &ops)].concat()
+        [&count[..], &entropy::encode(&ops)].concat()
     };
     let with_symbol = |found: &dyn Fn(u32) -> bool, wrong: u32| {
         with_ops(&|ops| {

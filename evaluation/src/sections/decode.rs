@@ -164,6 +164,7 @@ fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
 /// Decodes and renders as much of a file as shows, into the first of the samples.
 fn thumbnail(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
     let mut decoder = Decoder::new(file)?;
+    decoder.set_options(options.clone());
     let (width, height) = options.output_size(decoder.header());
     decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
     let picture = decoder.picture();

@@ -1,0 +1,103 @@
+//! Layers of coding 1 that wait to be decoded: none needs another one (spec, section 7.3), so that
+//! threads can take them side by side.
+
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+
+use super::account::AttributeBits;
+use super::set::{LAYER_PREFIX, SetCoding};
+use crate::color::ColorModel;
+use crate::container::Header;
+use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
+use crate::lattice::Lattice;
+use crate::threads;
+
+/// Layers that have arrived, in file order.
+#[derive(Debug, Default)]
+pub(crate) struct Layers(Vec<Layer>);
+
+#[derive(Debug)]
+struct Layer {
+    /// How many Gaussians it has.
+    count: usize,
+    payload: Vec<u8>,
+}
+
+impl Layer {
+    /// Decodes the Gaussians into as many places.
+    fn read(
+        &self,
+        coding: &SetCoding<'_>,
+        model: ColorModel,
+        account: Option<&mut AttributeBits>,
+        places: &mut [Gaussian],
+    ) -> Result<(), DecodeError> {
+        let mut places = places.iter_mut();
+        coding.read(self.count, &self.payload[LAYER_PREFIX..], account, |code, shape| {
+            if let Some(place) = places.next() {
+                *place = coding.lattice.gaussian(&code, shape, &coding.grid, model);
+            }
+        })
+    }
+}
+
+impl Layers {
+    /// Adds a layer that has at most `allowed` Gaussians.
+    pub(crate) fn push(&mut self, payload: Vec<u8>, allowed: u32) -> Result<(), DecodeError> {
+        let (count, _) = SetCoding::counted(&payload, allowed)?;
+        self.0.push(Layer { count, payload });
+        Ok(())
+    }
+
+    /// How many Gaussians there are in all layers.
+    pub(crate) fn count(&self) -> usize {
+        self.0.iter().map(|layer| layer.count).sum()
+    }
+
+    /// Bytes that all layers take.
+    pub(crate) fn size(&self) -> u64 {
+        self.0.iter().map(|layer| layer.payload.len() as u64).sum()
+    }
+
+    /// Decodes all layers into as many places as they have Gaussians, or adds to an account on the
+    /// way, one after the other.
+    ///
+    /// # Errors
+    /// With the number of Gaussians before the first layer that is not sound, and what is wrong
+    /// with it.
+    pub(crate) fn decode(
+        self,
+        header: &Header,
+        lattice: &Lattice,
+        account: Option<&mut AttributeBits>,
+        parallel: bool,
+        mut places: &mut [Gaussian],
+    ) -> Result<(), (usize, DecodeError)> {
+        let coding = SetCoding::new(lattice, header);
+        let mut outcomes: Vec<_> = self.0.iter().map(|_| Ok(())).collect();
+        let mut work = Vec::with_capacity(self.0.len());
+        for (layer, outcome) in self.0.iter().zip(&mut outcomes) {
+            let (own, rest) = core::mem::take(&mut places).split_at_mut(layer.count);
+            places = rest;
+            work.push((layer, own, outcome));
+        }
+        if let Some(account) = account {
+            for (layer, places, outcome) in work {
+                *outcome = layer.read(&coding, header.color, Some(account), places);
+            }
+        } else {
+            // The largest first, so that none of them is what all wait for in the end.
+            work.sort_by_key(|(layer, ..)| Reverse(layer.count));
+            threads::for_each(parallel, work, |(): &mut (), (layer, places, outcome)| {
+                *outcome = layer.read(&coding, header.color, None, places);
+            });
+        }
+        let mut sound = 0;
+        for (layer, outcome) in self.0.iter().zip(outcomes) {
+            outcome.map_err(|error| (sound, error))?;
+            sound += layer.count;
+        }
+        Ok(())
+    }
+}
