@@ -336,7 +336,7 @@ impl StreamDecoder {
     fn collected(&self, length: u32) -> Result<Stage, DecodeError> {
         let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
         let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
-        self.limits.check_memory(self.metadata.size() + self.waiting.size() + declared)?;
+        self.limits.check_memory(self.metadata.size() + self.waiting.memory() + declared)?;
         Ok(collect(length))
     }
 

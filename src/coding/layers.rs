@@ -13,9 +13,16 @@ use crate::gaussian::Gaussian;
 use crate::lattice::Lattice;
 use crate::threads;
 
+/// Bytes that a layer takes beside its payload: its entries in lists, and what came of it.
+const BY_LAYER: u64 = size_of::<(Layer, [usize; 4], Result<(), DecodeError>)>() as u64;
+
 /// Layers that have arrived, in file order.
 #[derive(Debug, Default)]
-pub(crate) struct Layers(Vec<Layer>);
+pub(crate) struct Layers {
+    layers: Vec<Layer>,
+    count: usize,
+    memory: u64,
+}
 
 #[derive(Debug)]
 struct Layer {
@@ -46,18 +53,20 @@ impl Layers {
     /// Adds a layer that has at most `allowed` Gaussians.
     pub(crate) fn push(&mut self, payload: Vec<u8>, allowed: u32) -> Result<(), DecodeError> {
         let (count, _) = SetCoding::counted(&payload, allowed)?;
-        self.0.push(Layer { count, payload });
+        self.count += count;
+        self.memory += payload.len() as u64 + BY_LAYER;
+        self.layers.push(Layer { count, payload });
         Ok(())
     }
 
     /// How many Gaussians there are in all layers.
     pub(crate) fn count(&self) -> usize {
-        self.0.iter().map(|layer| layer.count).sum()
+        self.count
     }
 
     /// Bytes that all layers take.
-    pub(crate) fn size(&self) -> u64 {
-        self.0.iter().map(|layer| layer.payload.len() as u64).sum()
+    pub(crate) fn memory(&self) -> u64 {
+        self.memory
     }
 
     /// Decodes all layers into as many places as they have Gaussians, or adds to an account on the
@@ -75,9 +84,9 @@ impl Layers {
         mut places: &mut [Gaussian],
     ) -> Result<(), (usize, DecodeError)> {
         let coding = SetCoding::new(lattice, header);
-        let mut outcomes: Vec<_> = self.0.iter().map(|_| Ok(())).collect();
-        let mut work = Vec::with_capacity(self.0.len());
-        for (layer, outcome) in self.0.iter().zip(&mut outcomes) {
+        let mut outcomes: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
+        let mut work = Vec::with_capacity(self.layers.len());
+        for (layer, outcome) in self.layers.iter().zip(&mut outcomes) {
             let (own, rest) = core::mem::take(&mut places).split_at_mut(layer.count);
             places = rest;
             work.push((layer, own, outcome));
@@ -94,7 +103,7 @@ impl Layers {
             });
         }
         let mut sound = 0;
-        for (layer, outcome) in self.0.iter().zip(outcomes) {
+        for (layer, outcome) in self.layers.iter().zip(outcomes) {
             outcome.map_err(|error| (sound, error))?;
             sound += layer.count;
         }
