@@ -150,6 +150,13 @@ impl Worker {
         Ok(Coded { bytes, distortion, encode_seconds, decode_seconds })
     }
 
+    /// Decodes the last file once more; the median over so many times.
+    pub(crate) fn decode_again(&mut self, decodings: usize) -> Result<f64> {
+        writeln!(self.requests, "again\t{decodings}")?;
+        let answer = self.line()?;
+        answer.parse().context(answer)
+    }
+
     fn line(&mut self) -> Result<String> {
         let mut line = String::new();
         let length = self.answers.read_line(&mut line)?;

@@ -7,6 +7,7 @@ use image_gip::{ColorModel, Decoder, Encoder, RenderOptions, Report, Source, Str
 
 use crate::memory;
 use crate::pictures::{Distortion, Picture};
+use crate::table::median;
 
 /// How the codec is called in tables and files.
 pub(crate) const NAME: &str = "gip";
@@ -110,14 +111,12 @@ pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
 
 /// How long something takes: the median of several times.
 pub(crate) fn median_seconds(repeats: usize, mut work: impl FnMut() -> Result<()>) -> Result<f64> {
-    let mut seconds = Vec::new();
-    for _ in 0..repeats {
+    let seconds = (0..repeats).map(|_| {
         let start = Instant::now();
         work()?;
-        seconds.push(start.elapsed().as_secs_f64());
-    }
-    seconds.sort_by(f64::total_cmp);
-    Ok(seconds[repeats / 2])
+        Ok(start.elapsed().as_secs_f64())
+    });
+    median(seconds.collect::<Result<Vec<f64>>>()?).context("nothing was timed")
 }
 
 #[cfg(test)]

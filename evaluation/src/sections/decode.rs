@@ -1,6 +1,6 @@
 //! Decoding: from a file in memory to 8-bit samples, next to other decoders in the same run.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target};
 
 use super::rate::Files;
@@ -11,7 +11,7 @@ use crate::gip;
 use crate::kernel;
 use crate::memory;
 use crate::pictures::Picture;
-use crate::table::{Table, mean};
+use crate::table::{Table, mean, median};
 use crate::verdict::list;
 
 /// Rates of the files, in bits per pixel.
@@ -21,6 +21,10 @@ const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
 /// Times are medians over so many runs.
 const REPEATS: usize = 15;
+/// What is compared takes turns, since a machine is now faster and now slower: so many, of so many
+/// runs each.
+const TURNS: usize = 7;
+const IN_A_TURN: usize = 5;
 /// How much smaller thumbnails are along each side.
 const THUMBNAIL: u32 = 8;
 /// How much smaller a preview of the first bytes is along each side.
@@ -35,9 +39,10 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let pictures = bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES });
     let mut text = format!(
         "Compared with: the decoders of libjpeg-turbo, libwebp, OpenJPEG, libavif with dav1d, and \
-         libjxl, on files of about the same rate of the same pictures, one after the other in the \
-         same run. From a file in memory to 8-bit RGB in memory that is there already; \
-         medians of {REPEATS}, then means; {}. Their times include some microseconds of Python.\n",
+         libjxl, on files of about the same rate of the same pictures. From a file in memory to \
+         8-bit RGB in memory that is there already. What is compared takes {TURNS} turns of \
+         {IN_A_TURN} decodings; times are medians, and a ratio is the median of those of the turns. \
+         {}. Their times include some microseconds of Python.\n",
         bench.share(pictures.len()),
     );
     let mut files = Files::open(bench)?;
@@ -51,13 +56,18 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     Ok(text)
 }
 
-/// A decoder at a rate: on each picture bits per pixel, PSNR, seconds.
+/// A decoder at a rate: on each picture bits per pixel, PSNR, seconds, and ours as a share of them.
 struct Row {
     decoder: &'static str,
-    points: Vec<[f64; 3]>,
+    points: Vec<[f64; 4]>,
 }
 
 impl Row {
+    /// The median over the pictures.
+    fn share(&self) -> f64 {
+        median(self.points.iter().map(|point| point[3])).unwrap_or(f64::NAN)
+    }
+
     fn mean(&self, column: usize) -> f64 {
         mean(self.points.iter().map(|point| point[column])).unwrap_or(f64::NAN)
     }
@@ -68,12 +78,15 @@ impl Row {
 struct Times {
     bytes: f64,
     psnr: f64,
-    /// Of the whole, with one thread and with all.
-    whole: [f64; 2],
+    /// Of the whole, with one thread.
+    whole: f64,
+    /// How many times as fast all threads are.
+    scaling: f64,
     /// From bytes to Gaussians.
     parse: f64,
     /// From no Gaussians to samples.
     output: f64,
+    /// How many times as fast a thumbnail is.
     thumbnail: f64,
     /// From the first tenth of the bytes, at full size and at a quarter of it along each side.
     tenth: [f64; 2],
@@ -86,18 +99,47 @@ struct Times {
     evaluations: f64,
 }
 
-fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
+/// Our file of a picture, made when it is needed.
+struct OurFile<'a> {
+    picture: &'a Picture,
+    rate: f64,
+    coded: Option<gip::Coded>,
+}
+
+impl OurFile<'_> {
+    fn coded(&mut self) -> Result<&gip::Coded> {
+        if self.coded.is_none() {
+            let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(self.rate));
+            self.coded = Some(gip::code(encoder, self.picture, None)?);
+        }
+        self.coded.as_ref().context("it was just made")
+    }
+}
+
+/// Times of two things that take turns, and the first as a share of the second.
+fn in_turns(
+    mut first: impl FnMut() -> Result<f64>,
+    mut second: impl FnMut() -> Result<f64>,
+) -> Result<([f64; 2], f64)> {
+    let turns: Vec<[f64; 2]> =
+        (0..TURNS).map(|_| Ok([first()?, second()?])).collect::<Result<_>>()?;
+    let of = |get: fn(&[f64; 2]) -> f64| median(turns.iter().map(get)).context("no turns");
+    Ok(([of(|turn| turn[0])?, of(|turn| turn[1])?], of(|turn| turn[0] / turn[1])?))
+}
+
+fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
+    let (picture, rate) = (file.picture, file.rate);
     let mut store = bench.store(
         "decode.csv",
         ["rate", "image"],
         [
             "bytes",
             "psnr",
-            "seconds_one",
-            "seconds_all",
+            "seconds",
+            "scaling",
             "seconds_parse",
             "seconds_output",
-            "seconds_thumbnail",
+            "thumbnail",
             "seconds_tenth",
             "seconds_tenth_small",
             "gaussians_tenth",
@@ -108,30 +150,36 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
     )?;
     let key = [&rate.to_string(), &picture.name];
     let values = store.get(&bench.product, key.map(String::as_str), || {
-        let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
-        let coded = gip::code(encoder, picture, None)?;
+        let coded = file.coded()?;
         let file = &coded.file;
         let mut out = vec![0; picture.rgb.len()];
         let one = RenderOptions::new().parallel(false);
         let (rendered, held) = memory::peak(|| render(file, &one, &mut out));
         rendered?;
-        let mut whole = |options| seconds(|| render(file, options, &mut out));
+        let whole_turn = |options: &RenderOptions| {
+            let mut out = vec![0; picture.rgb.len()];
+            gip::median_seconds(IN_A_TURN, || render(file, options, &mut out))
+        };
+        let ([whole, _], scaling) =
+            in_turns(|| whole_turn(&one), || whole_turn(&RenderOptions::new()))?;
         let nothing = one.clone().prefix(0);
         let mut stream = StreamDecoder::new();
         stream.feed(file)?;
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = one.clone().size(width, height);
+        let turn = || gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out));
+        let (_, faster) = in_turns(|| whole_turn(&one), turn)?;
         let tenth = &file[..file.len() / 10];
         let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
             coded.bytes,
             coded.distortion.psnr,
-            whole(&one)?,
-            whole(&RenderOptions::new())?,
+            whole,
+            scaling,
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
-            seconds(|| thumbnail(file, &small, &mut out))?,
+            faster,
             seconds(|| beginning(tenth, &one, &mut out))?,
             seconds(|| beginning(tenth, &preview, &mut out))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
@@ -140,12 +188,13 @@ fn ours(bench: &Bench, picture: &Picture, rate: f64) -> Result<Times> {
             evaluations(stream.gaussians(), picture.width, picture.height),
         ])
     })?;
-    let [bytes, psnr, one, all, parse, output, thumbnail, rest @ ..] = values;
+    let [bytes, psnr, whole, scaling, parse, output, thumbnail, rest @ ..] = values;
     let [tenth, preview, tenth_gaussians, memory, gaussians, evaluations] = rest;
     Ok(Times {
         bytes,
         psnr,
-        whole: [one, all],
+        whole,
+        scaling,
         parse,
         output,
         thumbnail,
@@ -234,10 +283,11 @@ fn against_others(
     let others = || BASELINES.iter().chain([&SEQUENTIAL_JPEG]);
     rows.extend(others().map(|other| Row { decoder: other.name, points: Vec::new() }));
     for picture in pictures {
-        let times = ours(bench, picture, rate)?;
-        rows[0].points.push([picture.rate(times.bytes), times.psnr, times.whole[0]]);
+        let mut file = OurFile { picture, rate, coded: None };
+        let times = ours(bench, &mut file)?;
+        rows[0].points.push([picture.rate(times.bytes), times.psnr, times.whole, 1.0]);
         for (row, other) in rows[1..].iter_mut().zip(others()) {
-            row.points.push(theirs(bench, files, other, picture, rate)?);
+            row.points.push(theirs(bench, files, other, &mut file)?);
         }
         all.push(times);
     }
@@ -248,13 +298,13 @@ fn theirs(
     bench: &mut Bench,
     files: &mut Files,
     other: &Baseline,
-    picture: &Picture,
-    rate: f64,
-) -> Result<[f64; 3]> {
+    file: &mut OurFile<'_>,
+) -> Result<[f64; 4]> {
+    let (picture, rate) = (file.picture, file.rate);
     let mut store = bench.store(
         "decoders.csv",
         ["codec", "quality", "image"],
-        ["bpp", "psnr", "decode_seconds"],
+        ["bpp", "psnr", "decode_seconds", "our_share"],
     )?;
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
@@ -262,8 +312,14 @@ fn theirs(
         Ok(files.baseline(worker, &versions, other, setting, picture)?.rate)
     })?;
     store.get(&beside(&product, &versions), [other.id, setting, &picture.name], || {
-        let coded = worker.code(other.id, setting, picture, Some(1), [1, REPEATS as u32])?;
-        Ok([picture.rate(coded.bytes), coded.distortion.psnr, coded.decode_seconds])
+        let coded = worker.code(other.id, setting, picture, Some(1), [1, 1])?;
+        let (ours, mut out) = (file.coded()?, vec![0; picture.rgb.len()]);
+        let one = RenderOptions::new().parallel(false);
+        let ([_, theirs], share) = in_turns(
+            || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
+            || worker.decode_again(IN_A_TURN),
+        )?;
+        Ok([picture.rate(coded.bytes), coded.distortion.psnr, theirs, share])
     })
 }
 
@@ -281,21 +337,20 @@ fn ratios(all: &[Measured]) -> String {
             "most",
         ]);
         for row in rows {
-            let pairs = rows[0].points.iter().zip(&row.points);
-            let mut shares: Vec<f64> = pairs.map(|(ours, theirs)| ours[2] / theirs[2]).collect();
-            shares.sort_by(f64::total_cmp);
-            let [least, most] = [shares[0], shares[shares.len() - 1]];
+            let shares = row.points.iter().map(|point| point[3]);
+            let [least, most] =
+                [shares.clone().fold(f64::NAN, f64::min), shares.fold(f64::NAN, f64::max)];
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),
                 format!("{:.2}", row.mean(1)),
                 format!("{:.2}", 1000.0 * row.mean(2)),
-                format!("{:.2}", shares[shares.len() / 2]),
+                format!("{:.2}", row.share()),
                 format!("{least:.2}"),
                 format!("{most:.2}"),
             ]);
         }
-        let faster = rows.iter().filter(|row| row.mean(2) < rows[0].mean(2));
+        let faster = rows.iter().filter(|row| row.share() > 1.0);
         text.push_str(&format!(
             "\nFiles of about {rate} bits per pixel:\n{}\nWorse: ours is slower than {}.\n",
             table.finish(),
@@ -335,7 +390,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
     for Measured { rate, ours, .. } in all {
         let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
         let pixels = f64::from(pictures[0].width * pictures[0].height);
-        let [whole, parse, output] = [mean(|t| t.whole[0]), mean(|t| t.parse), mean(|t| t.output)];
+        let [whole, parse, output] = [mean(|t| t.whole), mean(|t| t.parse), mean(|t| t.output)];
         let evaluations = mean(|times| times.evaluations);
         let ms = |seconds: f64| format!("{:.2}", 1000.0 * seconds);
         stages.row(&[
@@ -350,10 +405,10 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         ]);
         gains.row(&[
             rate.to_string(),
-            format!("{:.2}", mean(|times| times.whole[0] / times.whole[1])),
-            format!("{:.1}", mean(|times| times.whole[0] / times.thumbnail)),
-            format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole[0])),
-            format!("{:.0} %", 100.0 * mean(|times| times.tenth[1] / times.whole[0])),
+            format!("{:.2}", mean(|times| times.scaling)),
+            format!("{:.1}", mean(|times| times.thumbnail)),
+            format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole)),
+            format!("{:.0} %", 100.0 * mean(|times| times.tenth[1] / times.whole)),
             format!("{:.1} %", 100.0 * mean(|times| times.tenth_gaussians / times.gaussians)),
         ]);
         let kilobytes = |bytes: f64| format!("{:.0}", 1e-3 * bytes);
