@@ -44,6 +44,10 @@ pub(crate) fn map<T: Send, R: Send>(
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
 }
 
+/// How often a thread asks whether the others are done before it falls asleep: some milliseconds.
+#[cfg(feature = "rayon")]
+const PATIENCE: u32 = 10_000;
+
 /// Counts a thread as busy as long as it lives.
 #[cfg(feature = "rayon")]
 struct Busy<'a>(&'a AtomicUsize);
@@ -82,9 +86,12 @@ fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Sen
             scope.spawn(|_| run());
         }
         run();
-        // What is left is under way and soon done. To fall asleep until then takes longer, and so
-        // does it to wake up the others for what comes next.
-        while busy.load(Ordering::Relaxed) > 0 {
+        // What is left is under way and mostly soon done. To fall asleep until then takes longer,
+        // and so does it to wake up the others for what comes next.
+        for _ in 0..PATIENCE {
+            if busy.load(Ordering::Relaxed) == 0 {
+                break;
+            }
             std::thread::yield_now();
         }
     });
