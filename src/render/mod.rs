@@ -149,8 +149,8 @@ impl<'a> Picture<'a> {
         let strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
         threads::for_each(options.parallel, strips, |memory: &mut Band, (band, strip)| {
             job.band(memory, band, |planes, x, y| {
-                let place = Place { x, rows: &mut strip[y * stride..], stride };
-                output::write_interleaved(job.backend, planes, job.sources, place);
+                let mut place = Place { x, rows: &mut strip[y * stride..], stride };
+                output::write_interleaved(job.backend, planes, job.sources, &mut place);
             });
         });
         Ok(())

@@ -133,7 +133,7 @@ pub(super) fn write_interleaved<T: Sample>(
     backend: Backend,
     planes: &[Plane],
     sources: &[Option<usize>],
-    place: Place<'_, T>,
+    place: &mut Place<'_, T>,
 ) {
     match *sources {
         [a] => write_channels(backend, planes, [a], place),
@@ -148,7 +148,7 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
     backend: Backend,
     planes: &[Plane],
     sources: [Option<usize>; CHANNELS],
-    place: Place<'_, T>,
+    place: &mut Place<'_, T>,
 ) {
     match backend {
         Backend::Reference => write_rows(place, |row| pixels(planes, sources, row)),
@@ -163,9 +163,10 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
 
 #[inline(always)]
 fn write_rows<T: Sample, const CHANNELS: usize>(
-    Place { x, rows, stride }: Place<'_, T>,
+    Place { x, rows, stride }: &mut Place<'_, T>,
     pixels: impl Fn(usize) -> [[T; CHANNELS]; TILE_WIDTH],
 ) {
+    let (x, stride) = (*x, *stride);
     let rows = rows.chunks_mut(stride).take(TILE_HEIGHT);
     let tiles = rows.map(|samples| samples[x * CHANNELS..].as_chunks_mut().0);
     if stride / CHANNELS - x >= TILE_WIDTH {

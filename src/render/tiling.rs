@@ -167,12 +167,12 @@ fn tiles(
     // Pixel i has its centre at i + 0.5.
     let shift = origin as f32 + 0.5;
     let (length, one) = (length as f32, size as f32);
-    // Truncation is towards zero, so the first pixel is at most one too early. What lies beyond
-    // either end begins after it ends.
+    // Rounded up, but for a quarter of a pixel, which is far more than what rounding loses; the
+    // last pixel is rounded down. What lies beyond either end begins after it ends.
     let mut first = low;
     let mut last = high;
     for lane in 0..LANES {
-        first[lane] = smaller(larger(low[lane] - shift, 0.0), length + one);
+        first[lane] = smaller(larger(low[lane] - shift + 0.75, 0.0), length + one);
         last[lane] = smaller(larger(high[lane] - shift, -one), length - 1.0);
     }
     let (mut first, mut last) = (truncated(first), truncated(last));
