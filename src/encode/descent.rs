@@ -13,6 +13,7 @@ use crate::coding::set::{Costs, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 use crate::lattice::{Code, MAX_CLASS};
+use crate::render::{Kernel, TILE_HEIGHT, TILE_WIDTH};
 
 /// Side of the blocks by which Gaussians that do not touch are told apart, in pixels.
 const BLOCK: usize = 16;
@@ -31,6 +32,8 @@ pub(crate) struct Descent<'a> {
     pub(crate) model: ColorModel,
     /// Bits of the tree of cells for each Gaussian.
     pub(crate) tree: f32,
+    /// Bits that a tile of the decoder is worth, for the time that it takes.
+    pub(crate) tile: f32,
     /// Squared error that a bit is worth.
     pub(crate) lambda: f32,
 }
@@ -250,7 +253,8 @@ impl Descent<'_> {
     }
 
     fn bits(&self, code: Code, place: Place<'_>) -> f32 {
-        self.tree + self.coding.cost(code, place.level, place.costs)
+        let tiles = tiles(self.coding.lattice.shape(&code).cholesky);
+        self.tree + self.coding.cost(code, place.level, place.costs) + self.tile * tiles
     }
 
     /// A step up and down in each component of the geometry.
@@ -275,4 +279,11 @@ impl Descent<'_> {
             .filter_map(move |(axis, forward)| lattice.moved(&code, axis, forward, &grid));
         shapes.chain(moves)
     }
+}
+
+/// About how many of the decoder's tiles a Gaussian touches: those of its bounding box.
+pub(crate) fn tiles([l11, l21, l22]: [f32; 3]) -> f32 {
+    let radius = Kernel::Quartic.cutoff().sqrt();
+    let along = |sigma: f32, side: usize| 2.0 * radius * sigma / side as f32 + 1.0;
+    along(l11, TILE_WIDTH) * along((l21 * l21 + l22 * l22).sqrt(), TILE_HEIGHT)
 }
