@@ -513,9 +513,7 @@ impl<R: std::io::Read> Decoder<R> {
         let stream = StreamDecoder::with_limits(limits);
         let options = crate::render::RenderOptions::new();
         let mut decoder = Self { reader, stream, options };
-        while !decoder.stream.has_begun() {
-            decoder.read_some()?;
-        }
+        decoder.read_until(StreamDecoder::has_begun)?;
         Ok(decoder)
     }
 
@@ -564,7 +562,8 @@ impl<R: std::io::Read> Decoder<R> {
     /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
     /// decoded until then.
     pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
-        self.read_until(StreamDecoder::is_complete)
+        self.read_until(StreamDecoder::is_complete)?;
+        self.decode_waiting()
     }
 
     /// Reads until so many Gaussians have arrived, or all: enough layers for a thumbnail, with
@@ -573,7 +572,8 @@ impl<R: std::io::Read> Decoder<R> {
     /// # Errors
     /// As [`Decoder::read_to_end`].
     pub fn read_at_least(&mut self, gaussians: u32) -> Result<(), DecodeError> {
-        self.read_until(|stream| stream.arrived() >= gaussians as usize || stream.is_complete())
+        self.read_until(|stream| stream.arrived() >= gaussians as usize || stream.is_complete())?;
+        self.decode_waiting()
     }
 
     /// The picture so far.
@@ -601,14 +601,20 @@ impl<R: std::io::Read> Decoder<R> {
         self.picture().render_u16(&self.options, out)
     }
 
-    /// Reads until something is reached, then decodes what has arrived.
+    /// Reads until something is reached.
     fn read_until(&mut self, reached: impl Fn(&StreamDecoder) -> bool) -> Result<(), DecodeError> {
-        let mut outcome = Ok(());
-        while outcome.is_ok() && !reached(&self.stream) {
-            outcome = self.read_some();
+        while !reached(&self.stream) {
+            if let Err(error) = self.read_some() {
+                // What was wrong with what came earlier is to be told.
+                self.decode_waiting()?;
+                return Err(error);
+            }
         }
-        // What was wrong with what came earlier is to be told.
-        self.stream.decode_waiting(self.options.is_parallel()).and(outcome)
+        Ok(())
+    }
+
+    fn decode_waiting(&mut self) -> Result<(), DecodeError> {
+        self.stream.decode_waiting(self.options.is_parallel())
     }
 
     /// Takes one piece of the file.
