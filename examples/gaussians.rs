@@ -5,7 +5,7 @@
 //!         photo.gip photo.bin
 //!
 //! They are x, y, the conic a, b, c, and the colour. A pixel is the base colour plus, for every
-//! Gaussian, its colour times `(1 - q / 8)^4` where q < 8, with
+//! Gaussian, its colour times `(1 - q / 4)^2` where q < 4, with
 //! `q = a dx dx + 2 b dx dy + c dy dy` (spec/gip.md, section 9).
 
 use std::error::Error;

@@ -21,7 +21,7 @@ pub struct Limits {
     /// not counted. Default 512 MiB.
     pub max_memory: u64,
     /// Most kernel evaluations in one rendering: the sum over the Gaussians of the pixels that
-    /// each covers at most, in whole tiles of 16x8 and as if it were as wide everywhere as at its
+    /// each covers at most, in whole tiles of 8x8 and as if it were as wide everywhere as at its
     /// widest. Default 2^32, a few seconds on one core.
     pub max_work: u64,
 }

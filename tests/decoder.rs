@@ -90,7 +90,7 @@ proptest! {
         color in 0_u8..4,
         sixteen in any::<bool>(),
         size in (1_u32..=1 << 16, 1_u32..=4096),
-        kernel in prop_oneof![Just((QUARTIC, 8.0)), (Just(EXPONENTIAL), 1e-30_f32..=64.0)],
+        kernel in prop_oneof![Just((QUARTIC, 4.0)), (Just(EXPONENTIAL), 1e-30_f32..=64.0)],
         chart in 0_u8..3,
         base in any::<[u16; 4]>(),
     ) {
@@ -412,7 +412,7 @@ fn errors_name_the_chunk_and_the_rule() {
         (&|h| h.layers = 0, "GHDR: Gaussians, but no layer"),
         (&|h| h.layers = 2, "GHDR: more layers than Gaussians"),
         (&|h| h.gaussians = 0, "GHDR: more layers than Gaussians"),
-        (&|h| h.cutoff = 8.5, "GHDR: a cut-off of the quartic kernel that is not 8"),
+        (&|h| h.cutoff = 8.5, "GHDR: a cut-off of the quartic kernel that is not 4"),
         (&|h| (h.kernel, h.cutoff) = (0, 0.0), "GHDR: a cut-off that is not in (0, 64]"),
         (&|h| (h.kernel, h.cutoff) = (0, 64.5), "GHDR: a cut-off that is not in (0, 64]"),
         (&|h| (h.kernel, h.cutoff) = (0, f32::NAN), "GHDR: a cut-off that is not in (0, 64]"),

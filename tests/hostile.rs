@@ -157,7 +157,7 @@ fn spans_without_pixels_count_as_work() {
     let _alone = alone();
     // Needles that pass every row of a tall picture, most of the time beside it.
     let rows: Vec<Vec<f32>> =
-        (0..6000).map(|i| vec![2e6 + i as f32, 30_000.0, 1e6, 1e7, 1.0, 0.1]).collect();
+        (0..12_000).map(|i| vec![2e6 + i as f32, 30_000.0, 1e6, 1e7, 1.0, 0.1]).collect();
     let header = Ghdr { width: 1, height: 60_000, ..Ghdr::default() };
     let decoder = decode_valid(&File::of_floats(header, &rows).bytes());
     let start = Instant::now();

@@ -29,7 +29,7 @@ fn scene(color: u8, chart: u8, kernel: (u8, f32), size: (u32, u32), rows: &[Vec<
     File::of_floats(header, rows)
 }
 
-const SMOOTH: (u8, f32) = (QUARTIC, 8.0);
+const SMOOTH: (u8, f32) = (QUARTIC, 4.0);
 const PAPER: (u8, f32) = (EXPONENTIAL, 11.082_527);
 const WIDE: (u8, f32) = (EXPONENTIAL, 64.0);
 
@@ -297,7 +297,7 @@ fn exact(file: &File) -> (Vec<f64>, Vec<f64>) {
             let weight = match header.kernel {
                 EXPONENTIAL if q <= f64::from(header.cutoff) => (q * -0.5).exp(),
                 EXPONENTIAL => 0.0,
-                _ => (1.0 - q / 8.0).max(0.0).powi(4),
+                _ => (1.0 - q / 4.0).max(0.0).powi(2),
             };
             sums[pixel] += color * weight;
             // q comes from w dx + i22 dy, which cancels in a slanted needle; a sum rounds once

@@ -122,14 +122,14 @@ fn the_trace_of_one_pixel_is_what_prefixes_give() {
         let mut planes = [0.0; 6 * 4 * 3];
         let options = RenderOptions::new().prefix(index as u32 + 1);
         picture.render_planes(&options, &mut planes).expect("a sound request");
-        let found = [0, 1, 2].map(|plane| planes[plane * 24 + 6 + 2]);
+        let found = [0, 1, 2].map(|plane| planes[plane * 24 + 6 + 1]);
         assert_eq!(found, [row[3], row[4], row[5]].map(number));
 
         let [xx, xy, yy] = gaussian.conic();
-        let (dx, dy) = (2.5 - gaussian.center[0], 1.5 - gaussian.center[1]);
+        let (dx, dy) = (1.5 - gaussian.center[0], 1.5 - gaussian.center[1]);
         let q = xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy;
         assert!((number(row[1]) - q).abs() < 1e-5 * q, "q is {q}");
-        let weight = (1.0 - q / 8.0).max(0.0).powi(4);
+        let weight = (1.0 - q / 4.0).max(0.0).powi(2);
         assert!((number(row[2]) - weight).abs() < 1e-5, "the weight is {weight}");
     }
 }

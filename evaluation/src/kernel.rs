@@ -42,7 +42,7 @@ fn sums<S: Simd>(simd: S, gaussians: &[[f32; 8]]) -> [f32; 16] {
         for (row, sums) in sums.iter_mut().enumerate() {
             let v = slant + i22 * (row as f32 - dy);
             let root = (column - v * v).max(0.0);
-            let weight = root * root * (root * root);
+            let weight = root * root;
             sums[0] += weight * red;
             sums[1] += weight * green;
             sums[2] += weight * blue;

@@ -172,7 +172,7 @@ impl File {
     fn header(&self, layers: &[(u32, Vec<u8>)]) -> Vec<u8> {
         let (kernel, cutoff) = match self.kernel {
             Kernel::Exponential(cutoff) => (0, (f32::from(cutoff) + 1.0) / 1024.0),
-            Kernel::Quartic => (1, 8.0),
+            Kernel::Quartic => (1, 4.0),
         };
         let gaussians: u32 = layers.iter().map(|&(count, _)| count).sum();
         let depth = if self.sixteen_bit { 16 } else { 8 };

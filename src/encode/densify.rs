@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use super::chart;
 use super::gradient::Pass;
 use super::optimizer::{Bounds, Row};
-use super::raster::Raster;
+use super::raster::{Plane, Raster, TILE_WIDTH};
 use super::training::{Densification, Distortion, Filter, NewColor, NewShape, Placement};
 use crate::gaussian::{Chart, MAX_COMPONENTS};
-use crate::render::{Plane, TILE_HEIGHT, TILE_WIDTH};
+use crate::render::TILE_HEIGHT;
 
 /// Gaussians whose peak is below this share of a full sample are useless: a 16th of a step of 8
 /// bits.

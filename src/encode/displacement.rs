@@ -8,11 +8,11 @@
 use crate::gaussian::Gaussian;
 
 /// Half of the second derivatives of a Gaussian's squared error, for one whose colour times the
-/// root of its area is 1: integrals of the quartic kernel (1 - q/8)^4.
-const POSITION: f32 = 1.795_196;
-const SIZE: f32 = 3.590_392;
-const RATIO: f32 = 3.191_459;
-const SLANT: f32 = 0.797_865;
+/// root of its area is 1: integrals of the quartic kernel (1 - q/4)^2.
+const POSITION: f32 = 2.094_395;
+const SIZE: f32 = 4.188_79;
+const RATIO: f32 = 3.351_032;
+const SLANT: f32 = 0.837_758;
 
 /// From one Gaussian to another, or a slope along that way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -90,14 +90,14 @@ impl Displacement {
     }
 }
 
-/// Sums over the pixels of a Gaussian: its colour times the error, with t = 1 - q/8 and its place.
+/// Sums over the pixels of a Gaussian: its colour times the error, with t = 1 - q/4 and its place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
-    /// With t^3 u and t^3 v.
+    /// With t u and t v.
     pub(crate) first: [f32; 2],
-    /// With t^3 u^2, t^3 u v and t^3 v^2.
+    /// With t u^2, t u v and t v^2.
     pub(crate) second: [f32; 3],
-    /// With t^4.
+    /// With t^2.
     pub(crate) along: f32,
 }
 
@@ -124,7 +124,7 @@ mod tests {
         let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
         let u = (x - f64::from(gaussian.center[0])) / l11;
         let v = (y - f64::from(gaussian.center[1]) - l21 * u) / l22;
-        f64::from(gaussian.color[0]) * (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4)
+        f64::from(gaussian.color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
     }
 
     /// The squared difference of two Gaussians and of a third from the first, over fine pixels.

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use super::chart::Moments;
 use super::error::EncodeError;
 use super::progress::Observer;
-use super::raster::{FULL_SCALE, Raster, SamplePlane};
+use super::raster::{FULL_SCALE, Plane, Raster, SamplePlane, TILE_WIDTH, centers};
 use super::tiling::{TileRow, Tiling};
-use crate::render::{Kernel, Plane, Region, Splat, TILE_HEIGHT, TILE_WIDTH, centers, kernel_simd};
+use crate::render::{Kernel, Region, Splat, TILE_HEIGHT, kernel_simd};
 
 /// Sums of a Gaussian in a row of tiles: five of the geometry, then one by channel.
 type Slot = [f32; 8];
@@ -272,15 +272,13 @@ impl TrainingKernel for kernel_simd::Exponential {
 impl TrainingKernel for kernel_simd::Quartic {
     #[inline(always)]
     fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let t = (f32x16::splat(simd, 1.0) - q * 0.125).max(0.0);
-        let t2 = t * t;
-        (t, t2 * t2)
+        let t = (f32x16::splat(simd, 1.0) - q * 0.25).max(0.0);
+        (t, t * t)
     }
 
     #[inline(always)]
     fn backward<S: Simd>(self, t: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let t3 = t * t * t;
-        (t3 * t, t3)
+        (t * t, t)
     }
 }
 
@@ -494,7 +492,7 @@ mod tests {
                     let determinant = xx * yy - xy * xy;
                     let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
                     let weight = match kernel {
-                        Kernel::Quartic => (1.0 - q / 8.0).max(0.0).powi(4),
+                        Kernel::Quartic => (1.0 - q / 4.0).max(0.0).powi(2),
                         Kernel::Exponential { cutoff } if q <= f64::from(cutoff) => {
                             (-q / 2.0).exp()
                         }

@@ -233,8 +233,7 @@ impl Patch {
             for (index, errors) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
                 let [u, v] = weights.place(simd, x + index * LANES, y);
                 let root = root(simd, [u, v]);
-                let cube = root * root * root;
-                let weight = cube * root;
+                let weight = weight(root);
                 let mut square = weight * weight;
                 let mut along = zero;
                 for channel in 0..CHANNELS {
@@ -249,8 +248,8 @@ impl Patch {
                     along += error * gaussian.color[channel];
                 }
                 squares += square;
-                // dweight/dq is -cube / 2, and q is u^2 + v^2.
-                let slope = along * cube;
+                // dweight/dq is -root / 2, and q is u^2 + v^2.
+                let slope = along * root;
                 let (by_u, by_v) = (slope * u, slope * v);
                 first[0] += by_u;
                 first[1] += by_v;
@@ -358,7 +357,7 @@ mod tests {
         let (x, y) = (pixel % WIDTH, pixel / WIDTH);
         let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
         let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
-        (1.0 - (u * u + v * v) / 8.0).max(0.0).powi(4)
+        (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
     }
 
     /// The sum of squared errors with a Gaussian added to the rendering `factor` times, in f64.

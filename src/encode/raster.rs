@@ -1,12 +1,19 @@
 //! The source picture as planes, tile by tile, in the layout of the training pass.
 
+use fearless_simd::{Simd, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::source::Source;
-use crate::render::{TILE_HEIGHT, TILE_WIDTH};
+use crate::render::TILE_HEIGHT;
 
-/// One channel of a tile, row by row, [`FULL_SCALE`] being a full sample: half as large as floats
-/// and as exact.
+/// Pixels per row of a tile of the training pass: twice as wide as the decoder's, since each splat of
+/// a tile has sums to be gathered afterwards.
+pub(crate) const TILE_WIDTH: usize = 16;
+
+/// One channel of a tile, row by row.
+pub(crate) type Plane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
+/// One channel of the source in a tile, row by row, [`FULL_SCALE`] being a full sample: half as large
+/// as floats and as exact.
 pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];
 /// What a full sample is in a [`SamplePlane`].
 pub(crate) const FULL_SCALE: f32 = 65535.0;
@@ -95,4 +102,10 @@ impl Raster {
     pub(crate) fn memory(&self) -> usize {
         size_of_val(&self.planes[..])
     }
+}
+
+/// The pixel centres of the sixteen columns from `x` on.
+#[inline(always)]
+pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
+    f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
 }

@@ -19,10 +19,10 @@ const STEPS: (f64, f64) = (1e-4, 16.0);
 const LAMBDA: f32 = 0.322;
 /// Steps of geometry that harm as much as a step of colour, for a Gaussian whose colour times the
 /// root of its area is 1: from integrals of the quartic kernel's derivatives.
-const POSITION: f32 = 1.25;
-const SIZE: f32 = 0.88;
-const RATIO: f32 = 0.935;
-const SLANT: f32 = 1.87;
+const POSITION: f32 = 1.095;
+const SIZE: f32 = 0.775;
+const RATIO: f32 = 0.866;
+const SLANT: f32 = 1.732;
 /// How much of what bits are worth counts in training: all of it leaves less error to be corrected
 /// later than it saves.
 const SHRINKAGE: f32 = 0.4;

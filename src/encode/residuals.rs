@@ -5,9 +5,8 @@ use core::ops::Range;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
 use rayon::prelude::*;
 
-use super::raster::Raster;
+use super::raster::{Raster, centers};
 use crate::gaussian::{Gaussian, inverse_cholesky};
-use crate::render::centers;
 
 pub(crate) const LANES: usize = 16;
 pub(crate) type Lanes = [f32; LANES];
@@ -16,7 +15,7 @@ const BAND: usize = 64;
 /// How much larger than its Gaussian a patch is, for candidates to lie within, and in pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
 /// Mahalanobis distance at which the quartic kernel ends.
-const RADIUS: f32 = 2.828_427;
+const RADIUS: f32 = 2.0;
 
 /// Rendering minus source, before clamping.
 #[derive(Debug)]
@@ -252,14 +251,13 @@ impl Weights {
     }
 }
 
-/// 1 - q / 8, the fourth power of which is the quartic kernel.
+/// 1 - q / 4, the square of which is the quartic kernel.
 #[inline(always)]
 pub(crate) fn root<S: Simd>(simd: S, [u, v]: [f32x16<S>; 2]) -> f32x16<S> {
-    (f32x16::splat(simd, 1.0) - (u * u + v * v) * 0.125).max(0.0)
+    (f32x16::splat(simd, 1.0) - (u * u + v * v) * 0.25).max(0.0)
 }
 
 #[inline(always)]
 pub(crate) fn weight<S: Simd>(root: f32x16<S>) -> f32x16<S> {
-    let squared = root * root;
-    squared * squared
+    root * root
 }

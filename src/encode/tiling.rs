@@ -3,6 +3,7 @@
 use fearless_simd::Level;
 use rayon::prelude::*;
 
+use super::raster::TILE_WIDTH;
 use crate::render::{Grid, Region, Splat};
 
 /// Splats that one thread bins in one go.
@@ -11,7 +12,7 @@ const PIECE: usize = 256;
 /// For every row of tiles of a picture, the splats that may touch it, in order.
 #[derive(Debug)]
 pub(crate) struct Tiling {
-    grid: Grid,
+    grid: Grid<TILE_WIDTH>,
     /// `spans[starts[r]..starts[r + 1]]` are the spans of row r.
     starts: Vec<usize>,
     spans: Vec<Span>,

@@ -12,7 +12,7 @@ use super::footprint::LANES;
 use super::groups::{Group, Groups, MOST_TOGETHER};
 use super::kernel::Kernel;
 use super::splat::{Block, Splat, fill};
-use super::tile::{Backend, TILE_PIXELS};
+use super::tile::{Backend, TILE_PIXELS, TILE_WIDTH};
 #[cfg(feature = "std")]
 use super::tiling::truncated_at_once;
 use super::tiling::{Columns, Extent, Grid, truncated};
@@ -39,7 +39,7 @@ const LEAST_APART: usize = 512;
 /// Which Gaussians may show in which band.
 #[derive(Debug)]
 pub(crate) struct Bands {
-    grid: Grid,
+    grid: Grid<TILE_WIDTH>,
     /// In file order, of some Gaussians each: one for each thread.
     parts: Vec<Part>,
 }
@@ -101,6 +101,11 @@ impl Bands {
         self.parts.iter().map(move |part| &part.members[part.starts[band]..part.starts[band + 1]])
     }
 
+    /// How many Gaussians may show in a band.
+    pub(crate) fn load(&self, band: usize) -> usize {
+        self.members(band).map(<[u32]>::len).sum()
+    }
+
     pub(crate) fn columns(&self) -> usize {
         self.grid.columns
     }
@@ -129,7 +134,7 @@ struct Reaches {
 impl Reaches {
     fn new(
         Scene { gaussians, view, kernel }: &Scene<'_>,
-        grid: &Grid,
+        grid: &Grid<TILE_WIDTH>,
         bands: usize,
         backend: Backend,
         limits: &Limits,

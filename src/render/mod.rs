@@ -12,6 +12,7 @@ mod view;
 
 use alloc::format;
 use alloc::vec::Vec;
+use core::cmp::Reverse;
 
 pub use kernel::Kernel;
 pub use view::{Region, RenderOptions};
@@ -22,14 +23,12 @@ pub(crate) use output::Sample;
 #[cfg(feature = "encode")]
 pub(crate) use splat::Splat;
 #[cfg(feature = "encode")]
-pub(crate) use tile::centers;
-#[cfg(feature = "encode")]
 pub(crate) use tiling::Grid;
 
 use band::{BAND_ROWS, Band, Bands, Scene};
 use output::Place;
-use tile::Tile;
-pub(crate) use tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
+pub(crate) use tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
+use tile::{PAIR_WIDTH, Plane, Tile};
 
 use crate::container::Header;
 use crate::error::{DecodeError, LimitKind};
@@ -135,6 +134,7 @@ impl<'a> Picture<'a> {
             });
             strips.push((band, strip.collect::<Vec<_>>()));
         }
+        job.sort(&mut strips);
         threads::for_each(options.parallel, strips, |memory: &mut Band, (band, mut strip)| {
             job.band(memory, band, |planes, x, y| {
                 output::write_planes(planes, (x, y), job.sources, &mut strip, width);
@@ -146,7 +146,8 @@ impl<'a> Picture<'a> {
     fn render<T: Sample>(&self, options: &RenderOptions, out: &mut [T]) -> Result<(), DecodeError> {
         let job = self.prepare(options, out.len())?;
         let stride = job.scene.view.region.width as usize * job.sources.len();
-        let strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
+        let mut strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
+        job.sort(&mut strips);
         threads::for_each(options.parallel, strips, |memory: &mut Band, (band, strip)| {
             job.band(memory, band, |planes, x, y| {
                 let mut place = Place { x, rows: &mut strip[y * stride..], stride };
@@ -195,6 +196,11 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// Puts the bands with the most Gaussians first, so that threads end at the same time.
+    fn sort<T>(&self, strips: &mut [(usize, T)]) {
+        strips.sort_by_key(|&(band, _)| Reverse(self.bands.load(band)));
+    }
+
     /// Renders one band in the memory of an earlier one, and hands each tile over with its first
     /// column in the region and its first row in the band.
     fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
@@ -214,18 +220,24 @@ impl Job<'_> {
         mut write: impl FnMut(&[Plane], usize, usize),
     ) {
         let base: [f32; CHANNELS] = core::array::from_fn(|channel| self.base[channel]);
-        let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];
         for row in 0..self.bands.rows(band) {
             let y = row * TILE_HEIGHT;
             let top = self.scene.view.region.y + (band * BAND_HEIGHT + y) as u32;
             let (groups, blocks) = memory.row(self.backend, self.bands.columns(), row);
-            for column in 0..self.bands.columns() {
-                let x = column * TILE_WIDTH;
-                let origin = (self.scene.view.region.x + x as u32, top);
-                let members = groups.members(column);
-                Tile { origin, base, blocks, members, kernel: self.scene.kernel }
-                    .render(self.backend, &mut planes);
-                write(&planes, x, y);
+            let columns = self.bands.columns();
+            for first in (0..columns).step_by(2) {
+                for (half, column) in (first..columns.min(first + 2)).enumerate() {
+                    let x = (column * TILE_WIDTH) as u32;
+                    let origin = (self.scene.view.region.x + x, top);
+                    let members = groups.members(column);
+                    Tile { origin, base, blocks, members, kernel: self.scene.kernel }.render(
+                        self.backend,
+                        half,
+                        &mut planes,
+                    );
+                }
+                write(&planes, first * TILE_WIDTH, y);
             }
         }
     }

@@ -3,7 +3,7 @@
 #[cfg(feature = "std")]
 use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u8x16, u8x64};
 
-use super::tile::{Backend, Plane, TILE_HEIGHT, TILE_WIDTH};
+use super::tile::{Backend, PAIR_WIDTH, Plane, TILE_HEIGHT};
 use crate::color::ColorModel;
 
 /// An integer sample type.
@@ -20,13 +20,13 @@ pub(crate) trait Sample: Copy + Send {
         Self::from_integer((value.clamp(0.0, 1.0) * Self::SCALE + 0.5) as i32)
     }
 
-    /// The pixels of a row of a tile, from the numbers that the samples of each channel can be.
+    /// The pixels of a row of two tiles, from the numbers that the samples of each channel can be.
     #[cfg(feature = "std")]
     #[inline(always)]
     fn pixels<S: Simd, const CHANNELS: usize>(
         _: S,
         channels: [i32x16<S>; CHANNELS],
-    ) -> [[Self; CHANNELS]; TILE_WIDTH] {
+    ) -> [[Self; CHANNELS]; PAIR_WIDTH] {
         one_by_one(channels)
     }
 }
@@ -46,7 +46,7 @@ impl Sample for u8 {
     fn pixels<S: Simd, const CHANNELS: usize>(
         simd: S,
         channels: [i32x16<S>; CHANNELS],
-    ) -> [[Self; CHANNELS]; TILE_WIDTH] {
+    ) -> [[Self; CHANNELS]; PAIR_WIDTH] {
         if CHANNELS < 3 {
             return one_by_one(channels);
         }
@@ -56,7 +56,7 @@ impl Sample for u8 {
         }
         let order = u8x64::block_splat(u8x16::load_array(simd, word_order(CHANNELS)));
         let bytes = words.bitcast::<u8x64<S>>().swizzle_dyn_within_blocks(order).to_array();
-        let mut pixels = [[0; CHANNELS]; TILE_WIDTH];
+        let mut pixels = [[0; CHANNELS]; PAIR_WIDTH];
         let blocks = pixels.as_flattened_mut().chunks_exact_mut(4 * CHANNELS);
         for (samples, bytes) in blocks.zip(bytes.as_chunks::<16>().0) {
             samples.copy_from_slice(&bytes[..4 * CHANNELS]);
@@ -83,8 +83,8 @@ const fn word_order(channels: usize) -> [u8; 16] {
 #[inline(always)]
 fn one_by_one<S: Simd, T: Sample, const CHANNELS: usize>(
     channels: [i32x16<S>; CHANNELS],
-) -> [[T; CHANNELS]; TILE_WIDTH] {
-    let mut pixels = [[T::OPAQUE; CHANNELS]; TILE_WIDTH];
+) -> [[T; CHANNELS]; PAIR_WIDTH] {
+    let mut pixels = [[T::OPAQUE; CHANNELS]; PAIR_WIDTH];
     for (channel, samples) in channels.into_iter().enumerate() {
         for (pixel, sample) in pixels.iter_mut().zip(samples.to_array()) {
             pixel[channel] = T::from_integer(sample);
@@ -164,15 +164,15 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
 #[inline(always)]
 fn write_rows<T: Sample, const CHANNELS: usize>(
     Place { x, rows, stride }: &mut Place<'_, T>,
-    pixels: impl Fn(usize) -> [[T; CHANNELS]; TILE_WIDTH],
+    pixels: impl Fn(usize) -> [[T; CHANNELS]; PAIR_WIDTH],
 ) {
     let (x, stride) = (*x, *stride);
     let rows = rows.chunks_mut(stride).take(TILE_HEIGHT);
     let tiles = rows.map(|samples| samples[x * CHANNELS..].as_chunks_mut().0);
-    if stride / CHANNELS - x >= TILE_WIDTH {
+    if stride / CHANNELS - x >= PAIR_WIDTH {
         // Nearly all: copies of known length.
         for (row, samples) in tiles.enumerate() {
-            *samples.first_chunk_mut().expect("a whole tile") = pixels(row);
+            *samples.first_chunk_mut().expect("whole tiles") = pixels(row);
         }
     } else {
         for (row, samples) in tiles.enumerate() {
@@ -181,12 +181,12 @@ fn write_rows<T: Sample, const CHANNELS: usize>(
     }
 }
 
-/// The pixels of a row of a tile.
+/// The pixels of a row of two tiles.
 fn pixels<T: Sample, const CHANNELS: usize>(
     planes: &[Plane],
     sources: [Option<usize>; CHANNELS],
     row: usize,
-) -> [[T; CHANNELS]; TILE_WIDTH] {
+) -> [[T; CHANNELS]; PAIR_WIDTH] {
     let sample = |source: Option<usize>, column: usize| {
         source.map_or(T::OPAQUE, |plane| T::from_unit(planes[plane][row][column]))
     };
@@ -201,7 +201,7 @@ fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
     planes: &[Plane],
     sources: [Option<usize>; CHANNELS],
     row: usize,
-) -> [[T; CHANNELS]; TILE_WIDTH] {
+) -> [[T; CHANNELS]; PAIR_WIDTH] {
     let mut channels = [i32x16::splat(simd, T::SCALE as i32); CHANNELS];
     for (channel, source) in sources.into_iter().enumerate() {
         if let Some(plane) = source {
@@ -223,7 +223,7 @@ pub(super) fn write_planes(
 ) {
     for (source, strip) in sources.iter().zip(strips) {
         for (row, line) in strip[y * width..].chunks_mut(width).take(TILE_HEIGHT).enumerate() {
-            let end = width.min(x + TILE_WIDTH);
+            let end = width.min(x + PAIR_WIDTH);
             let line = &mut line[x..end];
             match source {
                 Some(plane) => line.copy_from_slice(&planes[*plane][row][..end - x]),

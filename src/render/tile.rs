@@ -8,16 +8,25 @@ use super::kernel::Kernel;
 #[cfg(feature = "std")]
 use super::kernel::simd::{Exponential, Quartic, Weight};
 use super::splat::Block;
+#[cfg(feature = "std")]
+use super::splat::Splat;
 
-/// Pixels per row of a tile: one AVX-512 register.
-pub(crate) const TILE_WIDTH: usize = 16;
+/// Pixels per row of a tile. Wider ones would be evaluated in vain more often, by a quarter of the
+/// work.
+pub(crate) const TILE_WIDTH: usize = 8;
+/// Pixels per row of two tiles, which become samples together.
+pub(crate) const PAIR_WIDTH: usize = 2 * TILE_WIDTH;
 /// Rows of a tile.
 pub(crate) const TILE_HEIGHT: usize = 8;
 /// Pixels of a tile.
 pub(crate) const TILE_PIXELS: usize = TILE_WIDTH * TILE_HEIGHT;
 
-/// One channel of a tile, row by row.
-pub(crate) type Plane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
+/// Rows that share a vector.
+#[cfg(feature = "std")]
+const TOGETHER: usize = 2;
+
+/// One channel of two tiles side by side, row by row.
+pub(crate) type Plane = [[f32; PAIR_WIDTH]; TILE_HEIGHT];
 
 /// Which code adds splats to tiles. All give the same bits.
 #[derive(Clone, Copy, Debug)]
@@ -66,23 +75,27 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
 }
 
 impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
-    pub(crate) fn render(&self, backend: Backend, planes: &mut [Plane; CHANNELS]) {
+    /// Renders it as the first or the second of its pair.
+    pub(crate) fn render(&self, backend: Backend, half: usize, planes: &mut [Plane; CHANNELS]) {
+        let left = half * TILE_WIDTH;
         match (backend, self.kernel) {
-            (Backend::Reference, _) => self.render_plainly(planes),
+            (Backend::Reference, _) => self.render_plainly(left, planes),
             #[cfg(feature = "std")]
             (Backend::Simd(level), Kernel::Exponential { cutoff }) => {
                 let kernel = Exponential { cutoff };
-                dispatch!(level, simd => self.render_with(simd, kernel, planes));
+                dispatch!(level, simd => self.render_with(simd, kernel, left, planes));
             }
             #[cfg(feature = "std")]
             (Backend::Simd(level), Kernel::Quartic) => {
-                dispatch!(level, simd => self.render_with(simd, Quartic, planes));
+                dispatch!(level, simd => self.render_with(simd, Quartic, left, planes));
             }
         }
     }
 
-    fn render_plainly(&self, planes: &mut [Plane; CHANNELS]) {
-        *planes = self.base.map(|base| [[base; TILE_WIDTH]; TILE_HEIGHT]);
+    fn render_plainly(&self, left: usize, planes: &mut [Plane; CHANNELS]) {
+        for (plane, base) in planes.iter_mut().zip(self.base) {
+            plane.iter_mut().for_each(|row| row[left..][..TILE_WIDTH].fill(base));
+        }
         for (block, lane) in self.members {
             let splat = &self.blocks[block][lane];
             for row in 0..TILE_HEIGHT {
@@ -91,7 +104,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
                     let py = (self.origin.1 as usize + row) as f32 + 0.5;
                     let weight = self.kernel.weight(splat.uv(px, py));
                     for (plane, color) in planes.iter_mut().zip(splat.color) {
-                        plane[row][column] += color * weight;
+                        plane[row][left + column] += color * weight;
                     }
                 }
             }
@@ -100,43 +113,80 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
 
     #[cfg(feature = "std")]
     #[inline(always)]
-    fn render_with<S: Simd, K: Weight>(&self, simd: S, kernel: K, planes: &mut [Plane; CHANNELS]) {
-        let px = centers(simd, self.origin.0);
-        let top = self.origin.1 as usize;
-        let py = f32x8::from_fn(simd, |row| (top + row) as f32 + 0.5);
+    fn render_with<S: Simd, K: Weight>(
+        &self,
+        simd: S,
+        kernel: K,
+        left: usize,
+        planes: &mut [Plane; CHANNELS],
+    ) {
+        // Exact, like every sum of them here.
+        const CENTERS: [f32; 8] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
+        let centers = f32x8::load_array(simd, CENTERS);
+        let px = centers + self.origin.0 as f32;
+        let (px, py) = (px.combine(px), centers + self.origin.1 as f32);
         // In registers, where there are enough: loading and storing would be half of the work.
-        let mut sums = [[f32x16::splat(simd, 0.0); TILE_HEIGHT]; CHANNELS];
+        let mut sums = [[f32x16::splat(simd, 0.0); TILE_HEIGHT / TOGETHER]; CHANNELS];
         for (sums, base) in sums.iter_mut().zip(self.base) {
-            *sums = [f32x16::splat(simd, base); TILE_HEIGHT];
+            *sums = [f32x16::splat(simd, base); TILE_HEIGHT / TOGETHER];
         }
-        for (block, lane) in self.members {
-            let splat = &self.blocks[block][lane];
-            let dx = px - splat.x;
-            let (column, slant) = (kernel.column(simd, dx * splat.i11), dx * splat.w);
-            // Through memory: a row takes its number from there within an addition, where taking it
-            // from a register would need instructions that compete with the arithmetic.
-            let shifts = core::hint::black_box(((py - splat.y) * splat.i22).to_array());
-            for row in 0..TILE_HEIGHT {
-                let v = slant + shifts[row];
-                let weight = kernel.weight(simd, column, v);
-                for (sums, color) in sums.iter_mut().zip(splat.color) {
-                    sums[row] += weight * color;
-                }
+        let mut members = self.members;
+        while let Some((block, lane)) = members.next() {
+            let first = &self.blocks[block][lane];
+            if let Some((block, lane)) = members.next() {
+                let second = &self.blocks[block][lane];
+                add(simd, kernel, (px, py), [first, second], &mut sums);
+            } else {
+                add(simd, kernel, (px, py), [first], &mut sums);
             }
         }
         for (sums, plane) in sums.iter().zip(planes) {
-            for (sum, values) in sums.iter().zip(plane) {
-                sum.store_array(values);
+            for (sum, rows) in sums.iter().zip(plane.as_chunks_mut::<TOGETHER>().0) {
+                let (upper, lower) = sum.split();
+                upper.store_slice(&mut rows[0][left..][..TILE_WIDTH]);
+                lower.store_slice(&mut rows[1][left..][..TILE_WIDTH]);
             }
         }
     }
 }
 
-/// The pixel centres of the sixteen columns from `x` on.
+/// Adds splats, one after the other in every pixel.
 #[cfg(feature = "std")]
 #[inline(always)]
-pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
-    f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
+fn add<S: Simd, K: Weight, const CHANNELS: usize, const SPLATS: usize>(
+    simd: S,
+    kernel: K,
+    (px, py): (f32x16<S>, f32x8<S>),
+    splats: [&Splat; SPLATS],
+    sums: &mut [[f32x16<S>; TILE_HEIGHT / TOGETHER]; CHANNELS],
+) {
+    let (mut columns, mut slants) = ([px; SPLATS], [px; SPLATS]);
+    let mut shifts = [[0.0; TILE_HEIGHT]; SPLATS];
+    for (index, splat) in splats.iter().enumerate() {
+        let dx = px - splat.x;
+        columns[index] = kernel.column(simd, dx * splat.i11);
+        slants[index] = dx * splat.w;
+        shifts[index] = ((py - splat.y) * splat.i22).to_array();
+    }
+    // Through memory: a row takes its number from there within an addition, where taking it
+    // from a register would need instructions that compete with the arithmetic.
+    let shifts = core::hint::black_box(shifts);
+    for rows in 0..TILE_HEIGHT / TOGETHER {
+        let mut weights = [px; SPLATS];
+        for index in 0..SPLATS {
+            let upper = f32x8::splat(simd, shifts[index][TOGETHER * rows]);
+            let lower = f32x8::splat(simd, shifts[index][TOGETHER * rows + 1]);
+            let v = slants[index] + upper.combine(lower);
+            weights[index] = kernel.weight(simd, columns[index], v);
+        }
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            let mut sum = sums[rows];
+            for (weight, splat) in weights.iter().zip(splats) {
+                sum += *weight * splat.color[channel];
+            }
+            sums[rows] = sum;
+        }
+    }
 }
 
 #[cfg(all(test, feature = "std"))]
@@ -172,13 +222,16 @@ mod tests {
         let members = Members::new(&groups);
         let render = |backend: Backend| {
             let base = [0.5; CHANNELS];
-            let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-            let tile = Tile { origin, base, blocks: &blocks, members, kernel };
-            tile.render(backend, &mut planes);
+            let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];
+            for half in 0..2 {
+                let origin = (origin.0 + (half * TILE_WIDTH) as u32, origin.1);
+                let tile = Tile { origin, base, blocks: &blocks, members, kernel };
+                tile.render(backend, half, &mut planes);
+            }
             planes.into_iter().flatten().flatten().map(f32::to_bits)
         };
         let pairs = render(Backend::Reference).zip(render(Backend::Simd(level)));
-        [pairs.filter(|(a, b)| a != b).count(), CHANNELS * TILE_PIXELS]
+        [pairs.filter(|(a, b)| a != b).count(), 2 * CHANNELS * TILE_PIXELS]
     }
 
     /// Positive numbers from 2^low to 2^high, every power of two as likely.

@@ -10,13 +10,13 @@ use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*};
 use super::footprint::{Ellipses, Footprints, LANES, larger, smaller};
 #[cfg(feature = "encode")]
 use super::splat::Splat;
-use super::tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
+use super::tile::{Backend, TILE_HEIGHT};
 use super::view::{Region, View};
 use crate::gaussian::Gaussian;
 
-/// The tiles of a region.
+/// The tiles of a region, each of `WIDTH` pixels by [`TILE_HEIGHT`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Grid {
+pub(crate) struct Grid<const WIDTH: usize> {
     region: Region,
     pub(crate) columns: usize,
     pub(crate) rows: usize,
@@ -26,11 +26,11 @@ pub(crate) struct Grid {
 /// same where it touches none.
 pub(crate) type Columns = [[u32; LANES]; 2];
 
-impl Grid {
+impl<const WIDTH: usize> Grid<WIDTH> {
     pub(crate) fn new(region: Region) -> Self {
         Self {
             region,
-            columns: (region.width as usize).div_ceil(TILE_WIDTH),
+            columns: (region.width as usize).div_ceil(WIDTH),
             rows: (region.height as usize).div_ceil(TILE_HEIGHT),
         }
     }
@@ -78,7 +78,7 @@ impl Grid {
         for row in rows.start.max(lowest)..rows.end.min(highest) {
             let top = y as f32 + (row * TILE_HEIGHT) as f32 + 0.5;
             let ends = footprints.columns(top, top + (TILE_HEIGHT - 1) as f32);
-            let [first, end] = tiles(ends, x, width, TILE_WIDTH, truncated);
+            let [first, end] = tiles(ends, x, width, WIDTH, truncated);
             let mut columns = [[0; LANES]; 2];
             for lane in 0..LANES {
                 let touched = first_row[lane] <= row as i32 && (row as i32) < end_row[lane];
@@ -134,7 +134,7 @@ impl Grid {
         let mut extents = [Extent::default(); LANES];
         for (lane, extent) in extents.iter_mut().enumerate() {
             // Casts saturate; both ends may lie within a tile.
-            let columns = (widths[lane] * (1.0 / TILE_WIDTH as f32)) as u32;
+            let columns = (widths[lane] * (1.0 / WIDTH as f32)) as u32;
             let columns = columns.saturating_add(2).min(self.columns as u32);
             let (first, end) = (first[lane] as u32, end[lane] as u32);
             *extent = Extent { first: first.min(end), end, columns };

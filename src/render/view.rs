@@ -2,6 +2,7 @@
 
 use alloc::format;
 
+use super::kernel::Kernel;
 use super::tile::Backend;
 use crate::color::ColorModel;
 use crate::container::Header;
@@ -174,7 +175,7 @@ impl RenderOptions {
             )));
         }
         limits.check_size(region.width, region.height)?;
-        Ok(View::new((header.width, header.height), (width, height), region))
+        Ok(View::new((header.width, header.height), (width, height), region, header.kernel))
     }
 }
 
@@ -183,17 +184,26 @@ impl RenderOptions {
 pub(crate) struct View {
     /// Output pixels per stored pixel, along x and y.
     pub(crate) scale: [f32; 2],
-    /// Variance that minification adds, in square output pixels (spec, section 9.2).
+    /// Covariance that minification adds, in square output pixels (spec, section 9.2).
     pub(crate) filter: [f32; 2],
     pub(crate) region: Region,
 }
 
 impl View {
-    pub(crate) fn new(stored: (u32, u32), output: (u32, u32), region: Region) -> Self {
+    pub(crate) fn new(
+        stored: (u32, u32),
+        output: (u32, u32),
+        region: Region,
+        kernel: Kernel,
+    ) -> Self {
         let scale = [output.0 as f32 / stored.0 as f32, output.1 as f32 / stored.1 as f32];
         // A box of one output pixel has variance 1/12, of which the stored pixels' own share is
-        // already in the model.
-        let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / 12.0 } else { 0.0 });
+        // already in the model. The quartic kernel's variance is half of its covariance.
+        let share = match kernel {
+            Kernel::Exponential { .. } => 12.0,
+            Kernel::Quartic => 6.0,
+        };
+        let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / share } else { 0.0 });
         Self { scale, filter, region }
     }
 }

@@ -64,7 +64,7 @@ impl Default for Ghdr {
             layers: 0,
             kernel: QUARTIC,
             chart: CHOLESKY,
-            cutoff: 8.0,
+            cutoff: 4.0,
             transform: 0,
             reserved: [0; 3],
             base: [0; 4],

@@ -85,7 +85,8 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let header = &file.header;
     let scale =
         [request.size.0 as f32 / header.width as f32, request.size.1 as f32 / header.height as f32];
-    let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / 12.0 } else { 0.0 });
+    let share = if header.kernel == EXPONENTIAL { 12.0 } else { 6.0 };
+    let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / share } else { 0.0 });
     let (left, top, width, height) = request.region;
     let mut planes: Vec<Vec<f32>> = (0..header.channels())
         .map(|c| vec![f32::from(header.base[c]) / 65535.0; width as usize * height as usize])
@@ -110,7 +111,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
         }
         let (i11, i22) = (1.0 / l11, 1.0 / l22);
         let w = -((l21 * i11) * i22);
-        let scale_of_kernel = if header.kernel == EXPONENTIAL { 1.0 } else { 0.353_553_38 };
+        let scale_of_kernel = if header.kernel == EXPONENTIAL { 1.0 } else { 0.5 };
         let [i11, w, i22] = [i11, w, i22].map(|factor| factor * scale_of_kernel);
         let (x, y) = (center[0] * scale[0], center[1] * scale[1]);
         for row in 0..height {
@@ -124,7 +125,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
                     if q <= header.cutoff { exp(q * -0.5) } else { 0.0 }
                 } else {
                     let t = (1.0 - u * u) - v * v;
-                    if t > 0.0 { (t * t) * (t * t) } else { 0.0 }
+                    if t > 0.0 { t * t } else { 0.0 }
                 };
                 for (plane, color) in planes.iter_mut().zip(&color) {
                     plane[(row * width + column) as usize] += color * weight;

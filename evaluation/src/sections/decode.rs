@@ -236,9 +236,9 @@ fn beginning(bytes: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Resul
     })
 }
 
-/// Pixels of all tiles of 16 x 8 that the Gaussians touch, each time that one does.
+/// Pixels of all tiles of 8 x 8 that the Gaussians touch, each time that one does.
 fn evaluations(gaussians: &[Gaussian], width: u32, height: u32) -> f64 {
-    const TILE: (u32, u32) = (16, 8);
+    const TILE: (u32, u32) = (8, 8);
     let touched = |gaussian: &Gaussian, row: u32| {
         let chords = (row * TILE.1..(row + 1) * TILE.1).filter_map(|y| chord(gaussian, y, width));
         let whole = chords.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -253,9 +253,9 @@ fn evaluations(gaussians: &[Gaussian], width: u32, height: u32) -> f64 {
 fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
     let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
     let [x, cy] = gaussian.center.map(f64::from);
-    // q <= 8, solved for dx.
+    // q <= 4, solved for dx.
     let (yy, dy) = (l21 * l21 + l22 * l22, f64::from(y) + 0.5 - cy);
-    let squared = 8.0 - dy * dy / yy;
+    let squared = 4.0 - dy * dy / yy;
     let half = (squared > 0.0).then(|| l11 * l22 / yy.sqrt() * squared.sqrt())?;
     let middle = x - 0.5 + l11 * l21 / yy * dy;
     let (first, last) = ((middle - half).ceil().max(0.0), (middle + half).floor());
@@ -494,11 +494,11 @@ mod tests {
     #[test]
     fn touched_tiles_are_counted() {
         let gaussian = |center, cholesky| Gaussian { center, cholesky, color: [1.0; 4] };
-        // A disc of radius 2.83 within one tile, and one on the corner of four.
-        let inside = gaussian([8.0, 4.0], [1.0, 0.0, 1.0]);
+        // A disc of radius 2 within one tile, and one on the corner of four.
+        let inside = gaussian([12.0, 4.0], [1.0, 0.0, 1.0]);
         let corner = gaussian([16.0, 8.0], [1.0, 0.0, 1.0]);
         let outside = gaussian([-9.0, 8.0], [1.0, 0.0, 1.0]);
-        let tiles = |gaussian| evaluations(&[gaussian], 64, 64) / 128.0;
+        let tiles = |gaussian| evaluations(&[gaussian], 64, 64) / 64.0;
         assert_eq!([inside, corner, outside].map(tiles), [1.0, 4.0, 0.0]);
     }
 }

@@ -110,7 +110,7 @@ fn weight(kernel: Kernel, q: f64) -> f64 {
     if q > f64::from(kernel.cutoff()) {
         0.0
     } else if kernel == Kernel::Quartic {
-        (1.0 - q / 8.0).powi(4)
+        (1.0 - q / 4.0).powi(2)
     } else {
         (-0.5 * q).exp()
     }
