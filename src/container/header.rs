@@ -9,7 +9,7 @@ use crate::gaussian::Chart;
 use crate::render::Kernel;
 
 /// Of a small output: more Gaussians than one for so many pixels change little of it.
-const PIXELS_PER_GAUSSIAN: u64 = 10;
+const PIXELS_PER_GAUSSIAN: u64 = 11;
 
 /// The version that this crate reads and writes; 0 was a draft.
 pub(crate) const VERSION: u8 = 1;
