@@ -22,8 +22,8 @@ pub enum Kernel {
         cutoff: f32,
     },
     /// (1 - q / 4)^2 for q < 4, else 0, the quartic or biweight kernel of statistics: like
-    /// exp(-q / 2) near the centre, but without an exponential, smooth where it ends, and with less
-    /// than half of the area, which a decoder takes less than half of the time for.
+    /// exp(-q / 2) near the centre, but without an exponential, smooth where it ends, and with far
+    /// fewer pixels under it.
     Quartic,
 }
 

@@ -150,7 +150,8 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
     }
 }
 
-/// Adds splats, one after the other in every pixel.
+/// Adds splats, one after the other in every pixel: several at a time, so that sums which are not in
+/// registers are loaded and stored less often.
 #[cfg(feature = "std")]
 #[inline(always)]
 fn add<S: Simd, K: Weight, const CHANNELS: usize, const SPLATS: usize>(
