@@ -91,7 +91,7 @@ fn reported_figures_are_those_of_the_file() {
             let encoded = encoder.encode(&source).expect("it encodes");
             let stream = check(&encoded, &samples);
             let report = &encoded.report;
-            assert!(report.gaussians > 90 && report.gaussians <= 120, "{}", report.gaussians);
+            assert!(report.gaussians >= 100 && report.gaussians <= 120, "{}", report.gaussians);
             assert!(report.psnr > 24.0, "{color:?} {precision:?}: {} dB", report.psnr);
             // Rounding to 8 bits alone leaves 58.9 dB, and may cost 0.3 dB of 47.
             let rounded = -10.0 * (10_f64.powf(-report.psnr_float / 10.0) + 1.28e-6).log10();

@@ -8,12 +8,12 @@ use super::displacement::Displacement;
 use super::error::EncodeError;
 use super::patch::{Change, Patch, Slopes};
 use super::progress::Observer;
-use super::residuals::Residuals;
+use super::residuals::{RADIUS, Residuals};
 use crate::coding::set::{Costs, SetCoding};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 use crate::lattice::{Code, MAX_CLASS};
-use crate::render::{Kernel, TILE_HEIGHT, TILE_WIDTH};
+use crate::render::{TILE_HEIGHT, TILE_WIDTH};
 
 /// Side of the blocks by which Gaussians that do not touch are told apart, in pixels.
 const BLOCK: usize = 16;
@@ -283,7 +283,6 @@ impl Descent<'_> {
 
 /// About how many of the decoder's tiles a Gaussian touches: those of its bounding box.
 pub(crate) fn tiles([l11, l21, l22]: [f32; 3]) -> f32 {
-    let radius = Kernel::Quartic.cutoff().sqrt();
-    let along = |sigma: f32, side: usize| 2.0 * radius * sigma / side as f32 + 1.0;
+    let along = |sigma: f32, side: usize| 2.0 * RADIUS * sigma / side as f32 + 1.0;
     along(l11, TILE_WIDTH) * along((l21 * l21 + l22 * l22).sqrt(), TILE_HEIGHT)
 }

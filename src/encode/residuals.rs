@@ -15,7 +15,7 @@ const BAND: usize = 64;
 /// How much larger than its Gaussian a patch is, for candidates to lie within, and in pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
 /// Mahalanobis distance at which the quartic kernel ends.
-const RADIUS: f32 = 2.0;
+pub(crate) const RADIUS: f32 = 2.0;
 
 /// Rendering minus source, before clamping.
 #[derive(Debug)]

@@ -49,6 +49,14 @@ impl Kernel {
         }
     }
 
+    /// Its variance along each axis, for a covariance of 1.
+    pub(super) const fn variance(self) -> f32 {
+        match self {
+            Self::Exponential { .. } => 1.0,
+            Self::Quartic => 0.5,
+        }
+    }
+
     /// The weight at a point (u, v), in scaled distances, which may be infinite.
     pub(super) fn weight(self, (u, v): (f32, f32)) -> f32 {
         match self {

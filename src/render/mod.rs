@@ -198,11 +198,11 @@ struct Job<'a> {
 impl Job<'_> {
     /// Puts the bands with the most Gaussians first, so that threads end at the same time.
     fn sort<T>(&self, strips: &mut [(usize, T)]) {
-        strips.sort_by_key(|&(band, _)| Reverse(self.bands.load(band)));
+        strips.sort_by_cached_key(|&(band, _)| Reverse(self.bands.load(band)));
     }
 
-    /// Renders one band in the memory of an earlier one, and hands each tile over with its first
-    /// column in the region and its first row in the band.
+    /// Renders one band in the memory of an earlier one, and hands each pair of tiles over with its
+    /// first column in the region and its first row in the band.
     fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
         memory.fill(&self.bands, band, &self.scene, self.backend);
         match self.channels {

@@ -118,17 +118,17 @@ pub(super) fn sources(stored: ColorModel, output: ColorModel) -> &'static [Optio
     }
 }
 
-/// Where a tile goes among interleaved samples.
+/// Where two tiles go among interleaved samples.
 pub(super) struct Place<'a, T> {
-    /// The tile's first column.
+    /// Their first column.
     pub(super) x: usize,
-    /// From the tile's first row on.
+    /// From their first row on.
     pub(super) rows: &'a mut [T],
     /// Samples per row.
     pub(super) stride: usize,
 }
 
-/// Copies a tile to interleaved samples.
+/// Copies two tiles to interleaved samples.
 pub(super) fn write_interleaved<T: Sample>(
     backend: Backend,
     planes: &[Plane],
@@ -213,7 +213,7 @@ fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
     T::pixels(simd, channels)
 }
 
-/// Copies a tile to planes; (x, y) is its first pixel, `width` the length of a row.
+/// Copies two tiles to planes; (x, y) is their first pixel, `width` the length of a row.
 pub(super) fn write_planes(
     planes: &[Plane],
     (x, y): (usize, usize),

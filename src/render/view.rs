@@ -198,11 +198,8 @@ impl View {
     ) -> Self {
         let scale = [output.0 as f32 / stored.0 as f32, output.1 as f32 / stored.1 as f32];
         // A box of one output pixel has variance 1/12, of which the stored pixels' own share is
-        // already in the model. The quartic kernel's variance is half of its covariance.
-        let share = match kernel {
-            Kernel::Exponential { .. } => 12.0,
-            Kernel::Quartic => 6.0,
-        };
+        // already in the model.
+        let share = 12.0 * kernel.variance();
         let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / share } else { 0.0 });
         Self { scale, filter, region }
     }
