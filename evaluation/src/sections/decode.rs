@@ -1,5 +1,9 @@
 //! Decoding: from a file in memory to 8-bit samples, next to other decoders in the same run.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+use std::{array, thread};
+
 use anyhow::{Context, Result};
 use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target};
 
@@ -23,7 +27,7 @@ const QUICK_PICTURES: usize = 2;
 const REPEATS: usize = 15;
 /// What is compared takes turns, since a machine is now faster and now slower: so many, of so many
 /// runs each.
-const TURNS: usize = 7;
+const TURNS: usize = 21;
 const IN_A_TURN: usize = 5;
 /// How much smaller thumbnails are along each side.
 const THUMBNAIL: u32 = 8;
@@ -82,6 +86,8 @@ struct Times {
     whole: f64,
     /// How many times as fast all threads are.
     scaling: f64,
+    /// How many times as much they do when each decodes on its own: what the machine allows.
+    one_each: f64,
     /// From bytes to Gaussians.
     parse: f64,
     /// From no Gaussians to samples.
@@ -116,15 +122,41 @@ impl OurFile<'_> {
     }
 }
 
-/// Times of two things that take turns, and the first as a share of the second.
-fn in_turns(
-    mut first: impl FnMut() -> Result<f64>,
-    mut second: impl FnMut() -> Result<f64>,
-) -> Result<([f64; 2], f64)> {
-    let turns: Vec<[f64; 2]> =
-        (0..TURNS).map(|_| Ok([first()?, second()?])).collect::<Result<_>>()?;
-    let of = |get: fn(&[f64; 2]) -> f64| median(turns.iter().map(get)).context("no turns");
-    Ok(([of(|turn| turn[0])?, of(|turn| turn[1])?], of(|turn| turn[0] / turn[1])?))
+/// Times of some things that take turns, and the first as a share of each.
+fn in_turns<const N: usize>(
+    mut things: [&mut dyn FnMut() -> Result<f64>; N],
+) -> Result<([f64; N], [f64; N])> {
+    let mut turns = Vec::new();
+    for _ in 0..TURNS {
+        let mut turn = [0.0; N];
+        for (time, thing) in turn.iter_mut().zip(&mut things) {
+            *time = thing()?;
+        }
+        turns.push(turn);
+    }
+    let of = |get: &dyn Fn(&[f64; N]) -> f64| median(turns.iter().map(get)).unwrap_or(f64::NAN);
+    let times = array::from_fn(|index| of(&|turn| turn[index]));
+    Ok((times, array::from_fn(|index| of(&|turn| turn[0] / turn[index]))))
+}
+
+/// How long a decoding takes when every thread of the machine decodes on its own, per decoding.
+fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result<f64> {
+    let threads = thread::available_parallelism()?.get();
+    let wanted = 2 * IN_A_TURN * threads;
+    let begun = AtomicUsize::new(0);
+    let start = Instant::now();
+    thread::scope(|scope| {
+        let work = || {
+            let mut out = vec![0; samples];
+            while begun.fetch_add(1, Ordering::Relaxed) < wanted {
+                render(file, options, &mut out)?;
+            }
+            Ok(())
+        };
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().expect("it does not panic"))
+    })
+    .map(|()| start.elapsed().as_secs_f64() / wanted as f64)
 }
 
 fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
@@ -137,6 +169,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             "psnr",
             "seconds",
             "scaling",
+            "one_each",
             "seconds_parse",
             "seconds_output",
             "thumbnail",
@@ -160,16 +193,20 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             let mut out = vec![0; picture.rgb.len()];
             gip::median_seconds(IN_A_TURN, || render(file, options, &mut out))
         };
-        let ([whole, _], scaling) =
-            in_turns(|| whole_turn(&one), || whole_turn(&RenderOptions::new()))?;
+        let all = RenderOptions::new();
+        let ([whole, ..], [_, scaling, one_each]) =
+            in_turns([&mut || whole_turn(&one), &mut || whole_turn(&all), &mut || {
+                one_file_each(file, &one, picture.rgb.len())
+            }])?;
         let nothing = one.clone().prefix(0);
         let mut stream = StreamDecoder::new();
         stream.feed(file)?;
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = one.clone().size(width, height);
-        let turn = || gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out));
-        let (_, faster) = in_turns(|| whole_turn(&one), turn)?;
+        let (_, [_, faster]) = in_turns([&mut || whole_turn(&one), &mut || {
+            gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out))
+        }])?;
         let tenth = &file[..file.len() / 10];
         let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
@@ -177,6 +214,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             coded.distortion.psnr,
             whole,
             scaling,
+            one_each,
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
             faster,
@@ -188,13 +226,14 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             evaluations(stream.gaussians(), picture.width, picture.height),
         ])
     })?;
-    let [bytes, psnr, whole, scaling, parse, output, thumbnail, rest @ ..] = values;
+    let [bytes, psnr, whole, scaling, one_each, parse, output, thumbnail, rest @ ..] = values;
     let [tenth, preview, tenth_gaussians, memory, gaussians, evaluations] = rest;
     Ok(Times {
         bytes,
         psnr,
         whole,
         scaling,
+        one_each,
         parse,
         output,
         thumbnail,
@@ -315,10 +354,10 @@ fn theirs(
         let coded = worker.code(other.id, setting, picture, Some(1), [1, 1])?;
         let (ours, mut out) = (file.coded()?, vec![0; picture.rgb.len()]);
         let one = RenderOptions::new().parallel(false);
-        let ([_, theirs], share) = in_turns(
-            || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
-            || worker.decode_again(IN_A_TURN),
-        )?;
+        let ([_, theirs], [_, share]) = in_turns([
+            &mut || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
+            &mut || worker.decode_again(IN_A_TURN),
+        ])?;
         Ok([picture.rate(coded.bytes), coded.distortion.psnr, theirs, share])
     })
 }
@@ -376,6 +415,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
     let mut gains = Table::new(&[
         "bpp",
         "all threads, times as fast",
+        "one file each, times as many",
         "thumbnail, times as fast",
         "first tenth, share of the time",
         "and at a quarter of the size",
@@ -389,6 +429,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
     ]);
     for Measured { rate, ours, .. } in all {
         let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
+        let of = |get: fn(&Times) -> f64| median(ours.iter().map(get)).unwrap_or(f64::NAN);
         let pixels = f64::from(pictures[0].width * pictures[0].height);
         let [whole, parse, output] = [mean(|t| t.whole), mean(|t| t.parse), mean(|t| t.output)];
         let evaluations = mean(|times| times.evaluations);
@@ -405,8 +446,9 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         ]);
         gains.row(&[
             rate.to_string(),
-            format!("{:.2}", mean(|times| times.scaling)),
-            format!("{:.1}", mean(|times| times.thumbnail)),
+            format!("{:.2}", of(|times| times.scaling)),
+            format!("{:.2}", of(|times| times.one_each)),
+            format!("{:.1}", of(|times| times.thumbnail)),
             format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole)),
             format!("{:.0} %", 100.0 * mean(|times| times.tenth[1] / times.whole)),
             format!("{:.1} %", 100.0 * mean(|times| times.tenth_gaussians / times.gaussians)),
@@ -426,7 +468,9 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
          in this run.\n{}\n### Less than all\n\nCompared with ours for the whole picture on one \
          thread. Thumbnails are 1/{THUMBNAIL} as wide and as high and take as many of the layers as \
          show at their size; the first tenth of the bytes is shown at the whole picture's size, and \
-         smaller as a preview; all times start from the file in memory.\n{}\n### Memory\n\nMost \
+         smaller as a preview; all times start from the file in memory. All threads decode one \
+         file together; what they do when each has a file of its own is what the machine allows. \
+         Ratios are medians of those of the pictures, shares are means.\n{}\n### Memory\n\nMost \
          bytes held at a time with one thread.\n{}",
         1e9 * floor,
         stages.finish(),
