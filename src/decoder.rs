@@ -13,6 +13,7 @@ use crate::lattice::Lattice;
 use crate::limits::Limits;
 use crate::quantizer::Quantizer;
 use crate::render::Picture;
+use crate::threads;
 
 /// Most bytes of a header or quantizer chunk of version 1: nine quantizers of twelve bytes.
 const MAX_SMALL_CHUNK: u32 = 108;
@@ -427,7 +428,7 @@ impl StreamDecoder {
         let before = self.gaussians.len();
         let count = waiting.count();
         grow(&mut self.gaussians, count, header.gaussians as usize);
-        self.gaussians.resize(before + count, Gaussian::NOTHING);
+        threads::extend(parallel, &mut self.gaussians, Gaussian::NOTHING, count);
         let places = &mut self.gaussians[before..];
         let account = self.account.as_mut();
         waiting.decode(header, lattice, account, parallel, places).map_err(|(sound, error)| {

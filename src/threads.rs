@@ -4,6 +4,11 @@ use alloc::vec::Vec;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
+#[cfg(feature = "rayon")]
+use rayon::iter::plumbing::{Folder, Reducer, UnindexedConsumer};
+#[cfg(feature = "rayon")]
+use rayon::iter::{ParallelExtend, ParallelIterator};
+
 /// How many threads [`for_each`] uses at most.
 pub(crate) fn count(parallel: bool) -> usize {
     #[cfg(feature = "rayon")]
@@ -42,6 +47,63 @@ pub(crate) fn map<T: Send, R: Send>(
     let items = items.into_iter().zip(&mut results).collect();
     for_each(parallel, items, |(): &mut (), (item, result)| *result = Some(work(item)));
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
+}
+
+/// Fewest copies that are shared among threads.
+#[cfg(feature = "rayon")]
+const LEAST_SHARED: usize = 2048;
+
+/// Adds copies of a value to a vector. Every thread adds some: memory that is new, or in the cache of
+/// another core, takes a single one long to write to.
+pub(crate) fn extend<T: Copy + Send + Sync>(
+    parallel: bool,
+    items: &mut Vec<T>,
+    value: T,
+    count: usize,
+) {
+    #[cfg(feature = "rayon")]
+    if parallel && count >= LEAST_SHARED {
+        items.par_extend(Copies { value, count });
+        return;
+    }
+    let _ = parallel;
+    items.resize(items.len() + count, value);
+}
+
+/// Copies of a value, for `rayon` to put in their places: without `unsafe`, it alone can let several
+/// threads write to memory that holds nothing yet.
+#[cfg(feature = "rayon")]
+struct Copies<T> {
+    value: T,
+    count: usize,
+}
+
+#[cfg(feature = "rayon")]
+impl<T: Copy + Send + Sync> ParallelIterator for Copies<T> {
+    type Item = T;
+
+    fn opt_len(&self) -> Option<usize> {
+        Some(self.count)
+    }
+
+    fn drive_unindexed<C: UnindexedConsumer<T>>(self, consumer: C) -> C::Result {
+        let Self { value, count } = self;
+        let (mut rest, mut left) = (consumer, count);
+        let (mut parts, mut reducers) = (Vec::new(), Vec::new());
+        for threads in (1..=self::count(true)).rev() {
+            let length = left.div_ceil(threads);
+            let (part, others, reducer) = rest.split_at(length);
+            (rest, left) = (others, left - length);
+            parts.push((part, length));
+            reducers.push(reducer);
+        }
+        let results = map(true, parts.into_iter(), |(part, length)| {
+            part.into_folder().consume_iter(core::iter::repeat_n(value, length)).complete()
+        });
+        let nothing = rest.into_folder().complete();
+        let all = results.into_iter().zip(reducers);
+        all.rfold(nothing, |others, (result, reducer)| reducer.reduce(result, others))
+    }
 }
 
 /// How often a thread asks whether the others are done before it falls asleep: some milliseconds.
@@ -95,4 +157,22 @@ fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Sen
             std::thread::yield_now();
         }
     });
+}
+
+#[cfg(all(test, feature = "rayon"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn threads_add_as_many_copies_as_one() {
+        for before in [0, 3] {
+            for count in [0, 1, LEAST_SHARED - 1, LEAST_SHARED, LEAST_SHARED + 1, 10_007] {
+                let mut items = vec![1_u64; before];
+                extend(true, &mut items, 7, count);
+                assert_eq!(items.len(), before + count);
+                assert!(items[..before].iter().all(|&item| item == 1));
+                assert!(items[before..].iter().all(|&item| item == 7));
+            }
+        }
+    }
 }
