@@ -16,6 +16,20 @@ use crate::render::TILE_HEIGHT;
 /// bits.
 pub(crate) const USELESS_COLOR: f32 = 1.0 / 4096.0;
 
+/// Least [`Spot::room`]. Photographs do not ask for one: a quarter and a hundredth are as good. But
+/// where a small part of a picture has all of its distortion, hundreds of large Gaussians would lie
+/// on top of each other, take steps in the same direction, and never come to rest.
+const LEAST_ROOM: f32 = 1.0 / 16.0;
+
+/// Where a new Gaussian goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Spot {
+    pixel: u32,
+    /// How much of the picture it has for itself, as a share of what each would have if all had the
+    /// same; at most 1.
+    room: f32,
+}
+
 /// Where a picture stands when Gaussians are added.
 #[derive(Debug)]
 pub(crate) struct Site<'a> {
@@ -33,7 +47,7 @@ impl Site<'_> {
     /// Up to `count` new Gaussians where the picture is worst. Fewer where there is nothing left
     /// to correct.
     pub(crate) fn newcomers(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
-        let pixels = match self.options.placement {
+        let spots = match self.options.placement {
             Placement::Top => top(count, &self.map()),
             Placement::Spread => {
                 spread(count, self.raster.width, self.tiles(), rng.f64(), |tile| {
@@ -41,16 +55,17 @@ impl Site<'_> {
                 })
             }
         };
-        let total = self.present + pixels.len();
+        let total = self.present + spots.len();
         let variance = self
             .filter
             .variance(self.raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        pixels.into_iter().map(|pixel| self.born(pixel as usize, variance, rng)).collect()
+        spots.into_iter().map(|spot| self.born(&spot, variance, rng)).collect()
     }
 
-    /// A new Gaussian on a pixel.
-    fn born(&self, pixel: usize, variance: f32, rng: &mut fastrand::Rng) -> Row {
+    /// A new Gaussian, of so much variance where it has all the room.
+    fn born(&self, spot: &Spot, variance: f32, rng: &mut fastrand::Rng) -> Row {
+        let (pixel, variance) = (spot.pixel as usize, variance * spot.room);
         let (x, y) = (pixel % self.raster.width, pixel / self.raster.width);
         let mut row = [0.0; MAX_COMPONENTS];
         row[0] = x as f32 + 0.5;
@@ -133,8 +148,8 @@ impl Site<'_> {
     }
 }
 
-/// The pixels of largest distortion; the first of equals.
-fn top(count: usize, map: &[f32]) -> Vec<u32> {
+/// The pixels of largest distortion, the first of equals, with all the room, as the paper has it.
+fn top(count: usize, map: &[f32]) -> Vec<Spot> {
     let mut order: Vec<u32> = (0..map.len() as u32).filter(|&at| map[at as usize] > 0.0).collect();
     let worst =
         |a: &u32, b: &u32| map[*b as usize].total_cmp(&map[*a as usize]).then_with(|| a.cmp(b));
@@ -143,36 +158,39 @@ fn top(count: usize, map: &[f32]) -> Vec<u32> {
         order.truncate(count);
     }
     order.sort_unstable_by(worst);
-    order
+    order.into_iter().map(|pixel| Spot { pixel, room: 1.0 }).collect()
 }
 
 /// Up to `count` pixels, in every part of the picture as many as it has of the distortion: at equal
-/// steps of the distortion summed up along a Z curve of tiles. `phase` in [0, 1) shifts them all.
+/// steps of the distortion summed up along a Z curve of tiles. `phase` in [0, 1) shifts them all. The
+/// more distortion a tile has, the less room there is in it for each.
 fn spread(
     count: usize,
     width: usize,
     [columns, rows]: [usize; 2],
     phase: f64,
     distortions: impl Fn(usize) -> Plane + Sync,
-) -> Vec<u32> {
+) -> Vec<Spot> {
     // Summed up by tile first, on all threads; only tiles with a step in them are looked into.
     let sum_of =
         |tile| distortions(tile).as_flattened().iter().map(|&value| f64::from(value)).sum();
     let sums: Vec<f64> = (0..columns * rows).into_par_iter().map(sum_of).collect();
-    let step = sums.iter().sum::<f64>() / count as f64;
+    let total: f64 = sums.iter().sum();
+    let (step, mean) = (total / count as f64, total / sums.len() as f64);
     let (mut sum, mut next) = (0.0, phase * step);
-    let mut pixels = Vec::new();
+    let mut spots = Vec::new();
     along_z([0, 0], [columns, rows], &mut |column, row| {
         let tile = row * columns + column;
         let end = sum + sums[tile];
         if end > next {
+            let room = (mean / sums[tile]).clamp(f64::from(LEAST_ROOM), 1.0) as f32;
             let first = row * TILE_HEIGHT * width + column * TILE_WIDTH;
             for (y, line) in distortions(tile).iter().enumerate() {
                 for (x, &value) in line.iter().enumerate() {
                     sum += f64::from(value);
                     // What is not to be improved, or not of the picture, is never chosen.
                     if sum > next && value > 0.0 {
-                        pixels.push((first + y * width + x) as u32);
+                        spots.push(Spot { pixel: (first + y * width + x) as u32, room });
                         // A pixel of more than one step gets one Gaussian.
                         next += step * ((sum - next) / step).ceil();
                     }
@@ -181,7 +199,7 @@ fn spread(
         }
         sum = end;
     });
-    pixels
+    spots
 }
 
 /// Visits the points of a rectangle along a Z curve: neighbours follow each other closely.
@@ -223,13 +241,17 @@ fn random_shape(chart: Chart, variance: f32, rng: &mut fastrand::Rng) -> Vec3 {
 mod tests {
     use super::*;
 
+    fn pixels(spots: &[Spot]) -> Vec<u32> {
+        spots.iter().map(|spot| spot.pixel).collect()
+    }
+
     #[test]
     fn the_top_are_the_largest_and_the_first_of_equals() {
         let map = [0.0, 3.0, 1.0, 3.0, 0.0, 2.0];
-        assert_eq!(top(3, &map), [1, 3, 5]);
-        assert_eq!(top(1, &map), [1]);
+        assert_eq!(pixels(&top(3, &map)), [1, 3, 5]);
+        assert_eq!(pixels(&top(1, &map)), [1]);
         // What is exact gets no Gaussian, however many are asked for.
-        assert_eq!(top(10, &map), [1, 3, 5, 2]);
+        assert_eq!(pixels(&top(10, &map)), [1, 3, 5, 2]);
     }
 
     /// A tile whose distortions depend on the picture's column alone.
@@ -241,13 +263,14 @@ mod tests {
     fn spread_pixels_follow_the_distortion() {
         // Left half: weak; right half: three times as much.
         let width = 50;
-        let pixels = spread(397, width, [4, 5], 0.5, |tile| {
+        let spots = spread(397, width, [4, 5], 0.5, |tile| {
             tile_of(tile % 4, |x| match x {
                 0..25 => 1.0,
                 25..50 => 3.0,
                 _ => 0.0,
             })
         });
+        let pixels = pixels(&spots);
         assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
         sorted.sort_unstable();
@@ -266,6 +289,14 @@ mod tests {
                 assert!((count - share).abs() < 1.0, "{count} of {share}");
             }
         }
+        // A tile has a distortion of 200 on average; the third column of tiles has 384 in each.
+        for spot in &spots {
+            match spot.pixel as usize % width {
+                0..16 => assert_eq!(spot.room, 1.0),
+                32..48 => assert!((spot.room - 200.0 / 384.0).abs() < 1e-6, "{spot:?}"),
+                _ => assert!((LEAST_ROOM..=1.0).contains(&spot.room), "{spot:?}"),
+            }
+        }
     }
 
     #[test]
@@ -274,7 +305,7 @@ mod tests {
         assert!(spread(10, 7, [1, 1], 0.0, |_| exact).is_empty());
         let mut map = exact;
         (map[2][3], map[2][4]) = (2.0, 1e-3);
-        let pixels = spread(10, 7, [1, 1], 0.9, |_| map);
+        let pixels = pixels(&spread(10, 7, [1, 1], 0.9, |_| map));
         assert!(pixels == [17] || pixels == [17, 18], "{pixels:?}");
     }
 
