@@ -89,7 +89,8 @@ pub enum Distortion {
 pub enum Placement {
     /// Those of largest distortion (paper). They come in clusters.
     Top,
-    /// As many everywhere as the distortion has its share there, evenly spread.
+    /// As many everywhere as the distortion has its share there, evenly spread, and born the smaller
+    /// the more they are.
     Spread,
 }
 
