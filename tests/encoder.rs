@@ -91,8 +91,9 @@ fn reported_figures_are_those_of_the_file() {
             let encoded = encoder.encode(&source).expect("it encodes");
             let stream = check(&encoded, &samples);
             let report = &encoded.report;
-
-            assert!((80..=120).contains(&report.gaussians), "{}", report.gaussians);
+            // Coding drops some whose bits are not worth it; else the budget is used up.
+            let least = if precision == Precision::Coded { 80 } else { 120 };
+            assert!((least..=120).contains(&report.gaussians), "{}", report.gaussians);
             assert!(report.psnr > 24.0, "{color:?} {precision:?}: {} dB", report.psnr);
             // Rounding to 8 bits alone leaves 58.9 dB, and may cost 0.3 dB of 47.
             let rounded = -10.0 * (10_f64.powf(-report.psnr_float / 10.0) + 1.28e-6).log10();
@@ -270,7 +271,6 @@ fn hard_pictures_become_sound_files() {
                     u64::from(encoded.report.gaussians) <= u64::from(width) * u64::from(height)
                 );
                 let report = &encoded.report;
-
                 let least =
                     if matches!(name, "1x1" | "black" | "white") { f64::INFINITY } else { 5.0 };
                 assert!(report.psnr >= least, "{name} {target:?} {precision:?}: {}", report.psnr);

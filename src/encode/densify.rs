@@ -16,9 +16,7 @@ use crate::render::TILE_HEIGHT;
 /// bits.
 pub(crate) const USELESS_COLOR: f32 = 1.0 / 4096.0;
 
-/// Least [`Spot::room`]. Photographs do not ask for one: a quarter and a hundredth are as good. But
-/// where a small part of a picture has all of its distortion, hundreds of large Gaussians would lie
-/// on top of each other, take steps in the same direction, and never come to rest.
+/// Least [`Spot::room`]. A quarter is too much: at the lowest efforts, crowds do not come to rest then.
 const LEAST_ROOM: f32 = 1.0 / 16.0;
 
 /// Where a new Gaussian goes.
@@ -26,7 +24,9 @@ const LEAST_ROOM: f32 = 1.0 / 16.0;
 struct Spot {
     pixel: u32,
     /// How much of the picture it has for itself, as a share of what each would have if all had the
-    /// same; at most 1.
+    /// same; at most 1. Where a small part of a picture has all of its distortion, hundreds of
+    /// Gaussians of the same size as elsewhere would lie on top of each other, take steps in the same
+    /// direction, and never come to rest.
     room: f32,
 }
 
@@ -183,7 +183,7 @@ fn spread(
         let tile = row * columns + column;
         let end = sum + sums[tile];
         if end > next {
-            let room = (mean / sums[tile]).clamp(f64::from(LEAST_ROOM), 1.0) as f32;
+            let room = ((mean / sums[tile]) as f32).clamp(LEAST_ROOM, 1.0);
             let first = row * TILE_HEIGHT * width + column * TILE_WIDTH;
             for (y, line) in distortions(tile).iter().enumerate() {
                 for (x, &value) in line.iter().enumerate() {

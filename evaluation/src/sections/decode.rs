@@ -15,6 +15,7 @@ use crate::gip;
 use crate::kernel;
 use crate::memory;
 use crate::pictures::Picture;
+use crate::provenance::cores;
 use crate::table::{Table, mean, median};
 use crate::verdict::list;
 
@@ -141,8 +142,7 @@ fn in_turns<const N: usize>(
 
 /// How long a decoding takes when every thread of the machine decodes on its own, per decoding.
 fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result<f64> {
-    let threads = thread::available_parallelism()?.get();
-    let wanted = 2 * IN_A_TURN * threads;
+    let wanted = 2 * IN_A_TURN * cores();
     let begun = AtomicUsize::new(0);
     let start = Instant::now();
     thread::scope(|scope| {
@@ -153,7 +153,7 @@ fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result
             }
             Ok(())
         };
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        let workers: Vec<_> = (0..cores()).map(|_| scope.spawn(work)).collect();
         workers.into_iter().try_for_each(|worker| worker.join().expect("it does not panic"))
     })
     .map(|()| start.elapsed().as_secs_f64() / wanted as f64)
