@@ -233,13 +233,13 @@ impl<'a> SetCoding<'a> {
         }
     }
 
-    /// The bits that a code takes in a cell of a level, without its share of the tree.
+    /// The bits that a code, which stands for a shape, takes in a cell of a level, without its share
+    /// of the tree.
     #[cfg(feature = "encode")]
-    pub(crate) fn cost(&self, code: Code, level: u32, costs: &Costs) -> f32 {
+    pub(crate) fn cost(&self, code: Code, shape: &Shape, level: u32, costs: &Costs) -> f32 {
         let mut cost = Cost { costs, bits: 0.0 };
         self.attributes(&mut cost, level, code);
-        let shape = self.lattice.shape(&code);
-        let fineness = self.lattice.fineness_of_position(code.class, &shape);
+        let fineness = self.lattice.fineness_of_position(code.class, shape);
         // Cells are square, or twice as high as wide.
         let pixels = [level / 2, level.div_ceil(2)].map(|pixels| pixels as i32);
         let bits = pixels.iter().zip(fineness).map(|(&pixels, fine)| (pixels + fine).max(0));

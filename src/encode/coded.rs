@@ -444,13 +444,14 @@ impl<'a> Coder<'a> {
             self.render(coded, &mut residuals, observer)?;
             let coding = self.coding(&coded.lattice);
             let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
-            let codes = coded.codes.iter().zip(&places);
-            let own: f32 =
-                codes.map(|(code, place)| coding.cost(*code, place.level, place.costs)).sum();
+            let (mut own, mut touched) = (0.0, 0.0);
+            for (code, place) in coded.codes.iter().zip(&places) {
+                let shape = coding.lattice.shape(code);
+                own += coding.cost(*code, &shape, place.level, place.costs);
+                touched += tiles(shape.cholesky);
+            }
             let tree = ((8.0 * bytes as f32 - own) / coded.codes.len().max(1) as f32).max(0.0);
-            let shapes = coded.codes.iter().map(|code| coding.lattice.shape(code).cholesky);
-            let tiles: f32 = shapes.map(tiles).sum();
-            let tile = BITS_FOR_TIME * coded.codes.len() as f32 / tiles.max(1.0);
+            let tile = BITS_FOR_TIME * coded.codes.len() as f32 / touched.max(1.0);
             let descent = Descent { coding, model: self.model, tree, tile, lambda };
             if descent.pass(&mut residuals, &mut coded.codes, &places, observer)? == 0 {
                 break;

@@ -253,8 +253,9 @@ impl Descent<'_> {
     }
 
     fn bits(&self, code: Code, place: Place<'_>) -> f32 {
-        let tiles = tiles(self.coding.lattice.shape(&code).cholesky);
-        self.tree + self.coding.cost(code, place.level, place.costs) + self.tile * tiles
+        let shape = self.coding.lattice.shape(&code);
+        let own = self.coding.cost(code, &shape, place.level, place.costs);
+        self.tree + own + self.tile * tiles(shape.cholesky)
     }
 
     /// A step up and down in each component of the geometry.
