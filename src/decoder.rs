@@ -563,6 +563,7 @@ impl<R: std::io::Read> Decoder<R> {
     /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
     /// decoded until then.
     pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
+        threads::wake(self.options.is_parallel());
         self.read_until(StreamDecoder::is_complete)?;
         self.decode_waiting()
     }

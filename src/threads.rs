@@ -110,23 +110,26 @@ impl<T: Copy + Send + Sync> ParallelIterator for Copies<T> {
 #[cfg(feature = "rayon")]
 const PATIENCE: u32 = 10_000;
 
-/// Counts a thread as busy as long as it lives.
+/// A thread that is expected to work; it is done when this is dropped.
 #[cfg(feature = "rayon")]
-struct Busy<'a>(&'a AtomicUsize);
+struct Expected<'a>(&'a AtomicUsize);
 
 #[cfg(feature = "rayon")]
-impl<'a> Busy<'a> {
-    fn new(threads: &'a AtomicUsize) -> Self {
-        threads.fetch_add(1, Ordering::Relaxed);
-        Self(threads)
-    }
-}
-
-#[cfg(feature = "rayon")]
-impl Drop for Busy<'_> {
+impl Drop for Expected<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
+}
+
+/// Wakes up a thread of the current pool for work that is about to come: that takes as long as some
+/// of the work does.
+#[cfg(feature = "std")]
+pub(crate) fn wake(parallel: bool) {
+    #[cfg(feature = "rayon")]
+    if parallel {
+        rayon::spawn(|| ());
+    }
+    let _ = parallel;
 }
 
 #[cfg(feature = "rayon")]
@@ -134,27 +137,30 @@ fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Sen
     let others = count(true).min(items.len()).saturating_sub(1);
     let items = std::sync::Mutex::new(items.into_iter());
     let next = || items.lock().expect("taking an item does not panic").next();
-    let busy = AtomicUsize::new(0);
+    let expected = AtomicUsize::new(others + 1);
     let run = || {
-        let _busy = Busy::new(&busy);
+        let _expected = Expected(&expected);
         let mut memory = M::default();
         while let Some(item) = next() {
             work(&mut memory, item);
         }
     };
-    // Threads of the pool may have to wake up first; this one does not wait for them.
+    // Threads of the pool may have to wake up first; this one begins without them.
     rayon::in_place_scope(|scope| {
         for _ in 0..others {
             scope.spawn(|_| run());
         }
         run();
-        // What is left is under way and mostly soon done. To fall asleep until then takes longer,
-        // and so does it to wake up the others for what comes next.
+        // What is left is under way and mostly soon done, and who was late soon here. To fall asleep
+        // until then takes longer, and so does it to wake up the others for what comes next.
         for _ in 0..PATIENCE {
-            if busy.load(Ordering::Relaxed) == 0 {
+            if expected.load(Ordering::Relaxed) == 0 {
                 break;
             }
-            std::thread::yield_now();
+            // Within a busy pool there is nobody but this thread to do what it has spawned.
+            if rayon::yield_local() != Some(rayon::Yield::Executed) {
+                std::thread::yield_now();
+            }
         }
     });
 }
