@@ -563,9 +563,7 @@ impl<R: std::io::Read> Decoder<R> {
     /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
     /// decoded until then.
     pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
-        threads::wake(self.options.is_parallel());
-        self.read_until(StreamDecoder::is_complete)?;
-        self.decode_waiting()
+        self.read_layers_until(StreamDecoder::is_complete)
     }
 
     /// Reads until so many Gaussians have arrived, or all: enough layers for a thumbnail, with
@@ -574,8 +572,8 @@ impl<R: std::io::Read> Decoder<R> {
     /// # Errors
     /// As [`Decoder::read_to_end`].
     pub fn read_at_least(&mut self, gaussians: u32) -> Result<(), DecodeError> {
-        self.read_until(|stream| stream.arrived() >= gaussians as usize || stream.is_complete())?;
-        self.decode_waiting()
+        let enough = gaussians as usize;
+        self.read_layers_until(|stream| stream.arrived() >= enough || stream.is_complete())
     }
 
     /// The picture so far.
@@ -601,6 +599,16 @@ impl<R: std::io::Read> Decoder<R> {
     pub fn decode_into_u16(&mut self, out: &mut [u16]) -> Result<(), DecodeError> {
         self.read_to_end()?;
         self.picture().render_u16(&self.options, out)
+    }
+
+    /// Reads until something is reached, and decodes the layers that came.
+    fn read_layers_until(
+        &mut self,
+        reached: impl Fn(&StreamDecoder) -> bool,
+    ) -> Result<(), DecodeError> {
+        threads::wake(self.options.is_parallel());
+        self.read_until(reached)?;
+        self.decode_waiting()
     }
 
     /// Reads until something is reached.

@@ -126,7 +126,7 @@ impl Drop for Expected<'_> {
 #[cfg(feature = "std")]
 pub(crate) fn wake(parallel: bool) {
     #[cfg(feature = "rayon")]
-    if parallel {
+    if count(parallel) > 1 {
         rayon::spawn(|| ());
     }
     let _ = parallel;
