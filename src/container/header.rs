@@ -8,8 +8,10 @@ use crate::error::DecodeError;
 use crate::gaussian::Chart;
 use crate::render::Kernel;
 
-/// Of a small output: more Gaussians than one for so many pixels change little of it.
-const PIXELS_PER_GAUSSIAN: u64 = 11;
+/// Of a small output: pixels for which one Gaussian is enough.
+const PIXELS_PER_GAUSSIAN: u64 = 12;
+/// Fewer of a file's Gaussians than one out of so many are not the same picture, however small.
+const MOST_LEFT_OUT: u64 = 6;
 
 /// The version that this crate reads and writes; 0 was a draft.
 pub(crate) const VERSION: u8 = 1;
@@ -172,11 +174,13 @@ impl Header {
         5 + self.color.channels()
     }
 
-    /// About how many Gaussians show in an output of this size, in pixels: all, or fewer where it
-    /// is much smaller than the picture. The first ones of a file are the strongest.
+    /// How many Gaussians make a fair preview of this size, in pixels: all, or fewer where it is
+    /// much smaller than the picture, but at least a sixth. The first ones of a file are the
+    /// strongest.
     #[must_use]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
+        let all = u64::from(self.gaussians);
         let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
-        u64::from(self.gaussians).min(shown) as u32
+        shown.clamp(all / MOST_LEFT_OUT, all) as u32
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use std::{array, thread};
 
 use anyhow::{Context, Result};
-use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target};
+use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target, metrics};
 
 use super::rate::Files;
 use super::speed::nearest;
@@ -27,8 +27,9 @@ const QUICK_PICTURES: usize = 2;
 /// Times are medians over so many runs.
 const REPEATS: usize = 15;
 /// What is compared takes turns, since a machine is now faster and now slower: so many, of so many
-/// runs each.
+/// runs each. All threads take more turns, since what else the machine does shows more with them.
 const TURNS: usize = 21;
+const TURNS_OF_THREADS: usize = 63;
 const IN_A_TURN: usize = 5;
 /// How much smaller thumbnails are along each side.
 const THUMBNAIL: u32 = 8;
@@ -46,7 +47,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         "Compared with: the decoders of libjpeg-turbo, libwebp, OpenJPEG, libavif with dav1d, and \
          libjxl, on files of about the same rate of the same pictures. From a file in memory to \
          8-bit RGB in memory that is there already. What is compared takes {TURNS} turns of \
-         {IN_A_TURN} decodings; times are medians, and a ratio is the median of those of the turns. \
+         {IN_A_TURN} decodings, {TURNS_OF_THREADS} where all threads are used; times are medians, and a ratio is the median of those of the turns. \
          {}. Their times include some microseconds of Python.\n",
         bench.share(pictures.len()),
     );
@@ -95,6 +96,8 @@ struct Times {
     output: f64,
     /// How many times as fast a thumbnail is.
     thumbnail: f64,
+    /// What it is worth next to one of all Gaussians.
+    thumbnail_psnr: f64,
     /// From the first tenth of the bytes, at full size and at a quarter of it along each side.
     tenth: [f64; 2],
     /// How many Gaussians that tenth has.
@@ -123,19 +126,20 @@ impl OurFile<'_> {
     }
 }
 
-/// Times of some things that take turns, and the first as a share of each.
+/// Times of some things that take so many turns, and the first as a share of each.
 fn in_turns<const N: usize>(
+    turns: usize,
     mut things: [&mut dyn FnMut() -> Result<f64>; N],
 ) -> Result<([f64; N], [f64; N])> {
-    let mut turns = Vec::new();
-    for _ in 0..TURNS {
+    let mut all = Vec::new();
+    for _ in 0..turns {
         let mut turn = [0.0; N];
         for (time, thing) in turn.iter_mut().zip(&mut things) {
             *time = thing()?;
         }
-        turns.push(turn);
+        all.push(turn);
     }
-    let of = |get: &dyn Fn(&[f64; N]) -> f64| median(turns.iter().map(get)).unwrap_or(f64::NAN);
+    let of = |get: &dyn Fn(&[f64; N]) -> f64| median(all.iter().map(get)).unwrap_or(f64::NAN);
     let times = array::from_fn(|index| of(&|turn| turn[index]));
     Ok((times, array::from_fn(|index| of(&|turn| turn[0] / turn[index]))))
 }
@@ -173,6 +177,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             "seconds_parse",
             "seconds_output",
             "thumbnail",
+            "thumbnail_psnr",
             "seconds_tenth",
             "seconds_tenth_small",
             "gaussians_tenth",
@@ -194,19 +199,28 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             gip::median_seconds(IN_A_TURN, || render(file, options, &mut out))
         };
         let all = RenderOptions::new();
-        let ([whole, ..], [_, scaling, one_each]) =
-            in_turns([&mut || whole_turn(&one), &mut || whole_turn(&all), &mut || {
+        let ([whole, ..], [_, scaling, one_each]) = in_turns(
+            TURNS_OF_THREADS,
+            [&mut || whole_turn(&one), &mut || whole_turn(&all), &mut || {
                 one_file_each(file, &one, picture.rgb.len())
-            }])?;
+            }],
+        )?;
         let nothing = one.clone().prefix(0);
         let mut stream = StreamDecoder::new();
         stream.feed(file)?;
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = one.clone().size(width, height);
-        let (_, [_, faster]) = in_turns([&mut || whole_turn(&one), &mut || {
-            gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out))
-        }])?;
+        let (_, [_, faster]) = in_turns(
+            TURNS,
+            [&mut || whole_turn(&one), &mut || {
+                gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out))
+            }],
+        )?;
+        let mut of_all = vec![0; picture_of().output_len(&small)?];
+        picture_of().render_u8(&small, &mut of_all)?;
+        thumbnail(file, &small, &mut out)?;
+        let thumbnail_psnr = metrics::psnr(&of_all, &out[..of_all.len()], 255.0);
         let tenth = &file[..file.len() / 10];
         let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
@@ -218,6 +232,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             seconds(|| Ok(StreamDecoder::new().feed(file).map(|_| ())?))?,
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
             faster,
+            thumbnail_psnr,
             seconds(|| beginning(tenth, &one, &mut out))?,
             seconds(|| beginning(tenth, &preview, &mut out))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
@@ -226,8 +241,17 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             evaluations(stream.gaussians(), picture.width, picture.height),
         ])
     })?;
-    let [bytes, psnr, whole, scaling, one_each, parse, output, thumbnail, rest @ ..] = values;
-    let [tenth, preview, tenth_gaussians, memory, gaussians, evaluations] = rest;
+    let [bytes, psnr, whole, scaling, one_each, parse, output, rest @ ..] = values;
+    let [
+        thumbnail,
+        thumbnail_psnr,
+        tenth,
+        preview,
+        tenth_gaussians,
+        memory,
+        gaussians,
+        evaluations,
+    ] = rest;
     Ok(Times {
         bytes,
         psnr,
@@ -237,6 +261,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
         parse,
         output,
         thumbnail,
+        thumbnail_psnr,
         tenth: [tenth, preview],
         tenth_gaussians,
         memory,
@@ -354,10 +379,13 @@ fn theirs(
         let coded = worker.code(other.id, setting, picture, Some(1), [1, 1])?;
         let (ours, mut out) = (file.coded()?, vec![0; picture.rgb.len()]);
         let one = RenderOptions::new().parallel(false);
-        let ([_, theirs], [_, share]) = in_turns([
-            &mut || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
-            &mut || worker.decode_again(IN_A_TURN),
-        ])?;
+        let ([_, theirs], [_, share]) = in_turns(
+            TURNS,
+            [
+                &mut || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
+                &mut || worker.decode_again(IN_A_TURN),
+            ],
+        )?;
         Ok([picture.rate(coded.bytes), coded.distortion.psnr, theirs, share])
     })
 }
@@ -417,6 +445,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         "all threads, times as fast",
         "one file each, times as many",
         "thumbnail, times as fast",
+        "its PSNR to one of all Gaussians, dB",
         "first tenth, share of the time",
         "and at a quarter of the size",
         "Gaussians in it",
@@ -449,6 +478,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
             format!("{:.2}", of(|times| times.scaling)),
             format!("{:.2}", of(|times| times.one_each)),
             format!("{:.1}", of(|times| times.thumbnail)),
+            format!("{:.1}", mean(|times| times.thumbnail_psnr)),
             format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole)),
             format!("{:.0} %", 100.0 * mean(|times| times.tenth[1] / times.whole)),
             format!("{:.1} %", 100.0 * mean(|times| times.tenth_gaussians / times.gaussians)),
@@ -467,7 +497,7 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
          them, whose data stay in registers and in the first cache: {:.3} ns each on this machine, \
          in this run.\n{}\n### Less than all\n\nCompared with ours for the whole picture on one \
          thread. Thumbnails are 1/{THUMBNAIL} as wide and as high and take as many of the layers as \
-         show at their size; the first tenth of the bytes is shown at the whole picture's size, and \
+         make a fair one; the first tenth of the bytes is shown at the whole picture's size, and \
          smaller as a preview; all times start from the file in memory. All threads decode one \
          file together; what they do when each has a file of its own is what the machine allows. \
          Ratios are medians of those of the pictures, shares are means.\n{}\n### Memory\n\nMost \
