@@ -3,6 +3,7 @@
 
 use alloc::vec::Vec;
 
+use crate::bounds::Bounds;
 use crate::coding::account::AttributeBits;
 use crate::coding::fixed::LayerReader;
 use crate::coding::layers::Layers;
@@ -13,6 +14,8 @@ use crate::lattice::Lattice;
 use crate::limits::Limits;
 use crate::quantizer::Quantizer;
 use crate::render::Picture;
+#[cfg(feature = "std")]
+use crate::render::RenderOptions;
 use crate::threads;
 
 /// Most bytes of a header or quantizer chunk of version 1: nine quantizers of twelve bytes.
@@ -53,6 +56,8 @@ pub struct StreamDecoder {
     quantizers: Vec<Quantizer>,
     /// Of coding 1.
     lattice: Option<Lattice>,
+    /// Of every layer that the header declares, where the file has them.
+    bounds: Option<Vec<Bounds>>,
     /// Layers of coding 1 that have arrived and were not decoded yet.
     waiting: Layers,
     metadata: Metadata,
@@ -120,6 +125,7 @@ impl StreamDecoder {
             header: None,
             quantizers: Vec::new(),
             lattice: None,
+            bounds: None,
             waiting: Layers::default(),
             metadata: Metadata::default(),
             gaussians: Vec::new(),
@@ -251,9 +257,19 @@ impl StreamDecoder {
     /// The picture so far; `None` until the header has arrived.
     #[must_use]
     pub fn picture(&self) -> Option<Picture<'_>> {
-        let header = self.header.as_ref()?;
-        let held = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
-        Some(Picture::new(header, &self.gaussians, &self.limits, held + self.metadata.size()))
+        Some(self.picture_of(self.header.as_ref()?, &self.gaussians))
+    }
+
+    /// A picture of Gaussians that are held beside all else.
+    fn picture_of<'a>(&'a self, header: &'a Header, gaussians: &'a Vec<Gaussian>) -> Picture<'a> {
+        let held = gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
+        Picture::new(header, gaussians, &self.limits, held + self.described())
+    }
+
+    /// Bytes that are held of what stands before the Gaussians.
+    fn described(&self) -> u64 {
+        let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<Bounds>();
+        self.metadata.size() + bounds as u64
     }
 
     /// Whether the first layer has begun: header and metadata are complete.
@@ -320,6 +336,10 @@ impl StreamDecoder {
             ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
             // A later version may add to these; version 1 reads them before any layer only.
+            ChunkType::BNDS if self.layers == 0 && self.bounds.is_some() => {
+                misplaced("appears twice")
+            }
+            ChunkType::BNDS if self.layers == 0 => self.collected(length),
             _ if Metadata::knows(chunk) && self.layers == 0 => self.collected(length),
             ChunkType::GHDR | ChunkType::QNTZ => Ok(collect(length)),
             ChunkType::GEND => Ok(Stage::Skip),
@@ -337,7 +357,7 @@ impl StreamDecoder {
     fn collected(&self, length: u32) -> Result<Stage, DecodeError> {
         let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
         let declared = growing::<Gaussian>(gaussians) + growing::<u8>(length);
-        self.limits.check_memory(self.metadata.size() + self.waiting.memory() + declared)?;
+        self.limits.check_memory(self.described() + self.waiting.memory() + declared)?;
         Ok(collect(length))
     }
 
@@ -388,8 +408,14 @@ impl StreamDecoder {
                 let payload = core::mem::take(payload);
                 let declared = self.header.as_ref().map_or(0, |header| header.gaussians);
                 let allowed = declared - self.arrived() as u32;
-                self.waiting.push(payload, allowed)?;
+                let number = usize::from(self.layers);
+                let bounds = self.bounds.as_ref().and_then(|bounds| bounds.get(number).copied());
+                self.waiting.push(payload, bounds, allowed)?;
                 self.layers += 1;
+            }
+            (ChunkType::BNDS, Stage::Collect { payload, .. }) => {
+                let Some(header) = &self.header else { return Ok(()) };
+                self.bounds = Some(Bounds::parse_all(payload, header)?);
             }
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
@@ -425,24 +451,49 @@ impl StreamDecoder {
             return Ok(());
         };
         let waiting = core::mem::take(&mut self.waiting);
+        let layers = waiting.select(|_| true);
         let before = self.gaussians.len();
-        let count = waiting.count();
+        let count = layers.count();
         grow(&mut self.gaussians, count, header.gaussians as usize);
         threads::extend(parallel, &mut self.gaussians, Gaussian::NOTHING, count);
         let places = &mut self.gaussians[before..];
         let account = self.account.as_mut();
-        waiting.decode(header, lattice, account, parallel, places).map_err(|(sound, error)| {
+        layers.decode(header, lattice, account, parallel, places).map_err(|(sound, error)| {
             self.gaussians.truncate(before + sound);
             self.stage = Stage::Failed;
             error
         })
     }
 
+    /// What there is for some output and what it adds of the layers that wait, which go on waiting;
+    /// `None` where that is all of them, or not all is well: then they are to be decoded for good,
+    /// which says what is wrong.
+    #[cfg(feature = "std")]
+    fn showing(&self, options: &RenderOptions) -> Option<Vec<Gaussian>> {
+        let (header, lattice) = (self.header.as_ref()?, self.lattice.as_ref()?);
+        let view = options.view(header, &self.limits).ok()?;
+        let shows = |bounds: Bounds| bounds.meet(&view, header);
+        let layers = self.waiting.select(|bounds| bounds.is_none_or(shows));
+        if layers.count() == self.waiting.count() || options.prefix.is_some() {
+            return None;
+        }
+        let (before, count) = (self.gaussians.len(), layers.count());
+        let places = (self.gaussians.capacity() + before + count) * size_of::<Gaussian>();
+        let held = self.described() + self.waiting.memory();
+        self.limits.check_memory(held + places as u64).ok()?;
+        let mut gaussians = Vec::with_capacity(before + count);
+        gaussians.extend_from_slice(&self.gaussians);
+        threads::extend(options.parallel, &mut gaussians, Gaussian::NOTHING, count);
+        let places = &mut gaussians[before..];
+        layers.decode(header, lattice, None, options.parallel, places).ok()?;
+        Some(gaussians)
+    }
+
     /// Checks what a header declares against the limits.
     fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
         self.limits.check_size(header.width, header.height)?;
         self.limits.check_gaussians(header.gaussians)?;
-        self.limits.check_memory(self.metadata.size() + growing::<Gaussian>(header.gaussians))
+        self.limits.check_memory(self.described() + growing::<Gaussian>(header.gaussians))
     }
 
     fn count(&mut self, kind: ChunkType, length: u32) {
@@ -493,7 +544,7 @@ fn grow<T>(items: &mut Vec<T>, additional: usize, declared: usize) {
 pub struct Decoder<R> {
     reader: R,
     stream: StreamDecoder,
-    options: crate::render::RenderOptions,
+    options: RenderOptions,
 }
 
 #[cfg(feature = "std")]
@@ -512,7 +563,7 @@ impl<R: std::io::Read> Decoder<R> {
     /// As [`Decoder::new`], and when a limit is exceeded.
     pub fn with_limits(reader: R, limits: Limits) -> Result<Self, DecodeError> {
         let stream = StreamDecoder::with_limits(limits);
-        let options = crate::render::RenderOptions::new();
+        let options = RenderOptions::new();
         let mut decoder = Self { reader, stream, options };
         decoder.read_until(StreamDecoder::has_begun)?;
         Ok(decoder)
@@ -547,7 +598,7 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes, and
     /// whether threads are used from here on.
-    pub fn set_options(&mut self, options: crate::render::RenderOptions) {
+    pub fn set_options(&mut self, options: RenderOptions) {
         self.options = options;
     }
 
@@ -585,20 +636,38 @@ impl<R: std::io::Read> Decoder<R> {
 
     /// Reads the rest of the file and renders interleaved 8-bit samples.
     ///
+    /// For a region of a large picture, layers that do not show in it are checked but not decoded,
+    /// and what was decoded for it is not kept: who renders many regions calls
+    /// [`Decoder::read_to_end`] first.
+    ///
     /// # Errors
     /// As [`Decoder::read_to_end`] and [`Picture::render_u8`].
     pub fn decode_into(&mut self, out: &mut [u8]) -> Result<(), DecodeError> {
-        self.read_to_end()?;
-        self.picture().render_u8(&self.options, out)
+        self.render(|picture, options| picture.render_u8(options, out))
     }
 
-    /// Reads the rest of the file and renders interleaved 16-bit samples.
+    /// Reads the rest of the file and renders interleaved 16-bit samples, as
+    /// [`Decoder::decode_into`] does.
     ///
     /// # Errors
     /// As [`Decoder::read_to_end`] and [`Picture::render_u16`].
     pub fn decode_into_u16(&mut self, out: &mut [u16]) -> Result<(), DecodeError> {
-        self.read_to_end()?;
-        self.picture().render_u16(&self.options, out)
+        self.render(|picture, options| picture.render_u16(options, out))
+    }
+
+    /// Reads the rest of the file and renders what shows.
+    fn render(
+        &mut self,
+        render: impl FnOnce(&Picture<'_>, &RenderOptions) -> Result<(), DecodeError>,
+    ) -> Result<(), DecodeError> {
+        threads::wake(self.options.parallel);
+        self.read_until(StreamDecoder::is_complete)?;
+        if let Some(gaussians) = self.stream.showing(&self.options) {
+            let picture = self.stream.picture_of(self.header(), &gaussians);
+            return render(&picture, &self.options);
+        }
+        self.decode_waiting()?;
+        render(&self.picture(), &self.options)
     }
 
     /// Reads until something is reached, and decodes the layers that came.
@@ -606,7 +675,7 @@ impl<R: std::io::Read> Decoder<R> {
         &mut self,
         reached: impl Fn(&StreamDecoder) -> bool,
     ) -> Result<(), DecodeError> {
-        threads::wake(self.options.is_parallel());
+        threads::wake(self.options.parallel);
         self.read_until(reached)?;
         self.decode_waiting()
     }
@@ -624,7 +693,7 @@ impl<R: std::io::Read> Decoder<R> {
     }
 
     fn decode_waiting(&mut self) -> Result<(), DecodeError> {
-        self.stream.decode_waiting(self.options.is_parallel())
+        self.stream.decode_waiting(self.options.parallel)
     }
 
     /// Takes one piece of the file.

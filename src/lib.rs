@@ -65,6 +65,8 @@
 extern crate alloc;
 
 #[cfg(feature = "decode")]
+mod bounds;
+#[cfg(feature = "decode")]
 mod coding;
 #[cfg(feature = "decode")]
 mod color;

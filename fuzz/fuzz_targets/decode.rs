@@ -10,4 +10,5 @@ fuzz_target!(|bytes: &[u8]| {
     let fed = decoder.feed(bytes);
     assert_eq!(fed.is_ok() && decoder.is_complete(), decoder.finish().is_ok());
     image_gip_fuzz::check(&decoder);
+    image_gip_fuzz::decode_region(bytes);
 });

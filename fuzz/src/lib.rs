@@ -13,7 +13,10 @@ pub mod file;
 mod sets;
 
 use fearless_simd::Level;
-use image_gip::{DecodeError, Limits, Picture, Region, RenderOptions, StreamDecoder};
+use image_gip::{
+    ChunkStatistics, ChunkType, DecodeError, Decoder, Limits, Picture, Region, RenderOptions,
+    StreamDecoder,
+};
 
 /// Bounds that leave room for every branch and keep one input to a few milliseconds.
 pub fn limits() -> Limits {
@@ -54,6 +57,23 @@ pub fn check(decoder: &StreamDecoder) {
     check_region(&picture, &small, width, part);
 
     check_backend(&picture, &middle);
+}
+
+/// Decodes the middle of a file from the layers that show in it: the same as from all of them, where
+/// the file does not say which these are.
+pub fn decode_region(bytes: &[u8]) {
+    let Ok(mut decoder) = Decoder::with_limits(bytes, limits()) else { return };
+    let [_, middle] = views(&decoder.picture()).map(|options| options.parallel(false));
+    let Ok(length) = decoder.picture().output_len(&middle) else { return };
+    decoder.set_options(middle.clone());
+    let mut samples = vec![0; length];
+    let decoded = decoder.decode_into(&mut samples);
+    let says_where = |chunk: &ChunkStatistics| chunk.kind == ChunkType::BNDS;
+    if decoded.is_ok() && !decoder.stream().chunks().iter().any(says_where) {
+        let mut expected = vec![0; length];
+        decoder.picture().render_u8(&middle, &mut expected).expect("it was rendered before");
+        assert_eq!(samples, expected);
+    }
 }
 
 /// All of a picture, small, and its middle at its stored size, however large that is.

@@ -6,6 +6,7 @@ use core::cmp::Reverse;
 
 use super::account::AttributeBits;
 use super::set::{LAYER_PREFIX, SetCoding};
+use crate::bounds::Bounds;
 use crate::color::ColorModel;
 use crate::container::Header;
 use crate::error::DecodeError;
@@ -29,6 +30,8 @@ struct Layer {
     /// How many Gaussians it has.
     count: usize,
     payload: Vec<u8>,
+    /// Where they show, if the file says so.
+    bounds: Option<Bounds>,
 }
 
 impl Layer {
@@ -51,11 +54,16 @@ impl Layer {
 
 impl Layers {
     /// Adds a layer that has at most `allowed` Gaussians.
-    pub(crate) fn push(&mut self, payload: Vec<u8>, allowed: u32) -> Result<(), DecodeError> {
+    pub(crate) fn push(
+        &mut self,
+        payload: Vec<u8>,
+        bounds: Option<Bounds>,
+        allowed: u32,
+    ) -> Result<(), DecodeError> {
         let (count, _) = SetCoding::counted(&payload, allowed)?;
         self.count += count;
         self.memory += payload.len() as u64 + BY_LAYER;
-        self.layers.push(Layer { count, payload });
+        self.layers.push(Layer { count, payload, bounds });
         Ok(())
     }
 
@@ -69,7 +77,29 @@ impl Layers {
         self.memory
     }
 
-    /// Decodes all layers into as many places as they have Gaussians, or adds to an account on the
+    /// Those of the layers whose bounds are wanted.
+    pub(crate) fn select(&self, wanted: impl Fn(Option<Bounds>) -> bool) -> Selected<'_> {
+        let layers = self.layers.iter().filter(|layer| wanted(layer.bounds));
+        let layers: Vec<&Layer> = layers.collect();
+        let count = layers.iter().map(|layer| layer.count).sum();
+        Selected { layers, count }
+    }
+}
+
+/// Layers that are to be decoded, in file order.
+#[derive(Debug)]
+pub(crate) struct Selected<'a> {
+    layers: Vec<&'a Layer>,
+    count: usize,
+}
+
+impl Selected<'_> {
+    /// How many Gaussians there are in all of them.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Decodes the layers into as many places as they have Gaussians, or adds to an account on the
     /// way, one after the other.
     ///
     /// # Errors
@@ -86,7 +116,7 @@ impl Layers {
         let coding = SetCoding::new(lattice, header);
         let mut outcomes: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
         let mut work = Vec::with_capacity(self.layers.len());
-        for (layer, outcome) in self.layers.iter().zip(&mut outcomes) {
+        for (&layer, outcome) in self.layers.iter().zip(&mut outcomes) {
             let (own, rest) = core::mem::take(&mut places).split_at_mut(layer.count);
             places = rest;
             work.push((layer, own, outcome));

@@ -23,6 +23,8 @@ impl ChunkType {
     pub const QNTZ: Self = Self(*b"QNTZ");
     /// One layer of Gaussians.
     pub const GAUS: Self = Self(*b"GAUS");
+    /// Where each layer shows.
+    pub const BNDS: Self = Self(*b"bNDS");
     /// The end of the file.
     pub const GEND: Self = Self(*b"GEND");
     /// An ICC profile.

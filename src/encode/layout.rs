@@ -5,6 +5,7 @@ use super::coded::{Coded, write_layers};
 use super::fit::Fitted;
 use super::source::Source;
 use super::training::Training;
+use crate::bounds::Bounds;
 use crate::coding::fixed;
 use crate::coding::set::SetCoding;
 use crate::container::{ChunkType, Coding, Header, Metadata, SIGNATURE, write_chunk};
@@ -16,6 +17,9 @@ const LEAST_LAYER: usize = 64;
 /// The layers of a file with enough Gaussians, as shares of them: each ends with a checksum, and
 /// the first already shows the picture.
 const LAYERS: [f64; 4] = [0.125, 0.125, 0.25, 0.5];
+
+/// Of more layers than this it is said where they show.
+const FEW_LAYERS: usize = 8;
 
 /// All of a file but its Gaussians.
 #[derive(Debug)]
@@ -88,13 +92,13 @@ impl<'a> Layout<'a> {
     /// The file of coded Gaussians.
     pub(crate) fn write_set(&self, coded: &Coded) -> Vec<u8> {
         let coding = SetCoding::new(&coded.lattice, &self.header);
-        let layers = write_layers(&coding, &mut coded.codes.clone());
-        let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
+        let mut codes = coded.codes.clone();
+        let layers = write_layers(&coding, &mut codes);
         let header = Header {
             coding: Coding::Set,
             chart: Chart::Cholesky,
             gaussians: coded.codes.len() as u32,
-            layers: payloads.len() as u16,
+            layers: layers.len() as u16,
             ..self.header.clone()
         };
         let mut file = SIGNATURE.to_vec();
@@ -103,8 +107,22 @@ impl<'a> Layout<'a> {
         for (kind, payload) in self.metadata.chunks() {
             write_chunk(&mut file, kind, &payload);
         }
-        for payload in payloads {
-            write_chunk(&mut file, ChunkType::GAUS, &payload);
+        if layers.len() > FEW_LAYERS {
+            let mut rest = &codes[..];
+            let mut bounds = Vec::new();
+            for layer in &layers {
+                let (codes, later) = rest.split_at(layer.levels.len());
+                rest = later;
+                let gaussians = codes.iter().map(|code| {
+                    let shape = coding.lattice.shape(code);
+                    coding.lattice.gaussian(code, &shape, &coding.grid, header.color)
+                });
+                bounds.extend(Bounds::of(gaussians, &header).to_entry());
+            }
+            write_chunk(&mut file, ChunkType::BNDS, &bounds);
+        }
+        for layer in layers {
+            write_chunk(&mut file, ChunkType::GAUS, &layer.payload);
         }
         write_chunk(&mut file, ChunkType::GEND, &[]);
         file
@@ -169,4 +187,70 @@ fn layers(count: usize) -> Vec<usize> {
     let last = sizes.len() - 1;
     sizes[last] += count - sizes.iter().sum::<usize>();
     sizes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::decoder::Decoder;
+    use crate::encode::rate;
+    use crate::lattice::{Code, Grid};
+    use crate::render::{Region, RenderOptions};
+
+    const SIDES: [u32; 2] = [900, 700];
+
+    /// A file of so many Gaussians, some of them beside the picture.
+    fn file(count: usize) -> Vec<u8> {
+        let [width, height] = SIDES;
+        let samples = vec![9; (width * height) as usize];
+        let source =
+            Source::new_u8(width, height, ColorModel::Gray, &samples).expect("sizes agree");
+        let metadata = Metadata::default();
+        let layout = Layout::new(&source, &Training::fast(1), [0.0; 4], &metadata);
+        let grid = Grid::new(width, height);
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut code = || Code {
+            class: 2,
+            color: [random.i32(-20..=20), 0, 0, 0],
+            size: random.i32(-6..=6),
+            ratio: random.i32(-3..=3),
+            slant: random.i32(-3..=3),
+            center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
+        };
+        let codes = (0..count).map(|_| code()).collect();
+        layout.write_set(&Coded { lattice: rate::lattice(0.0, ColorModel::Gray), codes })
+    }
+
+    /// The samples of a region, and how many Gaussians are kept then.
+    fn decoded(file: &[u8], options: &RenderOptions, all: bool) -> (Vec<u8>, usize) {
+        let mut decoder = Decoder::new(file).expect("it begins well");
+        if all {
+            decoder.read_to_end().expect("it is sound");
+        }
+        decoder.set_options(options.clone());
+        let mut samples = vec![0; decoder.output_len().expect("it fits")];
+        decoder.decode_into(&mut samples).expect("it is sound");
+        (samples, decoder.picture().gaussians().len())
+    }
+
+    #[test]
+    fn a_region_of_a_large_picture_is_that_part_of_it() {
+        let file = file(33_000);
+        for (scale, x, y) in [(1, 0, 0), (1, 430, 330), (1, 860, 660), (3, 2000, 800)] {
+            let region = Region { x, y, width: 40, height: 40 };
+            let options = RenderOptions::new().size(SIDES[0] * scale, SIDES[1] * scale);
+            let options = options.region(region);
+            let (expected, gaussians) = decoded(&file, &options, true);
+            assert_eq!(gaussians, 33_000);
+            // Those that were decoded for the region alone are not kept.
+            assert_eq!(decoded(&file, &options, false), (expected, 0), "{region:?}");
+        }
+    }
+
+    #[test]
+    fn few_layers_say_nothing_of_where_they_show() {
+        let options = RenderOptions::new().region(Region { x: 0, y: 0, width: 9, height: 9 });
+        assert_eq!(decoded(&file(3000), &options, false).1, 3000);
+    }
 }

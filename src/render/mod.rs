@@ -15,6 +15,8 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 pub use kernel::Kernel;
+#[cfg(feature = "std")]
+pub(crate) use view::View;
 pub use view::{Region, RenderOptions};
 
 #[cfg(feature = "encode")]

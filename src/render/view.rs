@@ -40,8 +40,8 @@ pub struct RenderOptions {
     size: Option<(u32, u32)>,
     region: Option<Region>,
     color: Option<ColorModel>,
-    pub(super) prefix: Option<u32>,
-    pub(super) parallel: bool,
+    pub(crate) prefix: Option<u32>,
+    pub(crate) parallel: bool,
     pub(super) backend: Backend,
 }
 
@@ -102,11 +102,6 @@ impl RenderOptions {
         self
     }
 
-    #[cfg(feature = "std")]
-    pub(crate) fn is_parallel(&self) -> bool {
-        self.parallel
-    }
-
     /// Whether to use the plain reference code in place of the fast code (default: no). The
     /// result is the same bit for bit; this is how to find out.
     pub fn reference(mut self, reference: bool) -> Self {
@@ -156,7 +151,7 @@ impl RenderOptions {
     }
 
     /// Checks the request against the picture and the limits.
-    pub(super) fn view(&self, header: &Header, limits: &Limits) -> Result<View, DecodeError> {
+    pub(crate) fn view(&self, header: &Header, limits: &Limits) -> Result<View, DecodeError> {
         let (width, height) = self.size.unwrap_or((header.width, header.height));
         let sides = 1..=MAX_OUTPUT_SIDE;
         if !sides.contains(&width) || !sides.contains(&height) {

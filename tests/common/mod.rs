@@ -240,6 +240,29 @@ impl File {
         self
     }
 
+    /// What `bNDS` says of a file of coding 1 with the quartic kernel (section 5.6).
+    pub(crate) fn bounds(&self) -> Vec<u8> {
+        let decoder = decode_valid(&self.bytes());
+        let mut rest = decoder.gaussians();
+        let mut all = Vec::new();
+        for layer in &self.sets.as_ref().expect("coding 1").layers {
+            let (gaussians, later) = rest.split_at(layer.len());
+            rest = later;
+            let mut bounds = [255, 255, 0, 0];
+            for Gaussian { center, cholesky: [l11, l21, l22], .. } in gaussians {
+                let reach = [2.0 * l11, 2.0 * (l21 * l21 + l22 * l22).sqrt()];
+                for axis in 0..2 {
+                    let side = self.header.sides()[axis] as f32;
+                    let cell = |at: f32| (at / side * 256.0).floor().clamp(0.0, 255.0) as u8;
+                    bounds[axis] = bounds[axis].min(cell(center[axis] - reach[axis]));
+                    bounds[axis + 2] = bounds[axis + 2].max(cell(center[axis] + reach[axis]));
+                }
+            }
+            all.extend(bounds);
+        }
+        all
+    }
+
     /// The chunks in order.
     pub(crate) fn chunks(&self) -> Vec<Vec<u8>> {
         let (quantizers, layers) = match &self.sets {

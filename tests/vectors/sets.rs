@@ -69,6 +69,7 @@ pub(super) fn valid() -> Vec<Vector> {
         let layers = layers.map(|(count, seed)| scatter(seed, &header, count)).collect();
         File::of_sets(header, usual_steps(RGB), layers)
     };
+    let bounded = layers.clone().with(b"bNDS", &layers.bounds());
     let classes = {
         let header = header(RGBA, 32, 16);
         let of_class = |class: u32| {
@@ -239,12 +240,13 @@ pub(super) fn valid() -> Vec<Vector> {
             "coding 1: one Gaussian",
             usual(gray, vec![at(&gray, [9.0, 7.0], 7)]),
         ),
-        Vector::valid(
-            "sets-layers",
-            "coding 1: four layers; models go on learning from one to the next",
-            layers,
-        )
-        .also(&[Rendering::Prefix(5), Rendering::Prefix(6), Rendering::Prefix(20)]),
+        Vector::valid("sets-layers", "coding 1: four layers; models begin anew in each", layers)
+            .also(&[Rendering::Prefix(5), Rendering::Prefix(6), Rendering::Prefix(20)]),
+        Vector::valid("sets-bounds", "coding 1: where each of four layers shows", bounded).also(&[
+            Rendering::Region(1, 2, 3, 4),
+            Rendering::Region(30, 17, 10, 7),
+            Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
+        ]),
         Vector::valid(
             "sets-classes",
             "coding 1: all classes, with plain bits under codes",
@@ -459,6 +461,21 @@ pub(super) fn invalid() -> Vec<Vector> {
             "coding 1: another state at the end",
             &with_ops(&|ops| ops.push(Op::Bits { count: 1, value: 1 })),
             "another state at the end",
+        ),
+        invalid(
+            "xsets-bounds-fewer",
+            "coding 1: it is said of one layer only where it shows, and there are two",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255]).bytes(),
+        ),
+        invalid(
+            "xsets-bounds-reversed",
+            "coding 1: a layer shows in rows that end before they begin",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255, 7, 9, 7, 8]).bytes(),
+        ),
+        invalid(
+            "xsets-bounds-twice",
+            "coding 1: it is said twice where layers show",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255].repeat(2)).with(b"bNDS", &[0; 8]).bytes(),
         ),
         invalid("xsets-crc", "coding 1: a wrong CRC, found when the layer is complete", {
             let mut bytes = file.bytes();

@@ -1,0 +1,149 @@
+//! A region is decoded from the layers that show in it (specification, section 5.6): the same bits as
+//! from all of them.
+
+mod common;
+
+use std::io::{self, Read};
+
+use common::coding1::{Code, Grid};
+use common::{File, Ghdr, RGB, Random, bits, chunk, decode, decode_valid, of_chunks};
+use image_gip::{DecodeError, Decoder, Region, RenderOptions};
+
+const SIZE: (u32, u32) = (300, 200);
+const LAYERS: usize = 24;
+const IN_A_LAYER: usize = 20;
+/// Chunks before the first layer: header, steps, bounds.
+const BEFORE: usize = 3;
+
+/// A picture of layers that each have a place of their own; some Gaussians lie beside it.
+fn sample() -> File {
+    let header = Ghdr { color: RGB, width: SIZE.0, height: SIZE.1, ..Ghdr::default() };
+    let grid = Grid::new(header.sides());
+    let mut random = Random(5);
+    let layer = |number: usize| {
+        let [x, y] = [(number % 6) as f32 * 50.0, (number / 6) as f32 * 50.0];
+        let mut code = |_| {
+            let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
+            let axes = vec![within(20), within(9), within(9)];
+            let [size, ratio, slant] = [within(6), within(3), within(3)];
+            let place = grid.units([x + random.range(0.0, 50.0), y + random.range(0.0, 50.0)]);
+            Code { class: 2, axes, size, ratio, slant, place }
+        };
+        (0..IN_A_LAYER).map(&mut code).collect()
+    };
+    let layers = (0..LAYERS).map(layer).collect();
+    File::of_sets(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
+}
+
+/// The chunks of the sample, with bounds.
+fn chunks() -> Vec<Vec<u8>> {
+    let file = sample();
+    let bounds = file.bounds();
+    file.with(b"bNDS", &bounds).chunks()
+}
+
+fn rendered(file: &[u8], options: &RenderOptions) -> Result<Vec<u8>, DecodeError> {
+    let mut decoder = Decoder::new(file)?;
+    decoder.set_options(options.clone());
+    let mut samples = vec![0; decoder.output_len().expect("it fits")];
+    decoder.decode_into(&mut samples).map(|()| samples)
+}
+
+#[test]
+fn a_region_is_that_part_of_the_picture() {
+    let bytes = of_chunks(&chunks());
+    let whole = decode_valid(&bytes);
+    let picture = whole.picture().expect("it is whole");
+    let mut random = Random(6);
+    for (width, height) in [SIZE, (75, 50), (20, 200), (301, 7), (1500, 1000)] {
+        for _ in 0..40 {
+            let mut part = |side: u32| {
+                let start = random.next() as u32 % side;
+                (start, 1 + random.next() as u32 % (side - start).min(40))
+            };
+            let ((x, width_of), (y, height_of)) = (part(width), part(height));
+            let region = Region { x, y, width: width_of, height: height_of };
+            let options = RenderOptions::new().size(width, height).region(region);
+            let mut expected = vec![0; picture.output_len(&options).expect("it fits")];
+            picture.render_u8(&options, &mut expected).expect("it renders");
+            let found = rendered(&bytes, &options).expect("it decodes");
+            assert_eq!(found, expected, "{width}x{height}, {region:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_that_do_not_show_are_not_decoded() {
+    let mut chunks = chunks();
+    let first = &mut chunks[BEFORE];
+    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
+    let bytes = of_chunks(&chunks);
+    let part = |x, y| RenderOptions::new().region(Region { x, y, width: 20, height: 20 });
+    rendered(&bytes, &part(280, 180)).expect("what is not sound is far away");
+    let (expected, error) = decode(&bytes);
+    let error = error.expect_err("the first layer is not sound").to_string();
+    for options in [part(0, 0), RenderOptions::new(), part(280, 180).prefix(1000)] {
+        assert_eq!(rendered(&bytes, &options).expect_err("it shows").to_string(), error);
+    }
+    let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+    assert_eq!(decoder.read_to_end().expect_err("all are decoded").to_string(), error);
+    assert_eq!(bits(decoder.picture().gaussians()), bits(expected.gaussians()));
+}
+
+/// A file that comes a few bytes at a time.
+struct Slow<'a>(&'a [u8]);
+
+impl Read for Slow<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let length = buffer.len().min(50);
+        self.0.read(&mut buffer[..length])
+    }
+}
+
+#[test]
+fn after_a_region_there_is_still_all_else() {
+    let bytes = of_chunks(&chunks());
+    let whole = decode_valid(&bytes);
+    let mut decoder = Decoder::new(Slow(&bytes)).expect("it begins well");
+    decoder.read_at_least(3 * IN_A_LAYER as u32).expect("it is sound");
+    let options = RenderOptions::new().region(Region { x: 270, y: 10, width: 30, height: 30 });
+    let mut expected = vec![0; 3 * 30 * 30];
+    whole.picture().expect("whole").render_u8(&options, &mut expected).expect("it renders");
+    decoder.set_options(options);
+    for _ in 0..2 {
+        let mut samples = vec![0; expected.len()];
+        decoder.decode_into(&mut samples).expect("it is sound");
+        assert_eq!(samples, expected);
+    }
+    assert_eq!(decoder.picture().gaussians().len(), 3 * IN_A_LAYER);
+    decoder.read_to_end().expect("it is sound");
+    assert_eq!(bits(decoder.picture().gaussians()), bits(whole.gaussians()));
+}
+
+#[test]
+fn wrong_bounds_are_refused() {
+    let sound = chunks();
+    let entries = &sound[BEFORE - 1][8..][..4 * LAYERS];
+    let mut reversed = entries.to_vec();
+    (reversed[4], reversed[6]) = (9, 8);
+    let cases: [(&[u8], &str); 4] = [
+        (&entries[..4 * LAYERS - 1], "has not as many entries as there are layers"),
+        (&[entries, &[0; 4]].concat(), "has not as many entries as there are layers"),
+        (&[], "has not as many entries as there are layers"),
+        (&reversed, "a layer ends before it begins"),
+    ];
+    for (payload, expected) in cases {
+        let mut chunks = sound.clone();
+        chunks[BEFORE - 1] = chunk(b"bNDS", payload);
+        let error = decode(&of_chunks(&chunks)).1.expect_err("it is malformed").to_string();
+        assert!(error.contains("bNDS") && error.contains(expected), "{error}");
+    }
+    let mut twice = sound.clone();
+    twice.insert(BEFORE, sound[BEFORE - 1].clone());
+    let error = decode(&of_chunks(&twice)).1.expect_err("it is malformed").to_string();
+    assert!(error.contains("bNDS") && error.contains("appears twice"), "{error}");
+    // Behind the first layer it says nothing, whatever it says.
+    let mut late = sound.clone();
+    late.insert(BEFORE + 1, chunk(b"bNDS", &[1]));
+    decode_valid(&of_chunks(&late));
+}
