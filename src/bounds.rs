@@ -99,8 +99,7 @@ mod tests {
     use crate::container::Coding;
     use crate::gaussian::Chart;
     use crate::limits::Limits;
-    use crate::render::Kernel;
-    use crate::render::{Picture, Region, RenderOptions};
+    use crate::render::{Kernel, Picture, Region, RenderOptions};
     use crate::testing::config;
 
     fn header(width: u32, height: u32) -> Header {

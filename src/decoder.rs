@@ -257,16 +257,17 @@ impl StreamDecoder {
     /// The picture so far; `None` until the header has arrived.
     #[must_use]
     pub fn picture(&self) -> Option<Picture<'_>> {
-        Some(self.picture_of(self.header.as_ref()?, &self.gaussians))
+        let header = self.header.as_ref()?;
+        Some(Picture::new(header, &self.gaussians, &self.limits, self.held()))
     }
 
-    /// A picture of Gaussians that are held beside all else.
-    fn picture_of<'a>(&'a self, header: &'a Header, gaussians: &'a Vec<Gaussian>) -> Picture<'a> {
-        let held = gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
-        Picture::new(header, gaussians, &self.limits, held + self.described())
+    /// Bytes that are held.
+    fn held(&self) -> u64 {
+        let gaussians = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
+        self.described() + self.waiting.memory() + gaussians
     }
 
-    /// Bytes that are held of what stands before the Gaussians.
+    /// Those of what stands before the Gaussians.
     fn described(&self) -> u64 {
         let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<Bounds>();
         self.metadata.size() + bounds as u64
@@ -335,10 +336,10 @@ impl StreamDecoder {
             ChunkType::GAUS if self.lattice.is_some() => self.collected(length),
             ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
-            // A later version may add to these; version 1 reads them before any layer only.
             ChunkType::BNDS if self.layers == 0 && self.bounds.is_some() => {
                 misplaced("appears twice")
             }
+            // A later version may add to these; version 1 reads them before any layer only.
             ChunkType::BNDS if self.layers == 0 => self.collected(length),
             _ if Metadata::knows(chunk) && self.layers == 0 => self.collected(length),
             ChunkType::GHDR | ChunkType::QNTZ => Ok(collect(length)),
@@ -478,9 +479,8 @@ impl StreamDecoder {
             return None;
         }
         let (before, count) = (self.gaussians.len(), layers.count());
-        let places = (self.gaussians.capacity() + before + count) * size_of::<Gaussian>();
-        let held = self.described() + self.waiting.memory();
-        self.limits.check_memory(held + places as u64).ok()?;
+        let places = (before + count) as u64 * size_of::<Gaussian>() as u64;
+        self.limits.check_memory(self.held() + places).ok()?;
         let mut gaussians = Vec::with_capacity(before + count);
         gaussians.extend_from_slice(&self.gaussians);
         threads::extend(options.parallel, &mut gaussians, Gaussian::NOTHING, count);
@@ -663,7 +663,8 @@ impl<R: std::io::Read> Decoder<R> {
         threads::wake(self.options.parallel);
         self.read_until(StreamDecoder::is_complete)?;
         if let Some(gaussians) = self.stream.showing(&self.options) {
-            let picture = self.stream.picture_of(self.header(), &gaussians);
+            let held = self.stream.held() + gaussians.len() as u64 * size_of::<Gaussian>() as u64;
+            let picture = Picture::new(self.header(), &gaussians, &self.stream.limits, held);
             return render(&picture, &self.options);
         }
         self.decode_waiting()?;
