@@ -270,6 +270,11 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
     })
 }
 
+/// The least and the most.
+fn ends(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    [values.clone().fold(f64::NAN, f64::min), values.fold(f64::NAN, f64::max)]
+}
+
 fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
     gip::median_seconds(REPEATS, work)
 }
@@ -404,9 +409,7 @@ fn ratios(all: &[Measured]) -> String {
             "most",
         ]);
         for row in rows {
-            let shares = row.points.iter().map(|point| point[3]);
-            let [least, most] =
-                [shares.clone().fold(f64::NAN, f64::min), shares.fold(f64::NAN, f64::max)];
+            let [least, most] = ends(row.points.iter().map(|point| point[3]));
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),
@@ -459,6 +462,10 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
     for Measured { rate, ours, .. } in all {
         let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
         let of = |get: fn(&Times) -> f64| median(ours.iter().map(get)).unwrap_or(f64::NAN);
+        let spread = |get: fn(&Times) -> f64| {
+            let [least, most] = ends(ours.iter().map(get));
+            format!("{:.2} ({least:.2} to {most:.2})", of(get))
+        };
         let pixels = f64::from(pictures[0].width * pictures[0].height);
         let [whole, parse, output] = [mean(|t| t.whole), mean(|t| t.parse), mean(|t| t.output)];
         let evaluations = mean(|times| times.evaluations);
@@ -475,8 +482,8 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         ]);
         gains.row(&[
             rate.to_string(),
-            format!("{:.2}", of(|times| times.scaling)),
-            format!("{:.2}", of(|times| times.one_each)),
+            spread(|times| times.scaling),
+            spread(|times| times.one_each),
             format!("{:.1}", of(|times| times.thumbnail)),
             format!("{:.1}", mean(|times| times.thumbnail_psnr)),
             format!("{:.0} %", 100.0 * mean(|times| times.tenth[0] / times.whole)),
@@ -500,7 +507,8 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
          make a fair one; the first tenth of the bytes is shown at the whole picture's size, and \
          smaller as a preview; all times start from the file in memory. All threads decode one \
          file together; what they do when each has a file of its own is what the machine allows. \
-         Ratios are medians of those of the pictures, shares are means.\n{}\n### Memory\n\nMost \
+         Ratios are medians of those of the pictures, with the least and the most where \
+         threads are used; shares are means.\n{}\n### Memory\n\nMost \
          bytes held at a time with one thread.\n{}",
         1e9 * floor,
         stages.finish(),
