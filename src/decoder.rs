@@ -16,6 +16,7 @@ use crate::quantizer::Quantizer;
 use crate::render::Picture;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
+#[cfg(feature = "std")]
 use crate::threads;
 
 /// Most bytes of a header or quantizer chunk of version 1: nine quantizers of twelve bytes.
@@ -453,17 +454,13 @@ impl StreamDecoder {
         };
         let waiting = core::mem::take(&mut self.waiting);
         let layers = waiting.select(|_| true);
-        let before = self.gaussians.len();
-        let count = layers.count();
-        grow(&mut self.gaussians, count, header.gaussians as usize);
-        threads::extend(parallel, &mut self.gaussians, Gaussian::NOTHING, count);
-        let places = &mut self.gaussians[before..];
+        grow(&mut self.gaussians, layers.count(), header.gaussians as usize);
         let account = self.account.as_mut();
-        layers.decode(header, lattice, account, parallel, places).map_err(|(sound, error)| {
-            self.gaussians.truncate(before + sound);
+        let decoded = layers.decode(header, lattice, account, parallel, &mut self.gaussians);
+        if decoded.is_err() {
             self.stage = Stage::Failed;
-            error
-        })
+        }
+        decoded
     }
 
     /// What there is for some output and what it adds of the layers that wait, which go on waiting;
@@ -478,14 +475,12 @@ impl StreamDecoder {
         if layers.count() == self.waiting.count() || options.prefix.is_some() {
             return None;
         }
-        let (before, count) = (self.gaussians.len(), layers.count());
-        let places = (before + count) as u64 * size_of::<Gaussian>() as u64;
+        let count = self.gaussians.len() + layers.count();
+        let places = count as u64 * size_of::<Gaussian>() as u64;
         self.limits.check_memory(self.held() + places).ok()?;
-        let mut gaussians = Vec::with_capacity(before + count);
+        let mut gaussians = Vec::with_capacity(count);
         gaussians.extend_from_slice(&self.gaussians);
-        threads::extend(options.parallel, &mut gaussians, Gaussian::NOTHING, count);
-        let places = &mut gaussians[before..];
-        layers.decode(header, lattice, None, options.parallel, places).ok()?;
+        layers.decode(header, lattice, None, options.parallel, &mut gaussians).ok()?;
         Some(gaussians)
     }
 

@@ -15,7 +15,7 @@ use crate::lattice::Lattice;
 use crate::threads;
 
 /// Bytes that a layer takes beside its payload: its entries in lists, and what came of it.
-const BY_LAYER: u64 = size_of::<(Layer, [usize; 4], Result<(), DecodeError>)>() as u64;
+const BY_LAYER: u64 = size_of::<(Layer, [usize; 5], Result<(), DecodeError>)>() as u64;
 
 /// Layers that have arrived, in file order.
 #[derive(Debug, Default)]
@@ -79,9 +79,9 @@ impl Layers {
 
     /// Those of the layers whose bounds are wanted.
     pub(crate) fn select(&self, wanted: impl Fn(Option<Bounds>) -> bool) -> Selected<'_> {
-        let layers = self.layers.iter().filter(|layer| wanted(layer.bounds));
-        let layers: Vec<&Layer> = layers.collect();
-        let count = layers.iter().map(|layer| layer.count).sum();
+        let mut layers = Vec::with_capacity(self.layers.len());
+        layers.extend(self.layers.iter().filter(|layer| wanted(layer.bounds)));
+        let count = layers.iter().map(|layer: &&Layer| layer.count).sum();
         Selected { layers, count }
     }
 }
@@ -99,20 +99,23 @@ impl Selected<'_> {
         self.count
     }
 
-    /// Decodes the layers into as many places as they have Gaussians, or adds to an account on the
+    /// Adds the Gaussians of the layers to others, those before the first layer that is not sound,
+    /// or also adds to an account on the
     /// way, one after the other.
     ///
     /// # Errors
-    /// With the number of Gaussians before the first layer that is not sound, and what is wrong
-    /// with it.
+    /// What is wrong with that layer.
     pub(crate) fn decode(
         self,
         header: &Header,
         lattice: &Lattice,
         account: Option<&mut AttributeBits>,
         parallel: bool,
-        mut places: &mut [Gaussian],
-    ) -> Result<(), (usize, DecodeError)> {
+        gaussians: &mut Vec<Gaussian>,
+    ) -> Result<(), DecodeError> {
+        let mut sound = gaussians.len();
+        threads::extend(parallel, gaussians, Gaussian::NOTHING, self.count);
+        let mut places = &mut gaussians[sound..];
         let coding = SetCoding::new(lattice, header);
         let mut outcomes: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
         let mut work = Vec::with_capacity(self.layers.len());
@@ -132,9 +135,11 @@ impl Selected<'_> {
                 *outcome = layer.read(&coding, header.color, None, places);
             });
         }
-        let mut sound = 0;
         for (layer, outcome) in self.layers.iter().zip(outcomes) {
-            outcome.map_err(|error| (sound, error))?;
+            if outcome.is_err() {
+                gaussians.truncate(sound);
+                return outcome;
+            }
             sound += layer.count;
         }
         Ok(())
