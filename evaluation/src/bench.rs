@@ -1,15 +1,13 @@
-//! What all sections share: pictures, stores, baselines, and the report.
+//! What all sections share: pictures, stores, baselines, and the report's folder.
 
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
 use crate::pictures::{self, Picture};
-use crate::sections::Section;
 use crate::store::Store;
-use crate::{gip, provenance, report};
+use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
@@ -106,11 +104,10 @@ impl Bench {
         Ok((self.worker.insert(worker), versions))
     }
 
-    /// Puts the text of a section into the report, with where it comes from. Returns the report's
-    /// path.
-    pub(crate) fn keep(&self, section: Section, text: &str) -> Result<PathBuf> {
+    /// Where the measurements come from: the list at the head of every section.
+    pub(crate) fn provenance(&self) -> String {
         let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
-        let mut from = format!(
+        let mut list = format!(
             "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
              of which some tables take fewer and say so: {}\n",
             self.machine,
@@ -122,21 +119,12 @@ impl Bench {
             names.join(", "),
         );
         if let Some(worker) = &self.worker {
-            from.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
+            list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }
         if self.quick {
-            from.push_str("- A quick run: few pictures and settings\n");
+            list.push_str("- A quick run: few pictures and settings\n");
         }
-        let path = self.path("report.md");
-        let before = match fs::read_to_string(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
-            before => before.with_context(|| format!("cannot read {}", path.display()))?,
-        };
-        // In its place once it is whole: the other sections are kept nowhere else.
-        let whole = self.path("report.md.new");
-        fs::write(&whole, report::with(&before, section, &format!("{from}\n{text}")))?;
-        fs::rename(whole, &path)?;
-        Ok(path)
+        list
     }
 }
 

@@ -1,6 +1,10 @@
-//! The report: one text, in which every section is as it was last measured.
+//! The report: its sections, and one text that has each of them as it was last measured.
 
-use crate::sections::Section;
+use std::path::Path;
+use std::{fmt, fs, io};
+
+use anyhow::{Context, Result};
+use clap::ValueEnum;
 
 const TITLE: &str = "\
 # image-gip, measured
@@ -10,8 +14,73 @@ CSV beside this file. Sizes are those of whole files. PSNR is over all samples o
 RGB picture, unless stated otherwise.
 ";
 
+/// What can be measured on its own; the comments are the help of `--only`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Section {
+    /// The fit itself, without quantization: against GaussianImage and GaussianImage++
+    Representation,
+    /// What each part of the method is worth
+    Ablation,
+    /// Rate and distortion, against every baseline
+    Rate,
+    /// Time against error, and how both grow
+    Speed,
+    /// Decoding next to other decoders, whole and in part
+    Decode,
+    /// Arithmetic at its edges, and pictures that are hard to fit
+    Stability,
+    /// How much is spent on simple and on difficult pictures
+    Scene,
+}
+
+impl Section {
+    /// In the order of the report.
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Representation,
+        Self::Ablation,
+        Self::Rate,
+        Self::Speed,
+        Self::Decode,
+        Self::Stability,
+        Self::Scene,
+    ];
+
+    fn title(self) -> &'static str {
+        match self {
+            Self::Representation => "Representation",
+            Self::Ablation => "Ablation",
+            Self::Rate => "Rate and distortion",
+            Self::Speed => "Speed against error",
+            Self::Decode => "Decoding",
+            Self::Stability => "Numerical stability",
+            Self::Scene => "Only what a scene needs",
+        }
+    }
+}
+
+impl fmt::Display for Section {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.to_possible_value().expect("no section is skipped");
+        f.write_str(value.get_name())
+    }
+}
+
+/// Replaces one section of the report in a file, which is made if it is missing.
+pub(crate) fn update(path: &Path, section: Section, text: &str) -> Result<()> {
+    let before = match fs::read_to_string(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+        before => before.with_context(|| format!("cannot read {}", path.display()))?,
+    };
+    // Written beside the old report and then renamed: an interruption must not destroy the other
+    // sections, which are kept nowhere else.
+    let new = path.with_extension("md.new");
+    fs::write(&new, with(&before, section, text))?;
+    fs::rename(new, path)?;
+    Ok(())
+}
+
 /// A report with a section as `text` has it, and all others as they were.
-pub(crate) fn with(report: &str, section: Section, text: &str) -> String {
+fn with(report: &str, section: Section, text: &str) -> String {
     let mut all = TITLE.to_owned();
     for each in Section::ALL {
         let text = if each == section { Some(text) } else { text_of(report, each) };
@@ -39,17 +108,33 @@ mod tests {
 
     #[test]
     fn a_section_is_replaced_and_the_others_stay() {
-        let report = with("", Section::Decode, "- Codec: a\n\n### Part\n\nfast\n");
-        let report = with(&report, Section::Rate, "small\n\n");
-        let report = with(&report, Section::Scene, "flat");
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("report.md");
+        let report = |section: Section, text: &str| {
+            update(&path, section, text).expect("it is written");
+            fs::read_to_string(&path).expect("it was just written")
+        };
         let expected = |rate: &str| {
             format!(
                 "{TITLE}\n## Rate and distortion\n\n{rate}\n\n## Decoding\n\n- Codec: a\n\n### Part\n\n\
                  fast\n\n## Only what a scene needs\n\nflat\n"
             )
         };
-        assert_eq!(report, expected("small"));
-        assert_eq!(with(&report, Section::Rate, "smaller"), expected("smaller"));
-        assert_eq!(with(&report, Section::Scene, "flat"), report);
+        report(Section::Decode, "- Codec: a\n\n### Part\n\nfast\n");
+        report(Section::Rate, "small\n\n");
+        assert_eq!(report(Section::Scene, "flat"), expected("small"));
+        assert_eq!(report(Section::Rate, "smaller"), expected("smaller"));
+        assert_eq!(report(Section::Scene, "flat"), expected("smaller"));
+        let files = fs::read_dir(folder.path()).expect("a folder").count();
+        assert_eq!(files, 1, "nothing is left beside the report");
+    }
+
+    #[test]
+    fn titles_differ() {
+        // A section is found by its title.
+        for (index, section) in Section::ALL.iter().enumerate() {
+            assert!(Section::ALL[..index].iter().all(|other| other.title() != section.title()));
+        }
+        assert_eq!(Section::ALL, Section::value_variants());
     }
 }
