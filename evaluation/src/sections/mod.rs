@@ -4,13 +4,13 @@
 //! There are only declarations here, so that no module has to import its parent.
 
 pub(crate) mod ablation;
-mod checks;
 pub(crate) mod decode;
 mod growth;
 mod handmade;
 mod levels;
 mod methods;
 mod positions;
+mod product_tests;
 pub(crate) mod rate;
 pub(crate) mod representation;
 pub(crate) mod scene;

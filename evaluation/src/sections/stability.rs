@@ -6,8 +6,8 @@ use image_gip::{
     ColorModel, Kernel, Picture, RenderOptions, SampleDepth, Source, StreamDecoder, Target,
 };
 
-use super::checks;
 use super::handmade::{self, COMPONENTS, Handmade};
+use super::product_tests;
 use crate::bench::Bench;
 use crate::gip;
 use crate::table::Table;
@@ -20,7 +20,7 @@ const GAUSSIANS: u32 = 500;
 const EFFORT: u8 = 3;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    Ok(format!("{}{}{}", decoder(bench)?, checks::measure(bench)?, encoder(bench)?))
+    Ok(format!("{}{}{}", decoder(bench)?, product_tests::measure()?, encoder(bench)?))
 }
 
 /// Gaussians that strain the arithmetic.
