@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::pictures::{Distortion, Picture};
+use crate::pictures::{Distortion, TestPicture};
 use crate::provenance::FOLDER;
 
 /// A codec with the settings to sweep.
@@ -85,7 +85,7 @@ tune=psnr; JPEG XL is libjxl's effort 7 at full resolution, and tuned for percei
 
 /// One file of a baseline.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Coded {
+pub(crate) struct RoundTrip {
     pub(crate) bytes: f64,
     pub(crate) distortion: Distortion,
     pub(crate) encode_seconds: f64,
@@ -128,14 +128,14 @@ impl Worker {
 
     /// Encodes and decodes a picture; `None` for all threads. Times are medians over so many
     /// `repeats` of encoding and of decoding.
-    pub(crate) fn code(
+    pub(crate) fn round_trip(
         &mut self,
         codec: &str,
         setting: &str,
-        picture: &Picture,
+        picture: &TestPicture,
         threads: Option<usize>,
         [encodings, decodings]: [u32; 2],
-    ) -> Result<Coded> {
+    ) -> Result<RoundTrip> {
         let (source, decoded) = (picture.path.display(), self.decoded.display());
         let threads = threads.unwrap_or(0);
         let repeats = format!("{encodings}\t{decodings}");
@@ -147,7 +147,7 @@ impl Worker {
             bail!("the worker answered `{answer}`");
         };
         let distortion = picture.distortion(&fs::read(&self.decoded)?)?;
-        Ok(Coded { bytes, distortion, encode_seconds, decode_seconds })
+        Ok(RoundTrip { bytes, distortion, encode_seconds, decode_seconds })
     }
 
     /// Decodes the last file once more; the median over so many times.

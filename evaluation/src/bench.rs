@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
-use crate::pictures::{self, Picture};
+use crate::pictures::{self, TestPicture};
 use crate::store::Store;
 use crate::{gip, provenance};
 
@@ -17,7 +17,7 @@ const QUICK_ITERATIONS: u32 = 2_000;
 
 #[derive(Debug)]
 pub(crate) struct Bench {
-    pub(crate) pictures: Vec<Picture>,
+    pub(crate) pictures: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -69,13 +69,13 @@ impl Bench {
     }
 
     /// At most so many of the pictures, evenly spread.
-    pub(crate) fn some(&self, at_most: usize) -> Vec<Picture> {
+    pub(crate) fn sample(&self, at_most: usize) -> Vec<TestPicture> {
         let (all, count) = (self.pictures.len(), at_most.min(self.pictures.len()));
         (0..count).map(|index| self.pictures[index * all / count].clone()).collect()
     }
 
     /// Which pictures a measurement took: `taken` of all.
-    pub(crate) fn share(&self, taken: usize) -> String {
+    pub(crate) fn pictures_used(&self, taken: usize) -> String {
         format!("pictures: {taken} of {}", self.pictures.len())
     }
 
@@ -130,7 +130,7 @@ impl Bench {
 
 /// The version of baselines whose times are compared with those of a codec: taken anew with every
 /// version of it, since only times of the same machine in the same state can be compared.
-pub(crate) fn beside(product: &str, versions: &str) -> String {
+pub(crate) fn timing_version(product: &str, versions: &str) -> String {
     format!("{versions}, beside {product}")
 }
 

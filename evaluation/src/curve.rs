@@ -34,14 +34,14 @@ impl Curve {
     pub(crate) fn quality(&self, rate: f64) -> Option<f64> {
         let (first, last) = (*self.rates.first()?, *self.rates.last()?);
         let rate = rate.ln();
-        (first..=last).contains(&rate).then(|| Cubic::new(&self.rates, &self.qualities).at(rate))
+        (first..=last).contains(&rate).then(|| Pchip::new(&self.rates, &self.qualities).at(rate))
     }
 
     /// The qualities from the rate `low` to the rate `high`, as far as the curve goes.
     fn qualities(&self, (low, high): (f64, f64)) -> Option<(f64, f64)> {
         let rates = (*self.rates.first()?, *self.rates.last()?);
         let (low, high) = (low.ln().max(rates.0), high.ln().min(rates.1));
-        let curve = Cubic::new(&self.rates, &self.qualities);
+        let curve = Pchip::new(&self.rates, &self.qualities);
         (low < high).then(|| (curve.at(low), curve.at(high)))
     }
 }
@@ -54,18 +54,18 @@ pub(crate) fn bd_rate(anchor: &Curve, test: &Curve, range: (f64, f64)) -> Option
     if low >= high {
         return None;
     }
-    let area = |curve: &Curve| Cubic::new(&curve.qualities, &curve.rates).integral(low, high);
+    let area = |curve: &Curve| Pchip::new(&curve.qualities, &curve.rates).integral(low, high);
     Some(((area(test) - area(anchor)) / (high - low)).exp_m1())
 }
 
 /// A monotone piecewise cubic through points (Fritsch and Butland, 1984).
-struct Cubic<'a> {
+struct Pchip<'a> {
     x: &'a [f64],
     y: &'a [f64],
     slopes: Vec<f64>,
 }
 
-impl<'a> Cubic<'a> {
+impl<'a> Pchip<'a> {
     /// Through points of increasing x, at least one.
     fn new(x: &'a [f64], y: &'a [f64]) -> Self {
         let steps: Vec<f64> = x.windows(2).map(|x| x[1] - x[0]).collect();

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use image_gip::{ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder};
 
 use crate::memory;
-use crate::pictures::{Distortion, Picture};
+use crate::pictures::{Distortion, TestPicture};
 use crate::table::median;
 
 /// How the codec is called in tables and files.
@@ -20,7 +20,7 @@ const REPEATS: usize = 5;
 
 /// One `.gip` file.
 #[derive(Clone, Debug)]
-pub(crate) struct Coded {
+pub(crate) struct MeasuredFile {
     pub(crate) file: Vec<u8>,
     pub(crate) bytes: f64,
     pub(crate) report: Report,
@@ -35,14 +35,18 @@ pub(crate) fn encoder(effort: u8) -> Encoder {
 }
 
 /// Encodes and decodes a picture; `None` for all threads.
-pub(crate) fn code(encoder: Encoder, picture: &Picture, threads: Option<usize>) -> Result<Coded> {
+pub(crate) fn encode(
+    encoder: Encoder,
+    picture: &TestPicture,
+    threads: Option<usize>,
+) -> Result<MeasuredFile> {
     let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
     let encoder = encoder.with_threads(threads);
     let (encoded, memory) = memory::peak(|| encoder.encode(&source));
     let encoded = encoded?;
     let file = encoded.bytes;
     let (bytes, distortion) = (file.len() as f64, distortion(&file, picture)?);
-    Ok(Coded { file, bytes, report: encoded.report, distortion, memory })
+    Ok(MeasuredFile { file, bytes, report: encoded.report, distortion, memory })
 }
 
 /// Decodes a file and hands over what it has.
@@ -56,12 +60,12 @@ pub(crate) fn open<T>(
 }
 
 /// How far a file is from its source.
-pub(crate) fn distortion(file: &[u8], picture: &Picture) -> Result<Distortion> {
+pub(crate) fn distortion(file: &[u8], picture: &TestPicture) -> Result<Distortion> {
     picture.distortion(&decode(file, true)?)
 }
 
 /// PSNR in dB of the rendering as floats, not rounded but clamped, as papers have it.
-pub(crate) fn psnr_float(file: &[u8], picture: &Picture) -> Result<f64> {
+pub(crate) fn psnr_float(file: &[u8], picture: &TestPicture) -> Result<f64> {
     let (planes, pixels) = (planes(file)?, picture.rgb.len() / 3);
     let squared = planes.iter().enumerate().map(|(index, sample)| {
         let source = picture.rgb[index % pixels * 3 + index / pixels];
@@ -128,11 +132,11 @@ mod tests {
         let (width, height) = (24, 16);
         let rgb = (0..width * height).flat_map(|i| [(i % 24 * 10) as u8, (i / 24 * 9) as u8, 77]);
         let picture =
-            Picture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
+            TestPicture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
         let encoder = encoder(1).with_target(image_gip::Target::Gaussians(20));
-        let coded = code(encoder, &picture, None).expect("a small picture");
-        let psnr = psnr_float(&coded.file, &picture).expect("it decodes");
-        assert!((psnr - coded.report.psnr_float).abs() < 1e-3, "{psnr}");
-        assert_eq!(coded.distortion.psnr, coded.report.psnr);
+        let measured = encode(encoder, &picture, None).expect("a small picture");
+        let psnr = psnr_float(&measured.file, &picture).expect("it decodes");
+        assert!((psnr - measured.report.psnr_float).abs() < 1e-3, "{psnr}");
+        assert_eq!(measured.distortion.psnr, measured.report.psnr);
     }
 }

@@ -2,9 +2,10 @@
 
 mod baselines;
 mod bench;
+mod comparison;
 mod curve;
 mod gip;
-mod kernel;
+mod kernel_benchmark;
 mod memory;
 mod pictures;
 mod plot;
@@ -13,7 +14,6 @@ mod report;
 mod sections;
 mod store;
 mod table;
-mod verdict;
 
 use std::fs;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ use clap::Parser;
 
 use bench::Bench;
 use report::Section;
-use sections::{ablation, decode, rate, representation, scene, speed, stability};
+use sections::{ablation, content, decode, rate, representation, speed, stability};
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
@@ -81,7 +81,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),
         Section::Stability => stability::measure(bench),
-        Section::Scene => scene::measure(bench),
+        Section::Content => content::measure(bench),
     }
 }
 

@@ -8,7 +8,7 @@ use image_gip::metrics;
 
 /// An 8-bit RGB picture, from a file or made up.
 #[derive(Clone, Debug)]
-pub(crate) struct Picture {
+pub(crate) struct TestPicture {
     pub(crate) name: String,
     /// Where the file is, for other programs to read.
     pub(crate) path: PathBuf,
@@ -26,7 +26,7 @@ pub(crate) struct Distortion {
     pub(crate) ms_ssim: f64,
 }
 
-impl Picture {
+impl TestPicture {
     pub(crate) fn pixels(&self) -> f64 {
         f64::from(self.width) * f64::from(self.height)
     }
@@ -68,7 +68,7 @@ impl Picture {
 }
 
 /// All PNGs of a folder by name, or `at_most` of them, evenly spread.
-pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<Picture>> {
+pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPicture>> {
     let unreadable = || format!("cannot read the folder {}", folder.display());
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).with_context(unreadable)? {
@@ -83,14 +83,14 @@ pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<Picture>
     (0..count).map(|index| open(&paths[index * paths.len() / count])).collect()
 }
 
-fn open(path: &Path) -> Result<Picture> {
+fn open(path: &Path) -> Result<TestPicture> {
     let image = image::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let image = image.into_rgb8();
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (width, height) = image.dimensions();
     // The worker has a working directory and lines of its own.
     let path = fs::canonicalize(path)?;
-    Ok(Picture { name, path, width, height, rgb: image.into_raw() })
+    Ok(TestPicture { name, path, width, height, rgb: image.into_raw() })
 }
 
 #[cfg(test)]
@@ -101,7 +101,7 @@ mod tests {
     fn mirrors_meet_without_an_edge() {
         let rgb = (0..2 * 2 * 3).collect();
         let picture =
-            Picture { name: String::new(), path: PathBuf::new(), width: 2, height: 2, rgb };
+            TestPicture { name: String::new(), path: PathBuf::new(), width: 2, height: 2, rgb };
         let mirrored = picture.mirrored(5, 3);
         let reds: Vec<u8> = mirrored.rgb.iter().step_by(3).copied().collect();
         assert_eq!(reds, [0, 3, 3, 0, 0, 6, 9, 9, 6, 6, 6, 9, 9, 6, 6]);
@@ -113,7 +113,7 @@ mod tests {
     fn a_picture_of_another_size_is_no_copy() {
         let rgb = vec![7; 3];
         let picture =
-            Picture { name: String::new(), path: PathBuf::new(), width: 1, height: 1, rgb };
+            TestPicture { name: String::new(), path: PathBuf::new(), width: 1, height: 1, rgb };
         assert_eq!(picture.distortion(&[7; 3]).expect("it fits").psnr, f64::INFINITY);
         assert!(picture.distortion(&[7; 4]).is_err());
     }

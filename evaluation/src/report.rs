@@ -30,7 +30,7 @@ pub(crate) enum Section {
     /// Arithmetic at its edges, and pictures that are hard to fit
     Stability,
     /// How much is spent on simple and on difficult pictures
-    Scene,
+    Content,
 }
 
 impl Section {
@@ -42,7 +42,7 @@ impl Section {
         Self::Speed,
         Self::Decode,
         Self::Stability,
-        Self::Scene,
+        Self::Content,
     ];
 
     fn title(self) -> &'static str {
@@ -53,7 +53,7 @@ impl Section {
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",
-            Self::Scene => "Only what a scene needs",
+            Self::Content => "Only what a scene needs",
         }
     }
 }
@@ -122,9 +122,9 @@ mod tests {
         };
         report(Section::Decode, "- Codec: a\n\n### Part\n\nfast\n");
         report(Section::Rate, "small\n\n");
-        assert_eq!(report(Section::Scene, "flat"), expected("small"));
+        assert_eq!(report(Section::Content, "flat"), expected("small"));
         assert_eq!(report(Section::Rate, "smaller"), expected("smaller"));
-        assert_eq!(report(Section::Scene, "flat"), expected("smaller"));
+        assert_eq!(report(Section::Content, "flat"), expected("smaller"));
         let files = fs::read_dir(folder.path()).expect("a folder").count();
         assert_eq!(files, 1, "nothing is left beside the report");
     }

@@ -7,12 +7,12 @@ use image_gip::{Chart, Encoder, Precision, Target};
 use super::methods::{self, CHARTS};
 use super::positions;
 use crate::bench::Bench;
+use crate::comparison::{Better, NamedFigures, list_or_none, where_worse};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::store::Store;
 use crate::table::{Table, mean, percent};
-use crate::verdict::{Better, Named, list, worse};
 
 /// Gaussians where the table names no others.
 const GAUSSIANS: u32 = 5_000;
@@ -45,14 +45,14 @@ const GROWTHS: [u32; 2] = [9, 4];
 const SEEDS: u64 = 5;
 
 /// What components and intervals are judged by.
-const FIGURES: [(&str, Better); 2] = [("PSNR", Better::Higher), ("MS-SSIM", Better::Higher)];
+const CRITERIA: [(&str, Better); 2] = [("PSNR", Better::Higher), ("MS-SSIM", Better::Higher)];
 
 /// Everything that the measurements share.
 #[derive(Debug)]
 struct Ablation<'a> {
     store: Store<4, 3>,
     bench: &'a Bench,
-    pictures: Vec<Picture>,
+    pictures: Vec<TestPicture>,
     gaussians: u32,
     iterations: u32,
     own_iterations: u32,
@@ -60,7 +60,7 @@ struct Ablation<'a> {
 
 /// Means over the pictures.
 #[derive(Clone, Copy, Debug)]
-struct Outcome {
+struct VariantMeans {
     rate: f64,
     psnr: f64,
     ms_ssim: f64,
@@ -69,7 +69,7 @@ struct Outcome {
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let bench: &Bench = bench;
     let choose = |quick: u32, full: u32| if bench.quick { quick } else { full };
-    let pictures = |full: usize| bench.some(if bench.quick { QUICK_PICTURES } else { full });
+    let pictures = |full: usize| bench.sample(if bench.quick { QUICK_PICTURES } else { full });
     let mut ablation = Ablation {
         store: bench.store(
             "ablation.csv",
@@ -104,10 +104,10 @@ impl Ablation<'_> {
     fn components(&mut self) -> Result<String> {
         let mut table =
             Table::new(&["parameterization", "neither", "CAF alone", "D3 alone", "D3 and CAF"]);
-        let mut verdicts = String::new();
+        let mut comparisons = String::new();
         for (name, chart) in CHARTS {
             let mut cells = vec![name.to_owned()];
-            let mut compared: Vec<Named> = Vec::new();
+            let mut compared: Vec<NamedFigures> = Vec::new();
             for (part, d3, caf) in [
                 ("neither", false, false),
                 ("CAF alone", false, true),
@@ -123,14 +123,14 @@ impl Ablation<'_> {
             table.row(&cells);
             if let Some((_, both)) = compared.pop() {
                 let subject = (format!("{name} with both"), both);
-                verdicts.push_str(&worse(&FIGURES, &subject, &compared));
+                comparisons.push_str(&where_worse(&CRITERIA, &subject, &compared));
             }
         }
         Ok(format!(
             "\n### Components\n\nCompared with each other: {} Gaussians as floats with and without \
-             D3 and CAF; {}.\n{}{verdicts}",
+             D3 and CAF; {}.\n{}{comparisons}",
             self.gaussians,
-            self.bench.share(self.pictures.len()),
+            self.bench.pictures_used(self.pictures.len()),
             table.finish()
         ))
     }
@@ -138,7 +138,7 @@ impl Ablation<'_> {
     /// How often to prune and to grow.
     fn intervals(&mut self) -> Result<String> {
         let mut table = Table::new(&["pruned every", "grown", "PSNR in dB", "MS-SSIM"]);
-        let mut compared: Vec<Named> = Vec::new();
+        let mut compared: Vec<NamedFigures> = Vec::new();
         for growths in GROWTHS {
             for interval in PRUNING {
                 let mut training = methods::paper(self.iterations, Chart::Covariance, true, true);
@@ -161,9 +161,9 @@ impl Ablation<'_> {
              with {} Gaussians as floats, grown as often as with the paper's intervals of 5,000 \
              and 10,000 of 50,000 iterations; {}.\n{}{}",
             self.gaussians,
-            self.bench.share(self.pictures.len()),
+            self.bench.pictures_used(self.pictures.len()),
             table.finish(),
-            worse(&FIGURES, &compared[0], &compared[1..]),
+            where_worse(&CRITERIA, &compared[0], &compared[1..]),
         ))
     }
 
@@ -178,11 +178,12 @@ impl Ablation<'_> {
             for &count in counts {
                 let encoder = Encoder::new().with_seed(gip::SEED).with_training(training.clone());
                 let encoder = encoder.with_precision(Precision::Packed);
-                outcomes.push(self.outcome(&variant, self.own_iterations, count, &encoder)?);
+                outcomes.push(self.means(&variant, self.own_iterations, count, &encoder)?);
             }
             rows.push((variant, outcomes));
         }
-        let curve = |outcomes: &[Outcome]| Curve::new(outcomes.iter().map(|o| (o.rate, o.psnr)));
+        let curve =
+            |outcomes: &[VariantMeans]| Curve::new(outcomes.iter().map(|o| (o.rate, o.psnr)));
         let anchor = curve(&rows[0].1);
         let mut columns = vec!["position/shape/colour".to_owned()];
         columns.extend(counts.iter().map(|count| format!("{count} Gaussians")));
@@ -205,9 +206,9 @@ impl Ablation<'_> {
              {} iterations, quantized; {}.\n{}\nThe paper's choice is worse, by BD-rate, than: \
              {}.\n",
             self.own_iterations,
-            self.bench.share(self.pictures.len()),
+            self.bench.pictures_used(self.pictures.len()),
             table.finish(),
-            list(better.into_iter()),
+            list_or_none(better.into_iter()),
         ))
     }
 
@@ -219,10 +220,10 @@ impl Ablation<'_> {
             let encoder = Encoder::new().with_seed(seed).with_training(training);
             let encoder = encoder.with_precision(Precision::Packed);
             let variant = format!("seed {seed}");
-            outcomes.push(self.outcome(&variant, self.own_iterations, self.gaussians, &encoder)?);
+            outcomes.push(self.means(&variant, self.own_iterations, self.gaussians, &encoder)?);
         }
         let mut table = Table::new(&["", "bpp", "PSNR in dB", "MS-SSIM"]);
-        let figures: [fn(&Outcome) -> f64; 3] = [|o| o.rate, |o| o.psnr, |o| o.ms_ssim];
+        let figures: [fn(&VariantMeans) -> f64; 3] = [|o| o.rate, |o| o.psnr, |o| o.ms_ssim];
         let columns = figures.map(|figure| outcomes.iter().map(figure).collect::<Vec<f64>>());
         for (name, figure) in [("mean", average as fn(&[f64]) -> f64), ("deviation", deviation)] {
             let mut cells = vec![name.to_owned()];
@@ -240,7 +241,7 @@ impl Ablation<'_> {
              best is better by {:.3} dB.\n",
             self.own_iterations,
             self.gaussians,
-            self.bench.share(self.pictures.len()),
+            self.bench.pictures_used(self.pictures.len()),
             table.finish(),
             average(psnrs) - least,
             most - average(psnrs),
@@ -248,33 +249,33 @@ impl Ablation<'_> {
     }
 
     /// A published method without quantization.
-    fn float(&mut self, variant: &str, training: Training) -> Result<Outcome> {
+    fn float(&mut self, variant: &str, training: Training) -> Result<VariantMeans> {
         let iterations = training.iterations;
         let encoder = Encoder::new().with_seed(gip::SEED).with_training(training);
         let encoder = encoder.with_precision(Precision::Float);
-        self.outcome(variant, iterations, self.gaussians, &encoder)
+        self.means(variant, iterations, self.gaussians, &encoder)
     }
 
-    fn outcome(
+    fn means(
         &mut self,
         variant: &str,
         iterations: u32,
         gaussians: u32,
         encoder: &Encoder,
-    ) -> Result<Outcome> {
+    ) -> Result<VariantMeans> {
         let mut rows = Vec::new();
         for picture in &self.pictures {
             let (rounds, count) = (iterations.to_string(), gaussians.to_string());
             let key = [variant, &rounds, &count, &picture.name];
             rows.push(self.store.get(&self.bench.product, key, || {
                 let encoder = encoder.clone().with_target(Target::Gaussians(gaussians));
-                let coded = gip::code(encoder, picture, None)?;
-                let (report, ms_ssim) = (&coded.report, coded.distortion.ms_ssim);
-                Ok([picture.rate(coded.bytes), report.psnr_float, ms_ssim])
+                let measured = gip::encode(encoder, picture, None)?;
+                let (report, ms_ssim) = (&measured.report, measured.distortion.ms_ssim);
+                Ok([picture.rate(measured.bytes), report.psnr_float, ms_ssim])
             })?);
         }
         let of = |column: usize| mean(rows.iter().map(|row| row[column])).unwrap_or(f64::NAN);
-        Ok(Outcome { rate: of(0), psnr: of(1), ms_ssim: of(2) })
+        Ok(VariantMeans { rate: of(0), psnr: of(1), ms_ssim: of(2) })
     }
 }
 

@@ -7,68 +7,68 @@ use std::{array, thread};
 use anyhow::{Context, Result};
 use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target, metrics};
 
-use super::rate::Files;
+use super::rate::RateStore;
 use super::speed::nearest;
 use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
-use crate::bench::{Bench, beside};
+use crate::bench::{Bench, timing_version};
+use crate::comparison::list_or_none;
 use crate::gip;
-use crate::kernel;
+use crate::kernel_benchmark;
 use crate::memory;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::provenance::cores;
 use crate::table::{Table, mean, median};
-use crate::verdict::list;
 
 /// Rates of the files, in bits per pixel.
 const RATES: [f64; 3] = [0.25, 0.5, 1.0];
 /// On how many pictures.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
-/// Times are medians over so many runs.
+/// DecoderProfile are medians over so many runs.
 const REPEATS: usize = 15;
 /// What is compared takes turns, since a machine is now faster and now slower: so many, of so many
 /// runs each. All threads take more turns, since what else the machine does shows more with them.
 const TURNS: usize = 21;
-const TURNS_OF_THREADS: usize = 63;
+const TURNS_ALL_THREADS: usize = 63;
 const IN_A_TURN: usize = 5;
 /// How much smaller thumbnails are along each side.
 const THUMBNAIL: u32 = 8;
 /// How much smaller a preview of the first bytes is along each side.
 const PREVIEW: u32 = 4;
 /// Bytes that a Gaussian takes in the list that a caller gets.
-const LISTED: f64 = size_of::<Gaussian>() as f64;
+const GAUSSIAN_BYTES: f64 = size_of::<Gaussian>() as f64;
 /// The picture of which a region is decoded: its width, its rate and its effort, and the region.
-const WIDE: (u32, f64, u8) = (2048, 0.5, 2);
+const LARGE_PICTURE: (u32, f64, u8) = (2048, 0.5, 2);
 const REGION: u32 = 128;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let pictures = bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES });
+    let pictures = bench.sample(if bench.quick { QUICK_PICTURES } else { PICTURES });
     let mut text = format!(
         "Compared with: the decoders of libjpeg-turbo, libwebp, OpenJPEG, libavif with dav1d, and \
          libjxl, on files of about the same rate of the same pictures. From a file in memory to \
          8-bit RGB in memory that is there already. What is compared takes {TURNS} turns of \
-         {IN_A_TURN} decodings, {TURNS_OF_THREADS} where all threads are used; times are medians, and a ratio is the median of those of the turns. \
+         {IN_A_TURN} decodings, {TURNS_ALL_THREADS} where all threads are used; times are medians, and a ratio is the median of those of the turns. \
          {}. Their times include some microseconds of Python.\n",
-        bench.share(pictures.len()),
+        bench.pictures_used(pictures.len()),
     );
-    let mut files = Files::open(bench)?;
+    let mut files = RateStore::open(bench)?;
     let mut all = Vec::new();
     for rate in RATES {
         all.push(against_others(bench, &mut files, &pictures, rate)?);
     }
     text.push_str(&ratios(&all));
-    text.push_str(&parts(&all, &pictures));
+    text.push_str(&breakdown(&all, &pictures));
     text.push_str(&region(bench)?);
     Ok(text)
 }
 
 /// A decoder at a rate: on each picture bits per pixel, PSNR, seconds, and ours as a share of them.
-struct Row {
+struct DecoderRow {
     decoder: &'static str,
     points: Vec<[f64; 4]>,
 }
 
-impl Row {
+impl DecoderRow {
     /// The median over the pictures.
     fn share(&self) -> f64 {
         median(self.points.iter().map(|point| point[3])).unwrap_or(f64::NAN)
@@ -81,7 +81,7 @@ impl Row {
 
 /// What our own decoder takes for a file, in seconds.
 #[derive(Clone, Copy, Debug)]
-struct Times {
+struct DecoderProfile {
     bytes: f64,
     psnr: f64,
     /// Of the whole, with one thread.
@@ -110,24 +110,24 @@ struct Times {
 }
 
 /// Our file of a picture, made when it is needed.
-struct OurFile<'a> {
-    picture: &'a Picture,
+struct LazyFile<'a> {
+    picture: &'a TestPicture,
     rate: f64,
-    coded: Option<gip::Coded>,
+    file: Option<gip::MeasuredFile>,
 }
 
-impl OurFile<'_> {
-    fn coded(&mut self) -> Result<&gip::Coded> {
-        if self.coded.is_none() {
+impl LazyFile<'_> {
+    fn get(&mut self) -> Result<&gip::MeasuredFile> {
+        if self.file.is_none() {
             let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(self.rate));
-            self.coded = Some(gip::code(encoder, self.picture, None)?);
+            self.file = Some(gip::encode(encoder, self.picture, None)?);
         }
-        self.coded.as_ref().context("it was just made")
+        self.file.as_ref().context("it was just made")
     }
 }
 
-/// Times of some things that take so many turns, and the first as a share of each.
-fn in_turns<const N: usize>(
+/// DecoderProfile of some things that take so many turns, and the first as a share of each.
+fn interleaved<const N: usize>(
     turns: usize,
     mut things: [&mut dyn FnMut() -> Result<f64>; N],
 ) -> Result<([f64; N], [f64; N])> {
@@ -163,7 +163,7 @@ fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result
     .map(|()| start.elapsed().as_secs_f64() / wanted as f64)
 }
 
-fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
+fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
     let (picture, rate) = (file.picture, file.rate);
     let mut store = bench.store(
         "decode.csv",
@@ -188,8 +188,8 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
     )?;
     let key = [&rate.to_string(), &picture.name];
     let values = store.get(&bench.product, key.map(String::as_str), || {
-        let coded = file.coded()?;
-        let file = &coded.file;
+        let measured = file.get()?;
+        let file = &measured.file;
         let mut out = vec![0; picture.rgb.len()];
         let one = RenderOptions::new().parallel(false);
         let (rendered, held) = memory::peak(|| render(file, &one, &mut out));
@@ -199,8 +199,8 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             gip::median_seconds(IN_A_TURN, || render(file, options, &mut out))
         };
         let all = RenderOptions::new();
-        let ([whole, ..], [_, scaling, one_each]) = in_turns(
-            TURNS_OF_THREADS,
+        let ([whole, ..], [_, scaling, one_each]) = interleaved(
+            TURNS_ALL_THREADS,
             [&mut || whole_turn(&one), &mut || whole_turn(&all), &mut || {
                 one_file_each(file, &one, picture.rgb.len())
             }],
@@ -211,7 +211,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
         let small = one.clone().size(width, height);
-        let (_, [_, faster]) = in_turns(
+        let (_, [_, faster]) = interleaved(
             TURNS,
             [&mut || whole_turn(&one), &mut || {
                 gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out))
@@ -224,8 +224,8 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
         let tenth = &file[..file.len() / 10];
         let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
-            coded.bytes,
-            coded.distortion.psnr,
+            measured.bytes,
+            measured.distortion.psnr,
             whole,
             scaling,
             one_each,
@@ -233,11 +233,11 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
             faster,
             thumbnail_psnr,
-            seconds(|| beginning(tenth, &one, &mut out))?,
-            seconds(|| beginning(tenth, &preview, &mut out))?,
+            seconds(|| render_prefix(tenth, &one, &mut out))?,
+            seconds(|| render_prefix(tenth, &preview, &mut out))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
             held,
-            coded.report.gaussians.into(),
+            measured.report.gaussians.into(),
             evaluations(stream.gaussians(), picture.width, picture.height),
         ])
     })?;
@@ -252,7 +252,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
         gaussians,
         evaluations,
     ] = rest;
-    Ok(Times {
+    Ok(DecoderProfile {
         bytes,
         psnr,
         whole,
@@ -271,7 +271,7 @@ fn ours(bench: &Bench, file: &mut OurFile<'_>) -> Result<Times> {
 }
 
 /// The least and the most.
-fn ends(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+fn min_and_max(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [values.clone().fold(f64::NAN, f64::min), values.fold(f64::NAN, f64::max)]
 }
 
@@ -298,7 +298,7 @@ fn render(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()
 }
 
 /// Decodes and renders what the beginning of a file has, into the first of the samples.
-fn beginning(bytes: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
+fn render_prefix(bytes: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
     gip::open(bytes, |picture| {
         let length = picture.output_len(options)?;
         Ok(picture.render_u8(options, &mut samples[..length])?)
@@ -333,26 +333,26 @@ fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
 }
 
 /// What was measured at a rate.
-struct Measured {
+struct RateResults {
     rate: f64,
     /// All decoders, ours first.
-    rows: Vec<Row>,
+    rows: Vec<DecoderRow>,
     /// More of ours, picture by picture.
-    ours: Vec<Times>,
+    ours: Vec<DecoderProfile>,
 }
 
 fn against_others(
     bench: &mut Bench,
-    files: &mut Files,
-    pictures: &[Picture],
+    files: &mut RateStore,
+    pictures: &[TestPicture],
     rate: f64,
-) -> Result<Measured> {
+) -> Result<RateResults> {
     let mut all = Vec::new();
-    let mut rows = vec![Row { decoder: gip::NAME, points: Vec::new() }];
+    let mut rows = vec![DecoderRow { decoder: gip::NAME, points: Vec::new() }];
     let others = || BASELINES.iter().chain([&SEQUENTIAL_JPEG]);
-    rows.extend(others().map(|other| Row { decoder: other.name, points: Vec::new() }));
+    rows.extend(others().map(|other| DecoderRow { decoder: other.name, points: Vec::new() }));
     for picture in pictures {
-        let mut file = OurFile { picture, rate, coded: None };
+        let mut file = LazyFile { picture, rate, file: None };
         let times = ours(bench, &mut file)?;
         rows[0].points.push([picture.rate(times.bytes), times.psnr, times.whole, 1.0]);
         for (row, other) in rows[1..].iter_mut().zip(others()) {
@@ -360,14 +360,14 @@ fn against_others(
         }
         all.push(times);
     }
-    Ok(Measured { rate, rows, ours: all })
+    Ok(RateResults { rate, rows, ours: all })
 }
 
 fn theirs(
     bench: &mut Bench,
-    files: &mut Files,
+    files: &mut RateStore,
     other: &Baseline,
-    file: &mut OurFile<'_>,
+    file: &mut LazyFile<'_>,
 ) -> Result<[f64; 4]> {
     let (picture, rate) = (file.picture, file.rate);
     let mut store = bench.store(
@@ -380,25 +380,25 @@ fn theirs(
     let setting = nearest(other.settings, rate, |setting| {
         Ok(files.baseline(worker, &versions, other, setting, picture)?.rate)
     })?;
-    store.get(&beside(&product, &versions), [other.id, setting, &picture.name], || {
-        let coded = worker.code(other.id, setting, picture, Some(1), [1, 1])?;
-        let (ours, mut out) = (file.coded()?, vec![0; picture.rgb.len()]);
+    store.get(&timing_version(&product, &versions), [other.id, setting, &picture.name], || {
+        let trip = worker.round_trip(other.id, setting, picture, Some(1), [1, 1])?;
+        let (ours, mut out) = (file.get()?, vec![0; picture.rgb.len()]);
         let one = RenderOptions::new().parallel(false);
-        let ([_, theirs], [_, share]) = in_turns(
+        let ([_, theirs], [_, share]) = interleaved(
             TURNS,
             [
                 &mut || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
                 &mut || worker.decode_again(IN_A_TURN),
             ],
         )?;
-        Ok([picture.rate(coded.bytes), coded.distortion.psnr, theirs, share])
+        Ok([picture.rate(trip.bytes), trip.distortion.psnr, theirs, share])
     })
 }
 
-/// Times of all decoders with one thread, and ours as a share of theirs.
-fn ratios(all: &[Measured]) -> String {
+/// DecoderProfile of all decoders with one thread, and ours as a share of theirs.
+fn ratios(all: &[RateResults]) -> String {
     let mut text = String::from("\n### One thread\n");
-    for Measured { rate, rows, .. } in all {
+    for RateResults { rate, rows, .. } in all {
         let mut table = Table::new(&[
             "decoder",
             "bpp",
@@ -409,7 +409,7 @@ fn ratios(all: &[Measured]) -> String {
             "most",
         ]);
         for row in rows {
-            let [least, most] = ends(row.points.iter().map(|point| point[3]));
+            let [least, most] = min_and_max(row.points.iter().map(|point| point[3]));
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),
@@ -424,15 +424,15 @@ fn ratios(all: &[Measured]) -> String {
         text.push_str(&format!(
             "\nFiles of about {rate} bits per pixel:\n{}\nWorse: ours is slower than {}.\n",
             table.finish(),
-            list(faster.map(|row| row.decoder)),
+            list_or_none(faster.map(|row| row.decoder)),
         ));
     }
     text
 }
 
 /// What our decoder's time consists of, and how it is with threads, thumbnails and beginnings.
-fn parts(all: &[Measured], pictures: &[Picture]) -> String {
-    let floor = kernel::seconds_per_evaluation();
+fn breakdown(all: &[RateResults], pictures: &[TestPicture]) -> String {
+    let floor = kernel_benchmark::seconds_per_evaluation();
     let mut stages = Table::new(&[
         "bpp",
         "Gaussians",
@@ -459,11 +459,11 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         "of which listed Gaussians, kB",
         "the rest, kB",
     ]);
-    for Measured { rate, ours, .. } in all {
-        let mean = |get: fn(&Times) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
-        let of = |get: fn(&Times) -> f64| median(ours.iter().map(get)).unwrap_or(f64::NAN);
-        let spread = |get: fn(&Times) -> f64| {
-            let [least, most] = ends(ours.iter().map(get));
+    for RateResults { rate, ours, .. } in all {
+        let mean = |get: fn(&DecoderProfile) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
+        let of = |get: fn(&DecoderProfile) -> f64| median(ours.iter().map(get)).unwrap_or(f64::NAN);
+        let spread = |get: fn(&DecoderProfile) -> f64| {
+            let [least, most] = min_and_max(ours.iter().map(get));
             format!("{:.2} ({least:.2} to {most:.2})", of(get))
         };
         let pixels = f64::from(pictures[0].width * pictures[0].height);
@@ -494,8 +494,8 @@ fn parts(all: &[Measured], pictures: &[Picture]) -> String {
         memory.row(&[
             rate.to_string(),
             kilobytes(mean(|times| times.memory)),
-            kilobytes(mean(|times| LISTED * times.gaussians)),
-            kilobytes(mean(|times| times.memory - LISTED * times.gaussians)),
+            kilobytes(mean(|times| GAUSSIAN_BYTES * times.gaussians)),
+            kilobytes(mean(|times| times.memory - GAUSSIAN_BYTES * times.gaussians)),
         ]);
     }
     format!(
@@ -524,7 +524,7 @@ fn region(bench: &Bench) -> Result<String> {
         ["image", "width", "rate", "effort"],
         ["gaussians", "whole", "whole_rendered", "region", "region_rendered"],
     )?;
-    let (width, rate, effort) = WIDE;
+    let (width, rate, effort) = LARGE_PICTURE;
     let picture = &bench.pictures[0];
     let height = width * picture.height / picture.width;
     let key = [width.to_string(), rate.to_string(), effort.to_string()];
@@ -532,7 +532,7 @@ fn region(bench: &Bench) -> Result<String> {
     let values = store.get(&bench.product, key.map(String::as_str), || {
         let wide = picture.mirrored(width, height);
         let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(rate));
-        let file = gip::code(encoder, &wide, None)?.file;
+        let file = gip::encode(encoder, &wide, None)?.file;
         let (x, y) = ((width - REGION) / 2, (height - REGION) / 2);
         let all = RenderOptions::new().parallel(false);
         let part = all.clone().region(Region { x, y, width: REGION, height: REGION });

@@ -4,10 +4,10 @@ use anyhow::Result;
 use image_gip::Target;
 
 use crate::bench::Bench;
+use crate::comparison::list_or_none;
 use crate::gip;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::table::Table;
-use crate::verdict::list;
 
 /// Sizes in megapixels, and how many Gaussians each megapixel gets.
 const MEGAPIXELS: [f64; 7] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
@@ -36,12 +36,12 @@ struct Cost {
 }
 
 /// A figure of a cost with its name.
-type Figure = (&'static str, fn(&Cost) -> f64);
+type Quantity = (&'static str, fn(&Cost) -> f64);
 
 const MEBIBYTE: f64 = (1 << 20) as f64;
 
 /// Times in seconds, then memory in MiB.
-const COSTS: [Figure; 5] = [
+const COSTS: [Quantity; 5] = [
     ("encoding time", |cost| cost.encode),
     ("decoding time, one thread", |cost| cost.decode[0]),
     ("decoding time, all threads", |cost| cost.decode[1]),
@@ -75,14 +75,14 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
             let height = (1e6 * megapixels / width).round();
             let large = picture.mirrored(width as u32, height as u32);
             let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
-            let coded = gip::code(encoder, &large, None)?;
-            let file = &coded.file;
+            let measured = gip::encode(encoder, &large, None)?;
+            let file = &measured.file;
             Ok([
-                coded.distortion.psnr,
-                coded.report.iterations.into(),
-                coded.report.evaluations as f64,
-                coded.report.seconds,
-                coded.memory,
+                measured.distortion.psnr,
+                measured.report.iterations.into(),
+                measured.report.evaluations as f64,
+                measured.report.seconds,
+                measured.memory,
                 gip::decode_seconds(file, false)?,
                 gip::decode_seconds(file, true)?,
                 gip::decode_memory(file)?,
@@ -174,7 +174,7 @@ fn growth_table(costs: &[Cost]) -> String {
 }
 
 /// Says which costs grow faster than what makes them grow, from the first to the last.
-fn steeper(costs: &[Cost], (label, x): Figure) -> String {
+fn steeper(costs: &[Cost], (label, x): Quantity) -> String {
     let [first, .., last] = costs else { return String::new() };
     let grown = |of: fn(&Cost) -> f64| of(last) / of(first);
     let base = grown(x);
@@ -183,7 +183,7 @@ fn steeper(costs: &[Cost], (label, x): Figure) -> String {
     format!(
         "\nFor {base:.1} times the {label}, times more of: {}. Worse than in proportion: {}.\n",
         factors.collect::<Vec<_>>().join(", "),
-        list(steep),
+        list_or_none(steep),
     )
 }
 
@@ -192,9 +192,9 @@ fn plot_growth(
     name: &str,
     title: &str,
     costs: &[Cost],
-    (label, x): Figure,
+    (label, x): Quantity,
     unit: &str,
-    curves: &[Figure],
+    curves: &[Quantity],
 ) -> Result<()> {
     let series: Vec<Series> = curves
         .iter()

@@ -4,7 +4,7 @@ use image_gip::Chart;
 use image_gip::training::{Filter, Schedule, Training};
 
 /// Iterations of the paper.
-pub(crate) const PUBLISHED: u32 = 50_000;
+pub(crate) const PAPER_ITERATIONS: u32 = 50_000;
 /// Where the paper halves its learning rates, as a share of all iterations.
 const HALVING: f64 = 0.4;
 /// What GaussianImage adds to every variance, in square pixels.
@@ -20,7 +20,7 @@ pub(crate) const CHARTS: [(&str, Chart); 3] = [
 /// What iterations and schedules mean in the tables.
 pub(crate) fn description(iterations: u32) -> String {
     format!(
-        "The published methods run for {iterations} iterations (the paper: {PUBLISHED}) and halve \
+        "The published methods run for {iterations} iterations (the paper: {PAPER_ITERATIONS}) and halve \
          their learning rates at the same share ({HALVING}) of them; all else is as published. \
          With fewer iterations than the paper's they are worse than they can be. All run in this \
          crate, with its renderer and optimizer, on this machine's processor."

@@ -4,15 +4,16 @@
 //! There are only declarations here, so that no module has to import its parent.
 
 pub(crate) mod ablation;
+pub(crate) mod content;
 pub(crate) mod decode;
+mod f64_renderer;
+mod float_file;
 mod growth;
-mod handmade;
-mod levels;
 mod methods;
 mod positions;
 mod product_tests;
 pub(crate) mod rate;
 pub(crate) mod representation;
-pub(crate) mod scene;
 pub(crate) mod speed;
 pub(crate) mod stability;
+mod two_level;

@@ -4,14 +4,14 @@ use anyhow::Result;
 use half::f16;
 use image_gip::{Precision, Target};
 
-use super::handmade::Handmade;
+use super::float_file::FloatFile;
 use super::methods;
 use crate::bench::Bench;
+use crate::comparison::{Better, NamedFigures, where_worse};
 use crate::curve::{Curve, bd_rate};
-use crate::gip::{self, Coded};
-use crate::pictures::Picture;
+use crate::gip::{self, MeasuredFile};
+use crate::pictures::TestPicture;
 use crate::table::{Table, decibels, mean, percent};
-use crate::verdict::{Better, Named, worse};
 
 /// Bits of a coordinate: the paper's, and so many that they are as good as exact.
 const PAPER: u8 = 12;
@@ -24,24 +24,24 @@ const PRINTED: [f64; 2] = [0.2511, 0.1777];
 
 /// How positions are stored.
 #[derive(Clone, Copy, Debug)]
-enum Storage {
+enum PositionFormat {
     /// Trained with LSQ+ of so many bits: [`PAPER`] or [`FINE`].
     Trained(u8),
     /// From the fit with [`FINE`] bits, changed afterwards, with so many bits of a coordinate.
-    Rounded(u8, fn(&mut Handmade)),
+    Rounded(u8, fn(&mut FloatFile)),
 }
 
-const STORAGES: [(&str, Storage); 5] = [
-    ("LSQ+ of 12 bits", Storage::Trained(PAPER)),
-    ("LSQ+ of 16 bits", Storage::Trained(FINE)),
-    ("12 bits by rounding afterwards", Storage::Rounded(PAPER, uniform)),
-    ("half floats of pixels", Storage::Rounded(16, half_pixels)),
-    ("half floats before tanh", Storage::Rounded(16, half_before_tanh)),
+const FORMATS: [(&str, PositionFormat); 5] = [
+    ("LSQ+ of 12 bits", PositionFormat::Trained(PAPER)),
+    ("LSQ+ of 16 bits", PositionFormat::Trained(FINE)),
+    ("12 bits by rounding afterwards", PositionFormat::Rounded(PAPER, uniform)),
+    ("half floats of pixels", PositionFormat::Rounded(16, half_pixels)),
+    ("half floats before tanh", PositionFormat::Rounded(16, half_before_tanh)),
 ];
 
 /// Of one picture, or on average.
 #[derive(Clone, Copy, Debug)]
-struct Outcome {
+struct FormatMeans {
     rate: f64,
     bits: f64,
     psnr: f64,
@@ -50,7 +50,7 @@ struct Outcome {
 
 pub(super) fn measure(
     bench: &Bench,
-    pictures: &[Picture],
+    pictures: &[TestPicture],
     counts: &[u32],
     iterations: u32,
 ) -> Result<String> {
@@ -59,22 +59,22 @@ pub(super) fn measure(
         ["positions", "iterations", "gaussians", "image"],
         ["bpp", "bits_per_gaussian", "psnr", "msssim"],
     )?;
-    let mut rows = vec![Vec::new(); STORAGES.len()];
+    let mut rows = vec![Vec::new(); FORMATS.len()];
     for &count in counts {
-        let mut all = vec![Vec::new(); STORAGES.len()];
+        let mut all = vec![Vec::new(); FORMATS.len()];
         for picture in pictures {
             // All that is rounded afterwards comes from one fit.
             let mut fine = None;
-            for ((name, storage), all) in STORAGES.iter().zip(&mut all) {
+            for ((name, format), all) in FORMATS.iter().zip(&mut all) {
                 let key = [*name, &iterations.to_string(), &count.to_string(), &picture.name];
                 all.push(store.get(&bench.product, key, || {
-                    stored(*storage, count, iterations, picture, &mut fine)
+                    stored(*format, count, iterations, picture, &mut fine)
                 })?);
             }
         }
         for (row, all) in rows.iter_mut().zip(all) {
             let of = |column: usize| mean(all.iter().map(|one| one[column])).unwrap_or(f64::NAN);
-            row.push(Outcome { rate: of(0), bits: of(1), psnr: of(2), ms_ssim: of(3) });
+            row.push(FormatMeans { rate: of(0), bits: of(1), psnr: of(2), ms_ssim: of(3) });
         }
     }
     Ok(format!(
@@ -89,20 +89,20 @@ pub(super) fn measure(
          adapts to them, and LSQ+ in the third row neither. Sizes are whole files; those of \
          rounded rows are the second row's less the bits saved. Means; {}. The printed row is the \
          paper's, over its own rates.\n{}",
-        bench.share(pictures.len()),
+        bench.pictures_used(pictures.len()),
         text(counts, &rows),
     ))
 }
 
-fn text(counts: &[u32], rows: &[Vec<Outcome>]) -> String {
+fn text(counts: &[u32], rows: &[Vec<FormatMeans>]) -> String {
     let mut columns = vec!["positions".to_owned(), "bits per Gaussian".to_owned()];
     columns.extend(counts.iter().map(|count| format!("{count} Gaussians")));
     columns.extend(["BD-rate, PSNR", "BD-rate, MS-SSIM"].map(str::to_owned));
     let mut table = Table::new(&columns);
-    let qualities: [fn(&Outcome) -> f64; 2] = [|one| one.psnr, |one| decibels(one.ms_ssim)];
-    let mut named: Vec<Named> = Vec::new();
-    for ((name, _), row) in STORAGES.iter().zip(rows) {
-        let average = |of: fn(&Outcome) -> f64| mean(row.iter().map(of)).unwrap_or(f64::NAN);
+    let qualities: [fn(&FormatMeans) -> f64; 2] = [|one| one.psnr, |one| decibels(one.ms_ssim)];
+    let mut named: Vec<NamedFigures> = Vec::new();
+    for ((name, _), row) in FORMATS.iter().zip(rows) {
+        let average = |of: fn(&FormatMeans) -> f64| mean(row.iter().map(of)).unwrap_or(f64::NAN);
         let bits = average(|one| one.bits);
         let mut cells = vec![(*name).to_owned(), format!("{bits:.1}")];
         cells.extend(
@@ -111,7 +111,7 @@ fn text(counts: &[u32], rows: &[Vec<Outcome>]) -> String {
         );
         cells.extend(qualities.map(|quality| {
             let curve =
-                |row: &[Outcome]| Curve::new(row.iter().map(|one| (one.rate, quality(one))));
+                |row: &[FormatMeans]| Curve::new(row.iter().map(|one| (one.rate, quality(one))));
             percent(bd_rate(&curve(&rows[0]), &curve(row), (1e-3, 1e3)))
         }));
         table.row(&cells);
@@ -127,43 +127,43 @@ fn text(counts: &[u32], rows: &[Vec<Outcome>]) -> String {
         ("MS-SSIM", Better::Higher),
         ("bits per Gaussian", Better::Lower),
     ];
-    format!("{}{}", table.finish(), worse(&figures, &named[0], &named[1..]))
+    format!("{}{}", table.finish(), where_worse(&figures, &named[0], &named[1..]))
 }
 
 /// Bits per pixel, bits per Gaussian, PSNR as floats, MS-SSIM. `fine` is the fit with [`FINE`]
 /// bits, made when it is first needed.
 fn stored(
-    storage: Storage,
+    format: PositionFormat,
     count: u32,
     iterations: u32,
-    picture: &Picture,
-    fine: &mut Option<Coded>,
+    picture: &TestPicture,
+    fine: &mut Option<MeasuredFile>,
 ) -> Result<[f64; 4]> {
     let fit = |bits: u8| {
         let training = methods::ours(iterations, [bits, SHAPE, COLOR]);
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::Gaussians(count));
         let encoder = encoder.with_training(training).with_precision(Precision::Packed);
-        gip::code(encoder, picture, None)
+        gip::encode(encoder, picture, None)
     };
     let paper;
-    let coded = match storage {
-        Storage::Trained(PAPER) => {
+    let measured = match format {
+        PositionFormat::Trained(PAPER) => {
             paper = fit(PAPER)?;
             &paper
         }
         _ => match fine {
-            Some(coded) => coded,
+            Some(measured) => measured,
             None => fine.insert(fit(FINE)?),
         },
     };
-    let Coded { file, bytes, report, distortion, .. } = coded;
+    let MeasuredFile { file, bytes, report, distortion, .. } = measured;
     let gaussians = f64::from(report.gaussians);
-    let (psnr, ms_ssim, bytes) = match storage {
-        Storage::Trained(_) => (report.psnr_float, distortion.ms_ssim, *bytes),
-        Storage::Rounded(bits, round) => {
-            let mut handmade = Handmade::from_file(file)?;
-            round(&mut handmade);
-            let file = handmade.file();
+    let (psnr, ms_ssim, bytes) = match format {
+        PositionFormat::Trained(_) => (report.psnr_float, distortion.ms_ssim, *bytes),
+        PositionFormat::Rounded(bits, round) => {
+            let mut rounded = FloatFile::read(file)?;
+            round(&mut rounded);
+            let file = rounded.to_bytes();
             let saved = gaussians * 2.0 * f64::from(FINE - bits) / 8.0;
             let ms_ssim = gip::distortion(&file, picture)?.ms_ssim;
             (gip::psnr_float(&file, picture)?, ms_ssim, bytes - saved)
@@ -173,27 +173,27 @@ fn stored(
 }
 
 /// The nearest of as many steps as the paper's bits give, per axis.
-fn uniform(handmade: &mut Handmade) {
+fn uniform(file: &mut FloatFile) {
     for axis in 0..2 {
-        let values = || handmade.gaussians.iter().map(|row| row[axis]);
+        let values = || file.gaussians.iter().map(|row| row[axis]);
         let low = values().fold(f32::INFINITY, f32::min);
         let high = values().fold(f32::NEG_INFINITY, f32::max);
         let step = ((high - low) / f32::from((1_u16 << PAPER) - 1)).max(f32::MIN_POSITIVE);
-        for row in &mut handmade.gaussians {
+        for row in &mut file.gaussians {
             row[axis] = low + ((row[axis] - low) / step).round() * step;
         }
     }
 }
 
-fn half_pixels(handmade: &mut Handmade) {
-    for row in &mut handmade.gaussians {
+fn half_pixels(file: &mut FloatFile) {
+    for row in &mut file.gaussians {
         row[..2].iter_mut().for_each(|value| *value = half(*value));
     }
 }
 
-fn half_before_tanh(handmade: &mut Handmade) {
-    let (width, height) = handmade.size;
-    for row in &mut handmade.gaussians {
+fn half_before_tanh(file: &mut FloatFile) {
+    let (width, height) = file.size;
+    for row in &mut file.gaussians {
         for (value, side) in row.iter_mut().zip([width as f32, height as f32]) {
             let relative = 2.0 * *value / side - 1.0;
             if relative.abs() < 1.0 {
@@ -213,13 +213,13 @@ mod tests {
     use image_gip::Kernel;
 
     /// How far each rounding moves centres all over a picture of 768 x 512, at most, along x.
-    fn largest_move(round: fn(&mut Handmade)) -> f32 {
+    fn largest_move(round: fn(&mut FloatFile)) -> f32 {
         let xs = (0..7680).map(|i| 0.05 + 0.1 * i as f32);
         let rows = xs.map(|x| [x, 100.0, 1.0, 0.0, 1.0, 0.1, 0.1, 0.1]).collect();
-        let mut handmade = Handmade::new((768, 512), Kernel::Quartic, rows);
-        let before = handmade.gaussians.clone();
-        round(&mut handmade);
-        let pairs = handmade.gaussians.iter().zip(&before);
+        let mut file = FloatFile::new((768, 512), Kernel::Quartic, rows);
+        let before = file.gaussians.clone();
+        round(&mut file);
+        let pairs = file.gaussians.iter().zip(&before);
         let moves = pairs.map(|(after, before)| {
             assert_eq!(after[2..], before[2..]);
             (after[0] - before[0]).abs()
@@ -240,8 +240,8 @@ mod tests {
     #[test]
     fn centres_outside_stay() {
         let row = [-3.3, 777.7, 1.0, 0.0, 1.0, 0.1, 0.1, 0.1];
-        let mut handmade = Handmade::new((768, 512), Kernel::Quartic, vec![row]);
-        half_before_tanh(&mut handmade);
-        assert_eq!(handmade.gaussians, [row]);
+        let mut file = FloatFile::new((768, 512), Kernel::Quartic, vec![row]);
+        half_before_tanh(&mut file);
+        assert_eq!(file.gaussians, [row]);
     }
 }

@@ -5,9 +5,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::comparison::list_or_none;
 use crate::provenance::FOLDER;
 use crate::table::Table;
-use crate::verdict::list;
 
 /// Tests whose names start alike and that assert one property.
 struct Property {
@@ -54,7 +54,7 @@ pub(super) fn measure() -> Result<String> {
          are asserted by its own tests, which this run has executed. {}\n{}\nViolated: {}.\n",
         descriptions.join(" "),
         table.finish(),
-        list(violated.into_iter()),
+        list_or_none(violated.into_iter()),
     ))
 }
 

@@ -8,13 +8,13 @@ use image_gip::Target;
 
 use crate::baselines::{BASELINES, Baseline, DESCRIPTION, Worker};
 use crate::bench::Bench;
+use crate::comparison::{Better, NamedFigures, list_or_none, where_worse};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::store::Store;
 use crate::table::{Table, decibels, from_decibels, mean, percent};
-use crate::verdict::{Better, Named, list, worse};
 
 /// Rates in bits per pixel at which our codec is measured.
 const RATES: [f64; 9] = [0.1, 0.15, 0.2, 0.25, 0.35, 0.5, 0.75, 1.0, 1.25];
@@ -22,9 +22,9 @@ const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.05];
 /// Of the baselines' settings a quick run takes one in so many, and the last.
 const QUICK_STEP: usize = 3;
 /// Rates of the tables.
-const COLUMNS: [f64; 6] = [0.15, 0.25, 0.35, 0.5, 0.75, 1.0];
+const TABLE_RATES: [f64; 6] = [0.15, 0.25, 0.35, 0.5, 0.75, 1.0];
 /// Rates over which mean differences are taken.
-const RANGE: (f64, f64) = (0.1, 1.25);
+const BD_RANGE: (f64, f64) = (0.1, 1.25);
 
 /// One file.
 #[derive(Clone, Copy, Debug)]
@@ -38,9 +38,9 @@ pub(super) struct Point {
 
 /// All files that were measured.
 #[derive(Debug)]
-pub(super) struct Files(Store<3, 4>);
+pub(super) struct RateStore(Store<3, 4>);
 
-impl Files {
+impl RateStore {
     pub(super) fn open(bench: &Bench) -> Result<Self> {
         let keys = ["codec", "quality", "image"];
         Ok(Self(bench.store("rate.csv", keys, ["bytes", "bpp", "psnr", "msssim"])?))
@@ -51,13 +51,13 @@ impl Files {
         version: &str,
         rate: f64,
         setting: &str,
-        picture: &Picture,
+        picture: &TestPicture,
     ) -> Result<Point> {
         self.point(version, [gip::NAME, setting, &picture.name], || {
             let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
-            let coded = gip::code(encoder, picture, None)?;
-            let distortion = coded.distortion;
-            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+            let measured = gip::encode(encoder, picture, None)?;
+            let distortion = measured.distortion;
+            Ok([measured.bytes, picture.rate(measured.bytes), distortion.psnr, distortion.ms_ssim])
         })
     }
 
@@ -67,12 +67,12 @@ impl Files {
         versions: &str,
         baseline: &Baseline,
         setting: &str,
-        picture: &Picture,
+        picture: &TestPicture,
     ) -> Result<Point> {
         self.point(versions, [baseline.id, setting, &picture.name], || {
-            let coded = worker.code(baseline.id, setting, picture, Some(1), [1; 2])?;
-            let distortion = coded.distortion;
-            Ok([coded.bytes, picture.rate(coded.bytes), distortion.psnr, distortion.ms_ssim])
+            let trip = worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?;
+            let distortion = trip.distortion;
+            Ok([trip.bytes, picture.rate(trip.bytes), distortion.psnr, distortion.ms_ssim])
         })
     }
 
@@ -169,7 +169,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut text = format!(
         "Compared with: {DESCRIPTION} Means; {}. Ours is at effort {}, asked for {} bits per \
          pixel.\n",
-        bench.share(bench.pictures.len()),
+        bench.pictures_used(bench.pictures.len()),
         gip::EFFORT,
         rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
     );
@@ -195,7 +195,7 @@ fn rates(quick: bool) -> &'static [f64] {
 
 /// All codecs measured on all pictures, ours first.
 fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
-    let mut store = Files::open(bench)?;
+    let mut store = RateStore::open(bench)?;
     let pictures = bench.pictures.clone();
     let (quick, product) = (bench.quick, bench.product.clone());
     let (worker, versions) = bench.baselines()?;
@@ -241,21 +241,21 @@ fn by_rate(
     quality: impl Fn(&Codec, f64) -> Option<f64>,
     cell: impl Fn(&Codec, f64) -> String,
 ) -> String {
-    let names = COLUMNS.map(|rate| format!("{rate} bpp"));
+    let names = TABLE_RATES.map(|rate| format!("{rate} bpp"));
     let mut columns = vec!["codec".to_owned()];
     columns.extend(names.clone());
     let mut table = Table::new(&columns);
-    let mut compared: Vec<Named> = Vec::new();
+    let mut compared: Vec<NamedFigures> = Vec::new();
     for codec in codecs {
         let mut cells = vec![codec.name.to_owned()];
-        cells.extend(COLUMNS.map(|rate| cell(codec, rate)));
+        cells.extend(TABLE_RATES.map(|rate| cell(codec, rate)));
         table.row(&cells);
-        let qualities = COLUMNS.map(|rate| quality(codec, rate).unwrap_or(f64::NAN));
+        let qualities = TABLE_RATES.map(|rate| quality(codec, rate).unwrap_or(f64::NAN));
         compared.push((codec.name.to_owned(), qualities.to_vec()));
     }
     let figures = names.map(|name| format!("{} at {name}", metric.name()));
     let figures = figures.each_ref().map(|figure| (figure.as_str(), Better::Higher));
-    format!("{}{}", table.finish(), worse(&figures, &compared[0], &compared[1..]))
+    format!("{}{}", table.finish(), where_worse(&figures, &compared[0], &compared[1..]))
 }
 
 fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
@@ -307,7 +307,7 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
         let mut cells = vec![picture.name.clone()];
         for (codec, all) in others.iter().zip(&mut all) {
             let difference =
-                bd_rate(&codec.curve(index, metric), &ours.curve(index, metric), RANGE);
+                bd_rate(&codec.curve(index, metric), &ours.curve(index, metric), BD_RANGE);
             all.extend(difference);
             cells.push(percent(difference));
         }
@@ -317,9 +317,9 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
     let mut cells = vec!["**mean**".to_owned()];
     cells.extend(means.iter().map(|&mean| percent(mean)));
     table.row(&cells);
-    let curves = others
-        .iter()
-        .map(|codec| percent(bd_rate(&codec.mean_curve(metric), &ours.mean_curve(metric), RANGE)));
+    let curves = others.iter().map(|codec| {
+        percent(bd_rate(&codec.mean_curve(metric), &ours.mean_curve(metric), BD_RANGE))
+    });
     let mut cells = vec!["**of the mean curves**".to_owned()];
     cells.extend(curves);
     table.row(&cells);
@@ -327,14 +327,14 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
     let named = |worse: bool| {
         let means = others.iter().zip(&means);
         let of_kind = means.filter(move |(_, mean)| mean.is_some_and(|m| (m > 0.0) == worse));
-        list(of_kind.map(|(codec, _)| codec.name))
+        list_or_none(of_kind.map(|(codec, _)| codec.name))
     };
     format!(
         "\nBD-rate of our codec against each other one, from {} to {} bits per pixel: how much \
          larger (+) or smaller (-) our files are at equal {}.\n{}\nOurs is worse than: {}. It is \
          better than: {}.\n",
-        RANGE.0,
-        RANGE.1,
+        BD_RANGE.0,
+        BD_RANGE.1,
         metric.name(),
         table.finish(),
         named(true),
@@ -351,7 +351,7 @@ fn plot(bench: &Bench, codecs: &[Codec], metric: Metric) -> Result<String> {
             points: codec
                 .mean_curve(metric)
                 .points()
-                .filter(|(rate, _)| (RANGE.0 * 0.8..=RANGE.1 * 1.2).contains(rate))
+                .filter(|(rate, _)| (BD_RANGE.0 * 0.8..=BD_RANGE.1 * 1.2).contains(rate))
                 .collect(),
         })
         .collect();

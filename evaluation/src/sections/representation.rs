@@ -4,12 +4,12 @@ use anyhow::Result;
 use image_gip::training::Training;
 use image_gip::{Chart, Precision, Target};
 
-use super::{levels, methods};
+use super::{methods, two_level};
 use crate::bench::Bench;
+use crate::comparison::{Better, NamedFigures, where_worse};
 use crate::gip;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::table::{Table, mean};
-use crate::verdict::{Better, Named, worse};
 
 /// Numbers of Gaussians, as in the paper.
 const GAUSSIANS: [u32; 2] = [5_000, 10_000];
@@ -41,7 +41,7 @@ enum Method {
 }
 
 /// What tables compare, in the order of [`PRINTED`]'s figures.
-const FIGURES: [(&str, Better); 5] = [
+const CRITERIA: [(&str, Better); 5] = [
     ("PSNR", Better::Higher),
     ("MS-SSIM", Better::Higher),
     ("memory", Better::Lower),
@@ -56,7 +56,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         ["psnr", "msssim", "used", "peak_memory", "seconds", "frames_per_second"],
     )?;
     let iterations = bench.iterations;
-    let pictures = bench.some(if bench.quick { QUICK_PICTURES } else { usize::MAX });
+    let pictures = bench.sample(if bench.quick { QUICK_PICTURES } else { usize::MAX });
     let counts: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
     let full = methods::paper(iterations, Chart::Covariance, true, true);
     let without = |chart| methods::paper(iterations, chart, false, false);
@@ -80,7 +80,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          are the paper's own figures for all of Kodak on an NVIDIA A30, with GPU memory.\n",
         methods::description(iterations),
         gip::EFFORT,
-        bench.share(pictures.len()),
+        bench.pictures_used(pictures.len()),
     );
     for &count in counts {
         let mut table = Table::new(&[
@@ -92,7 +92,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             "training s",
             "frames/s",
         ]);
-        let mut compared: Vec<Named> = Vec::new();
+        let mut compared: Vec<NamedFigures> = Vec::new();
         for (name, method) in &all {
             let mut rows = Vec::new();
             for picture in &pictures {
@@ -114,16 +114,16 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             compared.push((format!("*{method}*"), figures.to_vec()));
         }
         text.push_str(&format!("\n{count} Gaussians:\n{}", table.finish()));
-        text.push_str(&worse(&FIGURES, &compared[0], &compared[1..]));
+        text.push_str(&where_worse(&CRITERIA, &compared[0], &compared[1..]));
     }
     Ok(text)
 }
 
 /// PSNR, MS-SSIM, Gaussians used, bytes held, seconds, frames per second.
-fn fit(method: &Method, count: u32, picture: &Picture) -> Result<[f64; 6]> {
+fn fit(method: &Method, count: u32, picture: &TestPicture) -> Result<[f64; 6]> {
     let (effort, training) = match method {
         Method::TwoLevels(training) => {
-            let levels = levels::fit(picture, count, training)?;
+            let levels = two_level::fit(picture, count, training)?;
             let file = &levels.file;
             return Ok([
                 gip::psnr_float(file, picture)?,
@@ -142,15 +142,15 @@ fn fit(method: &Method, count: u32, picture: &Picture) -> Result<[f64; 6]> {
     if let Some(training) = training {
         encoder = encoder.with_training(training.clone());
     }
-    let coded = gip::code(encoder, picture, None)?;
-    let report = &coded.report;
+    let measured = gip::encode(encoder, picture, None)?;
+    let report = &measured.report;
     Ok([
         report.psnr_float,
-        coded.distortion.ms_ssim,
+        measured.distortion.ms_ssim,
         report.gaussians.into(),
-        coded.memory,
+        measured.memory,
         report.seconds,
-        1.0 / gip::render_seconds(&coded.file)?,
+        1.0 / gip::render_seconds(&measured.file)?,
     ])
 }
 

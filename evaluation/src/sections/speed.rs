@@ -4,15 +4,15 @@ use anyhow::Result;
 use image_gip::Target;
 
 use super::growth;
-use super::rate::Files;
+use super::rate::RateStore;
 use crate::baselines::{BASELINES, DESCRIPTION};
-use crate::bench::{Bench, beside};
+use crate::bench::{Bench, timing_version};
+use crate::comparison::{Better, NamedFigures, where_worse};
 use crate::gip;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::Table;
-use crate::verdict::{Better, Named, worse};
 
 /// The rate that all files have, about.
 const RATE: f64 = 0.5;
@@ -25,7 +25,7 @@ const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 const REPEATS: u32 = 5;
 
 /// What the codecs are judged by.
-const FIGURES: [(&str, Better); 5] = [
+const CRITERIA: [(&str, Better); 5] = [
     ("PSNR at about this rate", Better::Higher),
     ("encoding time with one thread", Better::Lower),
     ("encoding time with all", Better::Lower),
@@ -41,14 +41,19 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          samples in memory to a file in memory and back, means; {}; all threads are {}. JPEG, JPEG \
          2000 and WebP have one thread here in any case. Other programs on the machine make times \
          longer.\n",
-        bench.share(pictures(bench).len()),
+        bench.pictures_used(pictures(bench).len()),
         cores(),
     );
     text.push_str(&table(&rows));
-    text.push_str(&verdict(&rows));
+    text.push_str(&worse_than_baselines(&rows));
     for (name, title, seconds, unit) in [
-        ("speed-encode.svg", "Encoding, all threads", Row::encoding as fn(&Row) -> f64, "seconds"),
-        ("speed-decode.svg", "Decoding, all threads", Row::decoding, "milliseconds"),
+        (
+            "speed-encode.svg",
+            "Encoding, all threads",
+            CodecRow::encoding as fn(&CodecRow) -> f64,
+            "seconds",
+        ),
+        ("speed-decode.svg", "Decoding, all threads", CodecRow::decoding, "milliseconds"),
     ] {
         let factor = if unit == "milliseconds" { 1000.0 } else { 1.0 };
         plot_scatter(bench, name, title, &rows, &|row| factor * seconds(row), unit)?;
@@ -60,7 +65,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
 
 /// A codec at a setting, on average over the pictures.
 #[derive(Clone, Debug)]
-struct Row {
+struct CodecRow {
     codec: &'static str,
     setting: String,
     rate: f64,
@@ -70,7 +75,7 @@ struct Row {
     decode: [f64; 2],
 }
 
-impl Row {
+impl CodecRow {
     fn encoding(&self) -> f64 {
         self.encode[1]
     }
@@ -80,17 +85,17 @@ impl Row {
     }
 }
 
-fn pictures(bench: &Bench) -> Vec<Picture> {
-    bench.some(if bench.quick { QUICK_PICTURES } else { PICTURES })
+fn pictures(bench: &Bench) -> Vec<TestPicture> {
+    bench.sample(if bench.quick { QUICK_PICTURES } else { PICTURES })
 }
 
-fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
+fn against_error(bench: &mut Bench) -> Result<Vec<CodecRow>> {
     let mut store = bench.store(
         "speed.csv",
         ["codec", "quality", "threads", "image"],
         ["bytes", "bpp", "psnr", "encode_seconds", "decode_seconds"],
     )?;
-    let mut files = Files::open(bench)?;
+    let mut files = RateStore::open(bench)?;
     let pictures = pictures(bench);
     let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &EFFORTS };
     let product = bench.product.clone();
@@ -100,13 +105,13 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         let setting = format!("{RATE} bpp, effort {effort}");
         rows.push(row(gip::NAME, &format!("effort {effort}"), &pictures, |index, threads| {
             let picture = &pictures[index];
-            let key = [gip::NAME, &setting, called(threads), &picture.name];
+            let key = [gip::NAME, &setting, thread_label(threads), &picture.name];
             store.get(&product, key, || {
                 let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
-                let coded = gip::code(encoder, picture, threads)?;
-                let decode = gip::decode_seconds(&coded.file, threads != Some(1))?;
-                let times = [coded.report.seconds, decode];
-                Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
+                let measured = gip::encode(encoder, picture, threads)?;
+                let decode = gip::decode_seconds(&measured.file, threads != Some(1))?;
+                let times = [measured.report.seconds, decode];
+                Ok(values(picture, measured.bytes, measured.distortion.psnr, times))
             })
         })?);
     }
@@ -121,11 +126,12 @@ fn against_error(bench: &mut Bench) -> Result<Vec<Row>> {
         }
         rows.push(row(baseline.name, &settings.join(", "), &pictures, |index, threads| {
             let (setting, picture) = (settings[index], &pictures[index]);
-            let key = [baseline.id, setting, called(threads), &picture.name];
-            store.get(&beside(&product, &versions), key, || {
-                let coded = worker.code(baseline.id, setting, picture, threads, [REPEATS; 2])?;
-                let times = [coded.encode_seconds, coded.decode_seconds];
-                Ok(values(picture, coded.bytes, coded.distortion.psnr, times))
+            let key = [baseline.id, setting, thread_label(threads), &picture.name];
+            store.get(&timing_version(&product, &versions), key, || {
+                let trip =
+                    worker.round_trip(baseline.id, setting, picture, threads, [REPEATS; 2])?;
+                let times = [trip.encode_seconds, trip.decode_seconds];
+                Ok(values(picture, trip.bytes, trip.distortion.psnr, times))
             })
         })?);
     }
@@ -148,20 +154,20 @@ pub(super) fn nearest<'a>(
     Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
 }
 
-fn called(threads: Option<usize>) -> &'static str {
+fn thread_label(threads: Option<usize>) -> &'static str {
     if threads == Some(1) { "one" } else { "all" }
 }
 
-fn values(picture: &Picture, bytes: f64, psnr: f64, [encode, decode]: [f64; 2]) -> [f64; 5] {
+fn values(picture: &TestPicture, bytes: f64, psnr: f64, [encode, decode]: [f64; 2]) -> [f64; 5] {
     [bytes, picture.rate(bytes), psnr, encode, decode]
 }
 
 fn row(
     codec: &'static str,
     setting: &str,
-    pictures: &[Picture],
+    pictures: &[TestPicture],
     mut get: impl FnMut(usize, Option<usize>) -> Result<[f64; 5]>,
-) -> Result<Row> {
+) -> Result<CodecRow> {
     let mut means = Vec::new();
     for threads in [Some(1), None] {
         let mut sums = [0.0; 5];
@@ -173,7 +179,7 @@ fn row(
         means.push(sums);
     }
     let [_, rate, psnr, ..] = means[0];
-    Ok(Row {
+    Ok(CodecRow {
         codec,
         setting: setting.to_owned(),
         rate,
@@ -183,7 +189,7 @@ fn row(
     })
 }
 
-fn table(rows: &[Row]) -> String {
+fn table(rows: &[CodecRow]) -> String {
     let mut table = Table::new(&[
         "codec",
         "setting",
@@ -206,26 +212,31 @@ fn table(rows: &[Row]) -> String {
 }
 
 /// What our codec at its default effort is worse at than which others.
-fn verdict(rows: &[Row]) -> String {
+fn worse_than_baselines(rows: &[CodecRow]) -> String {
     let default = format!("effort {}", gip::EFFORT);
     let Some(ours) = rows.iter().find(|row| row.setting == default) else {
         return String::new();
     };
-    let named = |row: &Row| {
+    let named = |row: &CodecRow| {
         let [encode, decode] = [row.encode, row.decode];
         (row.codec.to_owned(), vec![row.psnr, encode[0], encode[1], decode[0], decode[1]])
     };
-    let others: Vec<Named> = rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
+    let others: Vec<NamedFigures> =
+        rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
     let (name, figures) = named(ours);
-    worse(&FIGURES, &(format!("{name} at its default effort ({})", gip::EFFORT), figures), &others)
+    where_worse(
+        &CRITERIA,
+        &(format!("{name} at its default effort ({})", gip::EFFORT), figures),
+        &others,
+    )
 }
 
 fn plot_scatter(
     bench: &Bench,
     name: &str,
     title: &str,
-    rows: &[Row],
-    time: &dyn Fn(&Row) -> f64,
+    rows: &[CodecRow],
+    time: &dyn Fn(&CodecRow) -> f64,
     unit: &str,
 ) -> Result<()> {
     let mut series: Vec<Series> = Vec::new();

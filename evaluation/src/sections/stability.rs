@@ -6,12 +6,12 @@ use image_gip::{
     ColorModel, Kernel, Picture, RenderOptions, SampleDepth, Source, StreamDecoder, Target,
 };
 
-use super::handmade::{self, COMPONENTS, Handmade};
-use super::product_tests;
+use super::float_file::{COMPONENTS, FloatFile};
+use super::{f64_renderer, product_tests};
 use crate::bench::Bench;
+use crate::comparison::list_or_none;
 use crate::gip;
 use crate::table::Table;
-use crate::verdict::list;
 
 /// Size of the pictures made of chosen Gaussians.
 const SIZE: (u32, u32) = (96, 64);
@@ -92,7 +92,7 @@ fn decoder(bench: &Bench) -> Result<String> {
             let [_, from_f64, simd, threads, not_finite] =
                 store.get(&bench.product, [name, kernel_name], || {
                     let mut decoder = StreamDecoder::new();
-                    decoder.feed(&Handmade::new(SIZE, kernel, gaussians.clone()).file())?;
+                    decoder.feed(&FloatFile::new(SIZE, kernel, gaussians.clone()).to_bytes())?;
                     let picture = decoder.picture().context("the file has no picture")?;
                     ensure!(decoder.is_complete(), "the file is not complete");
                     let all = planes(&picture, &RenderOptions::new())?;
@@ -100,7 +100,7 @@ fn decoder(bench: &Bench) -> Result<String> {
                     let scalar = planes(&picture, &RenderOptions::new().reference(true))?;
                     Ok([
                         gaussians.len() as f64,
-                        difference(&all, &handmade::in_f64(&picture)),
+                        difference(&all, &f64_renderer::render(&picture)),
                         difference(&all, &scalar),
                         difference(&all, &one),
                         not_finite(&all),
@@ -137,7 +137,7 @@ fn decoder(bench: &Bench) -> Result<String> {
         SIZE.1,
         table.finish(),
         worst.collect::<Vec<_>>().join(", "),
-        list(violated.iter().map(String::as_str)),
+        list_or_none(violated.iter().map(String::as_str)),
     ))
 }
 
@@ -163,7 +163,7 @@ fn not_finite(samples: &[f64]) -> f64 {
 }
 
 /// A picture that is hard to fit.
-struct Hard {
+struct HardPicture {
     name: &'static str,
     size: (u32, u32),
     color: ColorModel,
@@ -172,10 +172,10 @@ struct Hard {
     sample: fn(u32, u32, u32) -> u16,
 }
 
-fn hard_pictures() -> Vec<Hard> {
+fn hard_pictures() -> Vec<HardPicture> {
     use ColorModel::{Gray, Rgb, Rgba};
     use SampleDepth::{Eight, Sixteen};
-    let hard = |name, size, color, depth, sample| Hard { name, size, color, depth, sample };
+    let hard = |name, size, color, depth, sample| HardPicture { name, size, color, depth, sample };
     vec![
         hard("one pixel", (1, 1), Rgb, Eight, |_, _, c| 20_000 * c as u16),
         hard("one column", (1, 200), Gray, Eight, |_, y, _| 300 * y as u16),
@@ -252,11 +252,11 @@ fn encoder(bench: &Bench) -> Result<String> {
         table.finish(),
         worst.1,
         worst.0,
-        list(violated.into_iter()),
+        list_or_none(violated.into_iter()),
     ))
 }
 
-fn fit(hard: &Hard) -> Result<[f64; 6]> {
+fn fit(hard: &HardPicture) -> Result<[f64; 6]> {
     let (width, height) = hard.size;
     let channels = hard.color.channels() as u32;
     let indices = 0..width * height * channels;

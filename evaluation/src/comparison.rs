@@ -8,14 +8,14 @@ pub(crate) enum Better {
 }
 
 /// A row of figures with its name.
-pub(crate) type Named = (String, Vec<f64>);
+pub(crate) type NamedFigures = (String, Vec<f64>);
 
 /// Says in which figures which of the others are better than the subject. Figures that are not
 /// numbers are neither better nor worse.
-pub(crate) fn worse(
+pub(crate) fn where_worse(
     figures: &[(&str, Better)],
-    (subject, ours): &Named,
-    others: &[Named],
+    (subject, ours): &NamedFigures,
+    others: &[NamedFigures],
 ) -> String {
     // Figures in which the same ones are better come together.
     let mut clauses: Vec<(Vec<&str>, String)> = Vec::new();
@@ -24,7 +24,7 @@ pub(crate) fn worse(
             Better::Higher => theirs[index] > ours[index],
             Better::Lower => theirs[index] < ours[index],
         });
-        let names = list(names.map(|(name, _)| name.as_str()));
+        let names = list_or_none(names.map(|(name, _)| name.as_str()));
         match clauses.iter_mut().find(|(_, known)| *known == names) {
             Some((figures, _)) => figures.push(figure),
             None => clauses.push((vec![figure], names)),
@@ -38,7 +38,7 @@ pub(crate) fn worse(
 }
 
 /// Names one after the other, or that there are none.
-pub(crate) fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+pub(crate) fn list_or_none<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     if names.is_empty() { "none of these".to_owned() } else { names.join(", ") }
 }
@@ -57,9 +57,9 @@ mod tests {
             row("c", [31.0, f64::NAN]),
             row("d", [30.0, 2.0]),
         ];
-        let text = worse(&figures, &row("ours", [30.0, 2.0]), &others);
+        let text = where_worse(&figures, &row("ours", [30.0, 2.0]), &others);
         assert_eq!(text, "\nWorse: ours, in PSNR than a, c; in time than b.\n");
-        let text = worse(&figures, &row("ours", [32.0, 0.5]), &others);
+        let text = where_worse(&figures, &row("ours", [32.0, 0.5]), &others);
         assert_eq!(text, "\nWorse: ours, in PSNR, time than none of these.\n");
     }
 }

@@ -4,10 +4,10 @@ use anyhow::Result;
 use image_gip::{ColorModel, Source, Target};
 
 use crate::bench::Bench;
+use crate::comparison::list_or_none;
 use crate::gip;
-use crate::pictures::Picture;
+use crate::pictures::TestPicture;
 use crate::table::{Table, mean, percent};
-use crate::verdict::list;
 
 /// Side of all pictures of this section.
 const SIDE: u32 = 256;
@@ -26,11 +26,11 @@ const PHOTOGRAPH: &str = "photograph";
 const GAUSSIANS: u32 = 1000;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let photos: Vec<Picture> = bench.some(PHOTOS).iter().map(middle).collect();
+    let photos: Vec<TestPicture> = bench.sample(PHOTOS).iter().map(middle).collect();
     let mut text = format!(
         "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of \
          the photographs (means; {}). Effort {}.\n",
-        bench.share(photos.len()),
+        bench.pictures_used(photos.len()),
         gip::EFFORT,
     );
     text.push_str(&kinds(bench, &photos)?);
@@ -39,21 +39,21 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
 }
 
 /// Makes the samples of a colour model from a photograph.
-type Samples = fn(&Picture) -> Vec<u8>;
+type Conversion = fn(&TestPicture) -> Vec<u8>;
 
 /// What is asked of the encoder.
 fn targets() -> [(String, Target); 2] {
     [("auto".into(), Target::Auto), (format!("{PSNR} dB"), Target::Psnr(PSNR))]
 }
 
-fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
+fn kinds(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut store = bench.store(
-        "scene.csv",
+        "content.csv",
         ["picture", "target", "effort"],
         ["gaussians", "bytes", "psnr", "encode_seconds"],
     )?;
-    let grainy: Vec<Picture> = photos.iter().map(|photo| noisy(photo, GRAIN)).collect();
-    let scenes = [
+    let grainy: Vec<TestPicture> = photos.iter().map(|photo| noisy(photo, GRAIN)).collect();
+    let kinds_of_pictures = [
         ("flat", vec![made("flat", |_, _| [96, 128, 160])]),
         ("ramp", vec![made("ramp", |x, y| [x as u8, y as u8, ((x + y) / 2) as u8])]),
         ("six discs", vec![made("discs", discs)]),
@@ -66,27 +66,27 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
         let mut table =
             Table::new(&["picture", "Gaussians", "bytes", "bpp", "PSNR in dB", "encode s"]);
         let (mut dearest, mut photograph) = ((0.0, ""), 0.0);
-        for (scene, pictures) in &scenes {
+        for (kind, pictures) in &kinds_of_pictures {
             let mut all = Vec::new();
             for picture in pictures {
                 let key = [picture.name.as_str(), &name, &gip::EFFORT.to_string()];
                 all.push(store.get(&bench.product, key, || {
-                    let coded =
-                        gip::code(gip::encoder(gip::EFFORT).with_target(target), picture, None)?;
-                    let report = coded.report;
-                    let psnr = coded.distortion.psnr;
-                    Ok([report.gaussians.into(), coded.bytes, psnr, report.seconds])
+                    let measured =
+                        gip::encode(gip::encoder(gip::EFFORT).with_target(target), picture, None)?;
+                    let report = measured.report;
+                    let psnr = measured.distortion.psnr;
+                    Ok([report.gaussians.into(), measured.bytes, psnr, report.seconds])
                 })?);
             }
             let [gaussians, bytes, psnr, seconds] = means(&all);
             if bytes > dearest.0 {
-                dearest = (bytes, *scene);
+                dearest = (bytes, *kind);
             }
-            if *scene == PHOTOGRAPH {
+            if *kind == PHOTOGRAPH {
                 photograph = bytes;
             }
             table.row(&[
-                (*scene).to_owned(),
+                (*kind).to_owned(),
                 format!("{gaussians:.0}"),
                 format!("{bytes:.0}"),
                 format!("{:.3}", 8.0 * bytes / f64::from(SIDE * SIDE)),
@@ -105,13 +105,13 @@ fn kinds(bench: &Bench, photos: &[Picture]) -> Result<String> {
 }
 
 /// What gray saves and alpha costs.
-fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
+fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut store = bench.store(
-        "scene-colors.csv",
+        "content-colors.csv",
         ["picture", "colors", "gaussians", "effort"],
         ["bytes", "psnr"],
     )?;
-    let models: [(_, _, Samples); 5] = [
+    let models: [(_, _, Conversion); 5] = [
         ("gray", ColorModel::Gray, |photo| gray(photo).collect()),
         ("gray, soft alpha", ColorModel::GrayAlpha, |photo| {
             gray(photo).zip(alpha()).flat_map(|(gray, alpha)| [gray, alpha]).collect()
@@ -162,7 +162,7 @@ fn colors(bench: &Bench, photos: &[Picture]) -> Result<String> {
          models; PSNR is over all samples of the model, alpha included.\n{}\nWorse than {RGB} in \
          bytes: {}.\n",
         table.finish(),
-        list(larger.into_iter()),
+        list_or_none(larger.into_iter()),
     ))
 }
 
@@ -171,7 +171,7 @@ fn means<const N: usize>(all: &[[f64; N]]) -> [f64; N] {
 }
 
 /// The middle of a photograph; of a smaller one, what there is and its mirror images.
-fn middle(photo: &Picture) -> Picture {
+fn middle(photo: &TestPicture) -> TestPicture {
     let (left, top) = (photo.width.saturating_sub(SIDE) / 2, photo.height.saturating_sub(SIDE) / 2);
     let mut part = photo.mirrored(photo.width.max(SIDE), photo.height.max(SIDE));
     let row = part.width as usize * 3;
@@ -183,12 +183,12 @@ fn middle(photo: &Picture) -> Picture {
         .flat_map(|row| &row[left as usize * 3..][..SIDE as usize * 3])
         .copied()
         .collect();
-    Picture { width: SIDE, height: SIDE, ..part }
+    TestPicture { width: SIDE, height: SIDE, ..part }
 }
 
-fn made(name: &str, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
+fn made(name: &str, pixel: impl Fn(u32, u32) -> [u8; 3]) -> TestPicture {
     let rgb = (0..SIDE * SIDE).flat_map(|i| pixel(i % SIDE, i / SIDE)).collect();
-    Picture { name: name.into(), path: "".into(), width: SIDE, height: SIDE, rgb }
+    TestPicture { name: name.into(), path: "".into(), width: SIDE, height: SIDE, rgb }
 }
 
 /// Discs of several sizes and colours on a plain ground.
@@ -208,18 +208,22 @@ fn discs(x: u32, y: u32) -> [u8; 3] {
 }
 
 /// The picture with Gaussian noise of a standard deviation on every sample.
-fn noisy(picture: &Picture, deviation: f64) -> Picture {
+fn noisy(picture: &TestPicture, deviation: f64) -> TestPicture {
     let mut random = fastrand::Rng::with_seed(gip::SEED);
     let rgb = picture.rgb.iter().map(|&sample| {
         let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();
         let normal = radius * (std::f64::consts::TAU * random.f64()).cos();
         (f64::from(sample) + deviation * normal).round().clamp(0.0, 255.0) as u8
     });
-    Picture { rgb: rgb.collect(), name: format!("{} with noise", picture.name), ..picture.clone() }
+    TestPicture {
+        rgb: rgb.collect(),
+        name: format!("{} with noise", picture.name),
+        ..picture.clone()
+    }
 }
 
 /// The luma of every pixel.
-fn gray(picture: &Picture) -> impl Iterator<Item = u8> {
+fn gray(picture: &TestPicture) -> impl Iterator<Item = u8> {
     picture.rgb.chunks_exact(3).map(|pixel| {
         let [r, g, b] = [0, 1, 2].map(|channel| f64::from(pixel[channel]));
         (0.299 * r + 0.587 * g + 0.114 * b).round() as u8
@@ -244,7 +248,7 @@ mod tests {
         for (width, height) in [(100, 300), (256, 256), (400, 100)] {
             let rgb = (0..width * height).flat_map(|i| [(i % width) as u8, (i / width) as u8, 0]);
             let rgb = rgb.collect();
-            let photo = Picture { name: String::new(), path: "".into(), width, height, rgb };
+            let photo = TestPicture { name: String::new(), path: "".into(), width, height, rgb };
             let part = middle(&photo);
             assert_eq!((part.width, part.height), (SIDE, SIDE));
             assert_eq!(part.rgb.len(), (SIDE * SIDE * 3) as usize);
