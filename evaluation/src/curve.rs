@@ -163,7 +163,12 @@ mod tests {
     #[test]
     fn worse_points_at_higher_rates_do_not_count() {
         let curve = Curve::new([(0.2, 30.0), (0.3, 29.0), (0.2, 28.0), (0.4, 31.0)]);
-        assert_eq!(curve.points().count(), 2);
+        let points: Vec<(f64, f64)> = curve.points().collect();
+        assert_eq!(points.len(), 2);
+        for ((rate, quality), expected) in points.into_iter().zip([(0.2, 30.0), (0.4, 31.0)]) {
+            close(Some(rate), expected.0);
+            close(Some(quality), expected.1);
+        }
     }
 
     #[test]

@@ -62,3 +62,32 @@ pub(crate) fn decibels(ms_ssim: f64) -> f64 {
 pub(crate) fn from_decibels(decibels: f64) -> f64 {
     1.0 - 10_f64.powf(-decibels / 10.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_markdown() {
+        let mut table = Table::new(&["codec", "bpp"]);
+        table.row(&["gip", "0.5"]);
+        assert_eq!(table.finish(), "\n| codec | bpp |\n| --- | ---: |\n| gip | 0.5 |\n");
+    }
+
+    #[test]
+    fn statistics() {
+        assert_eq!(median([3.0, 9.0, 1.0]), Some(3.0));
+        assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
+        assert_eq!(mean([3.0, 9.0, 0.0]), Some(4.0));
+        assert_eq!((median([]), mean([])), (None, None));
+        assert_eq!(percent(Some(-0.125)), "-12.5 %");
+        assert_eq!(percent(Some(0.5)), "+50.0 %");
+        assert_eq!(percent(None), "-");
+    }
+
+    #[test]
+    fn decibels_of_ms_ssim() {
+        assert!((decibels(0.99) - 20.0).abs() < 1e-9);
+        assert!((from_decibels(20.0) - 0.99).abs() < 1e-9);
+    }
+}

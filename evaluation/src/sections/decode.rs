@@ -574,6 +574,24 @@ mod tests {
     use super::*;
 
     #[test]
+    fn tasks_take_turns_and_ratios_are_of_the_same_turn() {
+        let order = std::cell::RefCell::new(String::new());
+        let task = |name: char, seconds: [f64; 3]| {
+            let (order, mut seconds) = (&order, seconds.into_iter());
+            move || {
+                order.borrow_mut().push(name);
+                seconds.next().context("there are three turns")
+            }
+        };
+        // The machine is at half its speed in the second turn.
+        let (mut a, mut b) = (task('a', [1.0, 2.0, 1.5]), task('b', [4.0, 8.0, 3.0]));
+        let (times, ratios) = interleaved(3, [&mut a, &mut b]).expect("three turns");
+        assert_eq!(*order.borrow(), "ababab");
+        assert_eq!(times, [1.5, 4.0]);
+        assert_eq!(ratios, [1.0, 0.25]);
+    }
+
+    #[test]
     fn touched_tiles_are_counted() {
         let gaussian = |center, cholesky| Gaussian { center, cholesky, color: [1.0; 4] };
         // A disc of radius 2 within one tile, and one on the corner of four.
