@@ -6,14 +6,16 @@ request per line, fields separated by tabs:
     codec, quality, threads (0: all), repeats of encoding, repeats of decoding, picture to encode,
     file for the decoded samples
 
-and answers each with the number of bytes of the file, the seconds to encode and the seconds to
-decode it, from samples in memory to bytes in memory and back: medians over the repeats. To
+The answer to a request is one line: the number of bytes of the file, the seconds to encode and the
+seconds to decode it, separated by tabs. Times are from samples in memory to bytes in memory and
+back, medians over the repeats. The answer to
 
     again, repeats of decoding
 
-the answer is the seconds to decode the last file once more.
-The decoded samples are interleaved 8-bit RGB, and those of the library that encoded. The time to
-decode is that of the binding with the least around the same library's decoder.
+is the seconds to decode the last file, the median over the repeats.
+
+The decoded samples are interleaved 8-bit RGB, as decoded by the binding that encoded the file. The
+time to decode is that of the binding with the least overhead around the same decoder.
 """
 
 import io
@@ -81,8 +83,8 @@ CODECS = {
     "jxl_e7": jpeg_xl(),
 }
 
-# Straight to an array of RGB that is there already: Pillow's WebP plugin, for one, takes twice as
-# long.
+# These decode into an array of RGB that is allocated beforehand. Pillow has more overhead: its WebP
+# plugin, for example, takes twice as long.
 DECODERS = {
     "jpeg420prog": lambda data, out, threads: imagecodecs.jpeg8_decode(data, out=out),
     "jpeg420": lambda data, out, threads: imagecodecs.jpeg8_decode(data, out=out),
@@ -121,7 +123,7 @@ def answer(codec, quality, threads, encodings, decodings, source, decoded):
     out = numpy.empty_like(samples)
     again = DECODERS[codec], data, out, threads
     result, decode_seconds = timed(int(decodings), *again)
-    # Another version may round otherwise; another picture would be another measurement.
+    # Another version of the library may round differently, but must decode the same picture.
     if result.shape != samples.shape or abs(result.astype(int) - samples).mean() > 1:
         raise ValueError(f"two decoders of {codec} disagree")
     with open(decoded, "wb") as file:

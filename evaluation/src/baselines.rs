@@ -77,13 +77,13 @@ pub(crate) const BASELINES: [Baseline; 6] = [
 pub(crate) const SEQUENTIAL_JPEG: Baseline =
     Baseline { id: "jpeg420", name: "JPEG, sequential", settings: BASELINES[0].settings };
 
-/// What the columns and names of the baselines mean.
+/// What the names of the baselines stand for.
 pub(crate) const DESCRIPTION: &str = "JPEG is 4:2:0, progressive, with optimised Huffman tables; \
 JPEG 2000 is OpenJPEG's 9/7 wavelet with its colour transform, in a .jp2; WebP is libwebp's method \
 6; AVIF is aom at speed 6, 4:2:0, with libavif's default tuning (for perceived quality) and with \
 tune=psnr; JPEG XL is libjxl's effort 7 at full resolution, and tuned for perceived quality.";
 
-/// One file of a baseline.
+/// A picture encoded and decoded by a baseline.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RoundTrip {
     pub(crate) bytes: f64,
@@ -126,8 +126,8 @@ impl Worker {
         }
     }
 
-    /// Encodes and decodes a picture; `None` for all threads. Times are medians over so many
-    /// `repeats` of encoding and of decoding.
+    /// Encodes and decodes a picture with so many threads; `None` for all. Times are medians over
+    /// so many encodings and decodings.
     pub(crate) fn round_trip(
         &mut self,
         codec: &str,
@@ -150,7 +150,7 @@ impl Worker {
         Ok(RoundTrip { bytes, distortion, encode_seconds, decode_seconds })
     }
 
-    /// Decodes the last file once more; the median over so many times.
+    /// The median time in seconds of decoding the last file so many times more.
     pub(crate) fn decode_again(&mut self, decodings: usize) -> Result<f64> {
         writeln!(self.requests, "again\t{decodings}")?;
         let answer = self.line()?;
@@ -167,7 +167,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // It may be in the middle of a picture; nobody waits for that.
+        // Without waiting for a picture that it may be working on.
         let _ = self.child.kill();
         let _ = self.child.wait();
         let _ = fs::remove_file(&self.decoded);

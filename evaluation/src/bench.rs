@@ -15,6 +15,7 @@ const QUICK_PICTURES: usize = 4;
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
+/// The pictures and settings of a run, and where its measurements are kept.
 #[derive(Debug)]
 pub(crate) struct Bench {
     pub(crate) pictures: Vec<TestPicture>,
@@ -52,7 +53,7 @@ impl Bench {
         Ok(bench)
     }
 
-    /// Makes sure that pictures of equal names are those that the folder's measurements are of.
+    /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
         for picture in &self.pictures {
@@ -74,7 +75,7 @@ impl Bench {
         (0..count).map(|index| self.pictures[index * all / count].clone()).collect()
     }
 
-    /// Which pictures a measurement took: `taken` of all.
+    /// How many pictures a table is about, in words.
     pub(crate) fn pictures_used(&self, taken: usize) -> String {
         format!("pictures: {taken} of {}", self.pictures.len())
     }
@@ -84,7 +85,7 @@ impl Bench {
         self.folder.join(name)
     }
 
-    /// The measurements of a kind.
+    /// The store of one kind of measurements, in a CSV of this name.
     pub(crate) fn store<const K: usize, const V: usize>(
         &self,
         name: &str,
@@ -128,8 +129,8 @@ impl Bench {
     }
 }
 
-/// The version of baselines whose times are compared with those of a codec: taken anew with every
-/// version of it, since only times of the same machine in the same state can be compared.
+/// The version of measured times of baselines. It includes the version of our codec, so that they
+/// are measured again whenever ours are: times compare only if the machine is in the same state.
 pub(crate) fn timing_version(product: &str, versions: &str) -> String {
     format!("{versions}, beside {product}")
 }

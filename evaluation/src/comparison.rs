@@ -1,4 +1,4 @@
-//! What something is worse at than what it is compared with, from the figures themselves.
+//! Sentences that say what is better than what, made from the figures themselves.
 
 /// Which values of a figure are better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,14 +10,14 @@ pub(crate) enum Better {
 /// A row of figures with its name.
 pub(crate) type NamedFigures = (String, Vec<f64>);
 
-/// Says in which figures which of the others are better than the subject. Figures that are not
-/// numbers are neither better nor worse.
-pub(crate) fn where_worse(
+/// Says which of the others are better than the subject, and in which figures. NaN is neither
+/// better nor worse.
+pub(crate) fn better_than(
     figures: &[(&str, Better)],
     (subject, ours): &NamedFigures,
     others: &[NamedFigures],
 ) -> String {
-    // Figures in which the same ones are better come together.
+    // Figures in which the same others are better share a clause.
     let mut clauses: Vec<(Vec<&str>, String)> = Vec::new();
     for (index, &(figure, better)) in figures.iter().enumerate() {
         let names = others.iter().filter(|(_, theirs)| match better {
@@ -32,12 +32,12 @@ pub(crate) fn where_worse(
     }
     let clauses: Vec<String> = clauses
         .iter()
-        .map(|(figures, names)| format!("in {} than {names}", figures.join(", ")))
+        .map(|(figures, names)| format!("in {}: {names}", figures.join(", ")))
         .collect();
-    format!("\nWorse: {subject}, {}.\n", clauses.join("; "))
+    format!("\nBetter than {subject} {}.\n", clauses.join("; "))
 }
 
-/// Names one after the other, or that there are none.
+/// The names separated by commas, or the words that there are none.
 pub(crate) fn list_or_none<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.collect();
     if names.is_empty() { "none of these".to_owned() } else { names.join(", ") }
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_better_ones_are_named() {
+    fn only_what_is_better_is_named() {
         let row = |name: &str, figures: [f64; 2]| (name.to_owned(), figures.to_vec());
         let figures = [("PSNR", Better::Higher), ("time", Better::Lower)];
         let others = [
@@ -57,9 +57,9 @@ mod tests {
             row("c", [31.0, f64::NAN]),
             row("d", [30.0, 2.0]),
         ];
-        let text = where_worse(&figures, &row("ours", [30.0, 2.0]), &others);
-        assert_eq!(text, "\nWorse: ours, in PSNR than a, c; in time than b.\n");
-        let text = where_worse(&figures, &row("ours", [32.0, 0.5]), &others);
-        assert_eq!(text, "\nWorse: ours, in PSNR, time than none of these.\n");
+        let text = better_than(&figures, &row("ours", [30.0, 2.0]), &others);
+        assert_eq!(text, "\nBetter than ours in PSNR: a, c; in time: b.\n");
+        let text = better_than(&figures, &row("ours", [32.0, 0.5]), &others);
+        assert_eq!(text, "\nBetter than ours in PSNR, time: none of these.\n");
     }
 }

@@ -10,8 +10,8 @@ pub(crate) struct Curve {
 }
 
 impl Curve {
-    /// A curve through points of bits per pixel and quality, in any order. A point that is no
-    /// better than a cheaper one is left out.
+    /// A curve through points of bits per pixel and quality, in any order. A point is left out if
+    /// another one of at most its rate is at least as good.
     pub(crate) fn new(points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut points: Vec<(f64, f64)> = points.into_iter().collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
@@ -30,7 +30,7 @@ impl Curve {
         self.rates.iter().map(|rate| rate.exp()).zip(self.qualities.iter().copied())
     }
 
-    /// The quality at a rate in bits per pixel; `None` where nothing was measured.
+    /// The quality at a rate in bits per pixel; `None` beyond the ends of the curve.
     pub(crate) fn quality(&self, rate: f64) -> Option<f64> {
         let (first, last) = (*self.rates.first()?, *self.rates.last()?);
         let rate = rate.ln();
@@ -46,8 +46,8 @@ impl Curve {
     }
 }
 
-/// The Bjøntegaard difference in rate: by which share `test` is larger than `anchor`, on average
-/// over the qualities that both have within a range of bits per pixel. `None` if there are none.
+/// The Bjøntegaard delta rate: by which share `test` is larger than `anchor`, on average over the
+/// qualities that both reach within a range of bits per pixel. `None` if there are none.
 pub(crate) fn bd_rate(anchor: &Curve, test: &Curve, range: (f64, f64)) -> Option<f64> {
     let (a, b) = (anchor.qualities(range)?, test.qualities(range)?);
     let (low, high) = (a.0.max(b.0), a.1.min(b.1));
@@ -58,7 +58,8 @@ pub(crate) fn bd_rate(anchor: &Curve, test: &Curve, range: (f64, f64)) -> Option
     Some(((area(test) - area(anchor)) / (high - low)).exp_m1())
 }
 
-/// A monotone piecewise cubic through points (Fritsch and Butland, 1984).
+/// A piecewise cubic Hermite interpolation that is monotone between monotone points (PCHIP; Fritsch
+/// and Butland, 1984).
 struct Pchip<'a> {
     x: &'a [f64],
     y: &'a [f64],

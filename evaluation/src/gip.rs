@@ -1,4 +1,4 @@
-//! Our codec, measured as the others are: whole files, from samples to bytes and back.
+//! Our codec, measured like the baselines: whole files, from samples to bytes and back.
 
 use std::time::Instant;
 
@@ -9,23 +9,23 @@ use crate::memory;
 use crate::pictures::{Distortion, TestPicture};
 use crate::table::median;
 
-/// How the codec is called in tables and files.
+/// The name of our codec in tables and CSV files.
 pub(crate) const NAME: &str = "gip";
-/// The effort where no other is named: the encoder's default.
+/// The encoder's default effort, used wherever no other is named.
 pub(crate) const EFFORT: u8 = 5;
 /// The seed of everything random in the encoder.
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.
 const REPEATS: usize = 5;
 
-/// One `.gip` file.
+/// A `.gip` file of a picture, with what was measured of it.
 #[derive(Clone, Debug)]
 pub(crate) struct MeasuredFile {
     pub(crate) file: Vec<u8>,
     pub(crate) bytes: f64,
     pub(crate) report: Report,
     pub(crate) distortion: Distortion,
-    /// Most bytes that the encoder held, beside the source.
+    /// Peak memory of the encoder in bytes, without the source.
     pub(crate) memory: f64,
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn encoder(effort: u8) -> Encoder {
     Encoder::new().with_effort(effort).with_seed(SEED)
 }
 
-/// Encodes and decodes a picture; `None` for all threads.
+/// Encodes a picture with so many threads (`None` for all) and measures the file.
 pub(crate) fn encode(
     encoder: Encoder,
     picture: &TestPicture,
@@ -49,7 +49,7 @@ pub(crate) fn encode(
     Ok(MeasuredFile { file, bytes, report: encoded.report, distortion, memory })
 }
 
-/// Decodes a file and hands over what it has.
+/// Decodes a file, or the beginning of one, and passes its picture on.
 pub(crate) fn open<T>(
     file: &[u8],
     work: impl FnOnce(image_gip::Picture<'_>) -> Result<T>,
@@ -59,12 +59,12 @@ pub(crate) fn open<T>(
     work(decoder.picture().context("the file has no picture")?)
 }
 
-/// How far a file is from its source.
+/// The distortion of a file against its source.
 pub(crate) fn distortion(file: &[u8], picture: &TestPicture) -> Result<Distortion> {
     picture.distortion(&decode(file, true)?)
 }
 
-/// PSNR in dB of the rendering as floats, not rounded but clamped, as papers have it.
+/// PSNR in dB of the float rendering, clamped but not rounded, as papers measure it.
 pub(crate) fn psnr_float(file: &[u8], picture: &TestPicture) -> Result<f64> {
     let (planes, pixels) = (planes(file)?, picture.rgb.len() / 3);
     let squared = planes.iter().enumerate().map(|(index, sample)| {
@@ -74,7 +74,7 @@ pub(crate) fn psnr_float(file: &[u8], picture: &TestPicture) -> Result<f64> {
     Ok(-10.0 * (squared.sum::<f64>() / planes.len() as f64).log10())
 }
 
-/// The rendering as floats, plane after plane.
+/// The float rendering, plane after plane.
 pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
     open(file, |picture| {
         let options = RenderOptions::new();
@@ -93,18 +93,18 @@ fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
     Ok(samples)
 }
 
-/// Most bytes that decoding holds beside the file, the samples included.
+/// Peak memory of decoding in bytes, without the file but with the samples.
 pub(crate) fn decode_memory(file: &[u8]) -> Result<f64> {
     let (samples, bytes) = memory::peak(|| decode(file, true));
     samples.map(|_| bytes)
 }
 
-/// How long decoding takes, from the file to samples, with all threads or with one.
+/// Seconds of decoding, from the file to samples, with all threads or with one.
 pub(crate) fn decode_seconds(file: &[u8], parallel: bool) -> Result<f64> {
     median_seconds(REPEATS, || decode(file, parallel).map(|_| ()))
 }
 
-/// How long rendering takes, from the Gaussians to samples, with all threads.
+/// Seconds of rendering, from Gaussians to samples, with all threads.
 pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
     let options = RenderOptions::new();
     open(file, |picture| {
@@ -113,7 +113,7 @@ pub(crate) fn render_seconds(file: &[u8]) -> Result<f64> {
     })
 }
 
-/// How long something takes: the median of several times.
+/// The median time of some work in seconds, over so many repeats.
 pub(crate) fn median_seconds(repeats: usize, mut work: impl FnMut() -> Result<()>) -> Result<f64> {
     let seconds = (0..repeats).map(|_| {
         let start = Instant::now();
@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_rendering_as_floats_is_as_far_as_the_encoder_says() {
+    fn psnr_equals_what_the_encoder_reports() {
         let (width, height) = (24, 16);
         let rgb = (0..width * height).flat_map(|i| [(i % 24 * 10) as u8, (i / 24 * 9) as u8, 77]);
         let picture =

@@ -1,19 +1,19 @@
-//! What an evaluation of the kernel takes where nothing else does: the floor of splatting.
+//! A micro-benchmark of kernel evaluations alone: the least time that splatting can take.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
-/// Rows of sixteen pixels that stay in registers, with three channels each.
+/// Rows of sixteen pixels with three channels, whose sums stay in registers.
 const ROWS: usize = 8;
-/// Gaussians in the first cache.
+/// So few Gaussians that they stay in the first-level cache.
 const GAUSSIANS: usize = 64;
 const REPEATS: usize = 2_000;
-/// The best of so many runs.
+/// The time is the least of so many runs.
 const RUNS: usize = 10;
 
-/// Seconds for one Gaussian at one pixel: the quartic kernel and three sums.
+/// Seconds for one Gaussian at one pixel: the quartic kernel, added to three channels.
 pub(crate) fn seconds_per_evaluation() -> f64 {
     let gaussians: Vec<[f32; 8]> = (0..GAUSSIANS)
         .map(|index| core::array::from_fn(|value| 0.01 * (index + value + 1) as f32))

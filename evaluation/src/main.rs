@@ -29,8 +29,8 @@ use sections::{ablation, content, decode, rate, representation, speed, stability
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
 ///
-/// What was measured before, on the same machine and the same version of the codec, is not measured
-/// again: an interrupted run goes on where it was, and a finished one only writes the report.
+/// Nothing is measured twice on the same machine with the same version of the codec: an interrupted
+/// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 struct Args {
     /// Folder with the pictures, as .png.
@@ -48,8 +48,8 @@ struct Args {
     /// Iterations of the published methods [default: 3000, quick: 2000; the paper: 50000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
-    /// CSV with measurements of the same baselines from elsewhere, to compare ours with; columns
-    /// codec, quality, image, bytes, bpp, psnr, msssim, as in `rate.csv`.
+    /// CSV with measurements of the same baselines by other programs, to compare ours with; it
+    /// needs the columns codec, quality, image, bytes, psnr and msssim of `rate.csv`.
     #[arg(long, value_name = "CSV")]
     reference: Option<PathBuf>,
 }

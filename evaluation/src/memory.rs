@@ -1,4 +1,4 @@
-//! How much memory work takes: the program's allocator counts.
+//! Peak memory, as counted by the program's allocator.
 
 use std::alloc::System;
 
@@ -7,8 +7,8 @@ use peakmem_alloc::{INSTRUMENTED_SYSTEM, PeakMemAlloc, PeakMemAllocTrait};
 #[global_allocator]
 static ALLOCATOR: &PeakMemAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Does the work; with its result, the most bytes that were held meanwhile beside what was held
-/// before. That counts all threads, so nothing else should run.
+/// Does the work and returns its result with the peak memory in bytes, without what was allocated
+/// before. All threads count, so nothing else should run meanwhile.
 pub(crate) fn peak<T>(work: impl FnOnce() -> T) -> (T, f64) {
     ALLOCATOR.reset_peak_memory();
     let result = work();
@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_freed_counts_as_well() {
+    fn memory_that_is_freed_again_counts() {
         const LARGE: usize = 1 << 28;
         // Other tests run beside this one, but are small.
         let (length, bytes) = peak(|| vec![0_u8; LARGE].len());

@@ -1,4 +1,4 @@
-//! The pictures to measure on.
+//! The test pictures.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use image_gip::metrics;
 
-/// An 8-bit RGB picture, from a file or made up.
+/// An 8-bit RGB picture, from a file or synthetic.
 #[derive(Clone, Debug)]
 pub(crate) struct TestPicture {
     pub(crate) name: String,
@@ -18,7 +18,7 @@ pub(crate) struct TestPicture {
     pub(crate) rgb: Vec<u8>,
 }
 
-/// How far a decoded picture is from its source.
+/// How well a decoded picture agrees with its source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Distortion {
     /// In dB, over all samples.
@@ -49,7 +49,7 @@ impl TestPicture {
         })
     }
 
-    /// As much of the picture, repeated in mirror images, as fits a size.
+    /// The picture at another size: cropped, or continued in mirror images.
     pub(crate) fn mirrored(&self, width: u32, height: u32) -> Self {
         let mut rgb = Vec::with_capacity(width as usize * height as usize * 3);
         let mirror = |i: u32, side: u32| {
@@ -88,7 +88,7 @@ fn open(path: &Path) -> Result<TestPicture> {
     let image = image.into_rgb8();
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (width, height) = image.dimensions();
-    // The worker has a working directory and lines of its own.
+    // Absolute, because the worker may have another working directory.
     let path = fs::canonicalize(path)?;
     Ok(TestPicture { name, path, width, height, rgb: image.into_raw() })
 }
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_of_another_size_is_no_copy() {
+    fn equal_samples_have_no_distortion_and_other_sizes_are_refused() {
         let rgb = vec![7; 3];
         let picture =
             TestPicture { name: String::new(), path: PathBuf::new(), width: 1, height: 1, rgb };

@@ -1,4 +1,4 @@
-//! What was measured, and where.
+//! Which version was measured, and on which machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::thread::available_parallelism;
 
 /// The crate's folder in the repository.
 pub(crate) const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
-/// What of the repository is measured, seen from [`FOLDER`].
+/// The files of the product, relative to [`FOLDER`].
 const PRODUCT: [&str; 2] = ["../src", "../Cargo.toml"];
 
 /// Processor, number of cores, system.
@@ -22,7 +22,7 @@ pub(crate) fn cores() -> usize {
     available_parallelism().map_or(1, Into::into)
 }
 
-/// The commit that last changed the codec, and a checksum of what it is now if that differs.
+/// The commit that last changed the product, with a checksum of its files if they differ from it.
 pub(crate) fn product() -> String {
     let checksum = || {
         let mut hasher = crc32fast::Hasher::new();
@@ -36,7 +36,7 @@ pub(crate) fn product() -> String {
     if changes.is_empty() { commit } else { format!("{commit}+{}", checksum()) }
 }
 
-/// Adds a file, or all files of a folder in the order of their names.
+/// Hashes a file, or all files of a folder in the order of their names.
 fn hash(path: &Path, hasher: &mut crc32fast::Hasher) {
     if let Ok(folder) = fs::read_dir(path) {
         let mut paths: Vec<PathBuf> = folder.flatten().map(|entry| entry.path()).collect();
@@ -52,7 +52,7 @@ pub(crate) fn commit() -> String {
     git(&["log", "-1", "--format=%H"], &[]).unwrap_or_else(|| "none: a copy outside of git".into())
 }
 
-/// The compiler, as far as it tells.
+/// The version of the compiler.
 pub(crate) fn compiler() -> String {
     output(Command::new("rustc").arg("--version")).unwrap_or_else(|| "unknown".into())
 }

@@ -9,9 +9,9 @@ use clap::ValueEnum;
 const TITLE: &str = "\
 # image-gip, measured
 
-Written by `evaluation/`, whose README has the command. The run leaves every single measurement as \
-CSV beside this file. Sizes are those of whole files. PSNR is over all samples of the decoded 8-bit \
-RGB picture, unless stated otherwise.
+Written by `evaluation/`, whose README has the command. A run also writes every single \
+measurement to CSV files in this folder. Sizes are those of whole files. PSNR is over all samples \
+of the decoded 8-bit RGB picture, unless stated otherwise.
 ";
 
 /// What can be measured on its own; the comments are the help of `--only`.
@@ -19,17 +19,17 @@ RGB picture, unless stated otherwise.
 pub(crate) enum Section {
     /// The fit itself, without quantization: against GaussianImage and GaussianImage++
     Representation,
-    /// What each part of the method is worth
+    /// What each part of the method contributes
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
-    /// Time against error, and how both grow
+    /// Time against PSNR, and how time and memory grow
     Speed,
-    /// Decoding next to other decoders, whole and in part
+    /// Decoding time against other decoders; threads and partial decoding
     Decode,
-    /// Arithmetic at its edges, and pictures that are hard to fit
+    /// Extreme Gaussians, and pictures that are hard to fit
     Stability,
-    /// How much is spent on simple and on difficult pictures
+    /// Gaussians and bytes for simple and for difficult pictures
     Content,
 }
 
@@ -116,8 +116,8 @@ mod tests {
         };
         let expected = |rate: &str| {
             format!(
-                "{TITLE}\n## Rate and distortion\n\n{rate}\n\n## Decoding\n\n- Codec: a\n\n### Part\n\n\
-                 fast\n\n## Only what a scene needs\n\nflat\n"
+                "{TITLE}\n## Rate and distortion\n\n{rate}\n\n## Decoding\n\n- Codec: a\n\n### Part\
+                 \n\nfast\n\n## Only what a scene needs\n\nflat\n"
             )
         };
         report(Section::Decode, "- Codec: a\n\n### Part\n\nfast\n");

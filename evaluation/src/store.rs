@@ -1,4 +1,5 @@
-//! Measurements on disk: one CSV per kind, appended as they are made, never made twice.
+//! Measurements on disk: one CSV per kind. Each measurement is appended as it is made, and is not
+//! made again.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -7,8 +8,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-/// What the first columns are: a measurement holds for one machine and one version of what was
-/// measured. Rows of others stay in the file but do not count.
+/// The first columns: a measurement is valid for one machine and one version of what was measured.
+/// Rows of other machines and versions stay in the file but are not used.
 const PROVENANCE: [&str; 2] = ["machine", "version"];
 
 /// Measurements of one kind: `K` columns say what was measured, `V` columns what came out.
@@ -60,7 +61,7 @@ impl<const K: usize, const V: usize> Store<K, V> {
         Ok(Self { file, rows, machine: machine.to_owned() })
     }
 
-    /// The measurement under a key: from the file, or else made now and written down.
+    /// The measurement under a key: from the file, or else made now and appended to it.
     pub(crate) fn get(
         &mut self,
         version: &str,

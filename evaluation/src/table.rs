@@ -1,4 +1,4 @@
-//! Markdown tables, and how numbers look in them.
+//! Markdown tables, and the numbers in them.
 
 use std::fmt::Write;
 
@@ -25,7 +25,7 @@ impl Table {
         self.text.push_str("|\n");
     }
 
-    /// The table behind a blank line.
+    /// The table after a blank line.
     pub(crate) fn finish(&self) -> String {
         format!("\n{}", self.text)
     }
@@ -36,14 +36,14 @@ pub(crate) fn percent(share: Option<f64>) -> String {
     share.map_or_else(|| "-".into(), |share| format!("{:+.1} %", 100.0 * share))
 }
 
-/// The one in the middle, if there is anything.
+/// The median (of an even number of values the upper one), `None` of nothing.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
-/// The mean, if there is anything.
+/// The mean, `None` of nothing.
 pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (mut sum, mut count) = (0.0, 0.0);
     for value in values {
@@ -53,7 +53,7 @@ pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (count > 0.0).then(|| sum / count)
 }
 
-/// MS-SSIM in decibels, where equal steps look alike.
+/// MS-SSIM in decibels: `-10 log10(1 - MS-SSIM)`.
 pub(crate) fn decibels(ms_ssim: f64) -> f64 {
     -10.0 * (1.0 - ms_ssim).log10()
 }

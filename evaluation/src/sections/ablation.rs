@@ -1,4 +1,4 @@
-//! What each part of the method is worth: components, bit depths, intervals, seeds.
+//! What each part of the method contributes: components, intervals, bit depths, seeds.
 
 use anyhow::Result;
 use image_gip::training::Training;
@@ -7,23 +7,23 @@ use image_gip::{Chart, Encoder, Precision, Target};
 use super::methods::{self, CHARTS};
 use super::positions;
 use crate::bench::Bench;
-use crate::comparison::{Better, NamedFigures, list_or_none, where_worse};
+use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::pictures::TestPicture;
 use crate::store::Store;
 use crate::table::{Table, mean, percent};
 
-/// Gaussians where the table names no others.
+/// Number of Gaussians, except for the curves of bit depths.
 const GAUSSIANS: u32 = 5_000;
 const QUICK_GAUSSIANS: u32 = 2_500;
-/// Gaussians for the curves of bit depths.
+/// Numbers of Gaussians for the curves of bit depths.
 const CURVE: [u32; 4] = [1_500, 2_500, 4_000, 6_500];
 const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
-/// Iterations of ours for bit depths and seeds.
+/// Iterations of our encoder for bit depths and seeds.
 const OWN_ITERATIONS: u32 = 600;
 const QUICK_OWN_ITERATIONS: u32 = 150;
-/// How many pictures: for components and seeds, and for what takes more settings.
+/// How many pictures: for components and seeds, and for the tables with more settings.
 const PICTURES: usize = 8;
 const FEWER_PICTURES: usize = 4;
 const QUICK_PICTURES: usize = 1;
@@ -38,16 +38,16 @@ const DEPTHS: [[u8; 3]; 8] = [
     [16, 8, 6],
     [16, 8, 8],
 ];
-/// The paper's intervals of pruning and numbers of growths: every 5,000 or every 10,000 of 50,000
-/// iterations, none after 90 %.
+/// The paper's intervals of pruning in iterations, and how often Gaussians grow in number: every
+/// 5,000 or every 10,000 of 50,000 iterations up to 90 % of them.
 const PRUNING: [u32; 3] = [100, 500, 1_000];
 const GROWTHS: [u32; 2] = [9, 4];
 const SEEDS: u64 = 5;
 
-/// What components and intervals are judged by.
+/// What components and intervals are compared by.
 const CRITERIA: [(&str, Better); 2] = [("PSNR", Better::Higher), ("MS-SSIM", Better::Higher)];
 
-/// Everything that the measurements share.
+/// What all tables share.
 #[derive(Debug)]
 struct Ablation<'a> {
     store: Store<4, 3>,
@@ -100,7 +100,8 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
 }
 
 impl Ablation<'_> {
-    /// D3 and CAF, for each parameterization.
+    /// The two components of GaussianImage++, D3 (densification) and CAF (filter), for each
+    /// parameterization.
     fn components(&mut self) -> Result<String> {
         let mut table =
             Table::new(&["parameterization", "neither", "CAF alone", "D3 alone", "D3 and CAF"]);
@@ -122,8 +123,8 @@ impl Ablation<'_> {
             }
             table.row(&cells);
             if let Some((_, both)) = compared.pop() {
-                let subject = (format!("{name} with both"), both);
-                comparisons.push_str(&where_worse(&CRITERIA, &subject, &compared));
+                let subject = (format!("{name} with both components"), both);
+                comparisons.push_str(&better_than(&CRITERIA, &subject, &compared));
             }
         }
         Ok(format!(
@@ -163,11 +164,11 @@ impl Ablation<'_> {
             self.gaussians,
             self.bench.pictures_used(self.pictures.len()),
             table.finish(),
-            where_worse(&CRITERIA, &compared[0], &compared[1..]),
+            better_than(&CRITERIA, &compared[0], &compared[1..]),
         ))
     }
 
-    /// How many bits each attribute gets.
+    /// Bit depths of position, shape and colour.
     fn depths(&mut self, counts: &[u32]) -> Result<String> {
         let mut rows = Vec::new();
         for depths in DEPTHS {
@@ -203,8 +204,8 @@ impl Ablation<'_> {
         }
         Ok(format!(
             "\n### Bit depths\n\nCompared with: the paper's choice, the first row. Our encoder at \
-             {} iterations, quantized; {}.\n{}\nThe paper's choice is worse, by BD-rate, than: \
-             {}.\n",
+             {} iterations, packed (bit-packed codes of LSQ+ quantizers); {}.\n{}\nBetter than the \
+             paper's choice by BD-rate: {}.\n",
             self.own_iterations,
             self.bench.pictures_used(self.pictures.len()),
             table.finish(),
@@ -225,7 +226,9 @@ impl Ablation<'_> {
         let mut table = Table::new(&["", "bpp", "PSNR in dB", "MS-SSIM"]);
         let figures: [fn(&VariantMeans) -> f64; 3] = [|o| o.rate, |o| o.psnr, |o| o.ms_ssim];
         let columns = figures.map(|figure| outcomes.iter().map(figure).collect::<Vec<f64>>());
-        for (name, figure) in [("mean", average as fn(&[f64]) -> f64), ("deviation", deviation)] {
+        for (name, figure) in
+            [("mean", average as fn(&[f64]) -> f64), ("standard deviation", standard_deviation)]
+        {
             let mut cells = vec![name.to_owned()];
             cells.extend(columns.iter().map(|column| format!("{:.5}", figure(column))));
             table.row(&cells);
@@ -236,9 +239,9 @@ impl Ablation<'_> {
         let most = psnrs.iter().copied().max_by(order).unwrap_or(f64::NAN);
         Ok(format!(
             "\n### Seeds\n\nCompared with each other: {SEEDS} seeds of our encoder at {} \
-             iterations, quantized, {} Gaussians; {}. Of the means over the pictures, the mean and \
-             the standard deviation.\n{}\nThe worst seed is worse than the mean by {:.3} dB, the \
-             best is better by {:.3} dB.\n",
+             iterations, packed, {} Gaussians; {}. Each seed gives a mean over the pictures; the \
+             rows are the mean and the standard deviation of these means.\n{}\nThe worst seed \
+             is {:.3} dB below the mean, the best {:.3} dB above.\n",
             self.own_iterations,
             self.gaussians,
             self.bench.pictures_used(self.pictures.len()),
@@ -283,8 +286,8 @@ fn average(values: &[f64]) -> f64 {
     mean(values.iter().copied()).unwrap_or(f64::NAN)
 }
 
-/// The standard deviation of a sample.
-fn deviation(values: &[f64]) -> f64 {
+/// The standard deviation, estimated from a sample.
+fn standard_deviation(values: &[f64]) -> f64 {
     let mean = average(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     (squares / (values.len() as f64 - 1.0)).sqrt()
@@ -295,9 +298,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn deviations() {
+    fn means_and_standard_deviations() {
         assert_eq!(average(&[1.0, 2.0, 6.0]), 3.0);
-        assert_eq!(deviation(&[1.0, 2.0, 6.0]), 7.0_f64.sqrt());
-        assert_eq!(deviation(&[5.0; 5]), 0.0);
+        assert_eq!(standard_deviation(&[1.0, 2.0, 6.0]), 7.0_f64.sqrt());
+        assert_eq!(standard_deviation(&[5.0; 5]), 0.0);
     }
 }

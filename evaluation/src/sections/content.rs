@@ -9,18 +9,18 @@ use crate::gip;
 use crate::pictures::TestPicture;
 use crate::table::{Table, mean, percent};
 
-/// Side of all pictures of this section.
+/// Width and height of all pictures of this section.
 const SIDE: u32 = 256;
-/// From how many pictures parts are taken as photographs.
+/// How many photographs are cut out of the pictures.
 const PHOTOS: usize = 8;
-/// Standard deviations, in steps of 8 bits, of the noise on a photograph and on plain gray.
+/// Standard deviations, in 8-bit steps, of the noise on a photograph and on plain gray.
 const GRAIN: f64 = 8.0;
 const NOISE: f64 = 20.0;
-/// The quality that all pictures are asked for, in dB: noise of [`NOISE`] lies at 22 dB.
+/// The target in dB for all pictures. A file without Gaussians has 22 dB on noise of [`NOISE`].
 const PSNR: f64 = 26.0;
-/// What the other colour models are compared with.
+/// The colour model that others are compared with.
 const RGB: &str = "RGB";
-/// What the other pictures are compared with.
+/// The kind of picture that others are compared with.
 const PHOTOGRAPH: &str = "photograph";
 /// Gaussians for comparing colour models.
 const GAUSSIANS: u32 = 1000;
@@ -28,12 +28,12 @@ const GAUSSIANS: u32 = 1000;
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let photos: Vec<TestPicture> = bench.sample(PHOTOS).iter().map(middle).collect();
     let mut text = format!(
-        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, made up or the middle of \
-         the photographs (means; {}). Effort {}.\n",
+        "Compared with each other: pictures of {SIDE} x {SIDE} pixels, synthetic ones and the \
+         middle of the photographs (means; {}). Effort {}.\n",
         bench.pictures_used(photos.len()),
         gip::EFFORT,
     );
-    text.push_str(&kinds(bench, &photos)?);
+    text.push_str(&kinds_of_content(bench, &photos)?);
     text.push_str(&colors(bench, &photos)?);
     Ok(text)
 }
@@ -41,32 +41,32 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
 /// Makes the samples of a colour model from a photograph.
 type Conversion = fn(&TestPicture) -> Vec<u8>;
 
-/// What is asked of the encoder.
+/// The targets that the encoder is given.
 fn targets() -> [(String, Target); 2] {
     [("auto".into(), Target::Auto), (format!("{PSNR} dB"), Target::Psnr(PSNR))]
 }
 
-fn kinds(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
+fn kinds_of_content(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut store = bench.store(
         "content.csv",
         ["picture", "target", "effort"],
         ["gaussians", "bytes", "psnr", "encode_seconds"],
     )?;
     let grainy: Vec<TestPicture> = photos.iter().map(|photo| noisy(photo, GRAIN)).collect();
-    let kinds_of_pictures = [
-        ("flat", vec![made("flat", |_, _| [96, 128, 160])]),
-        ("ramp", vec![made("ramp", |x, y| [x as u8, y as u8, ((x + y) / 2) as u8])]),
-        ("six discs", vec![made("discs", discs)]),
+    let kinds = [
+        ("flat", vec![synthetic("flat", |_, _| [96, 128, 160])]),
+        ("ramp", vec![synthetic("ramp", |x, y| [x as u8, y as u8, ((x + y) / 2) as u8])]),
+        ("six discs", vec![synthetic("discs", discs)]),
         (PHOTOGRAPH, photos.to_vec()),
         ("photograph with noise", grainy),
-        ("noise", vec![noisy(&made("noise", |_, _| [128; 3]), NOISE)]),
+        ("noise", vec![noisy(&synthetic("noise", |_, _| [128; 3]), NOISE)]),
     ];
     let mut text = String::new();
     for (name, target) in targets() {
         let mut table =
             Table::new(&["picture", "Gaussians", "bytes", "bpp", "PSNR in dB", "encode s"]);
-        let (mut dearest, mut photograph) = ((0.0, ""), 0.0);
-        for (kind, pictures) in &kinds_of_pictures {
+        let (mut largest, mut photograph) = ((0.0, ""), 0.0);
+        for (kind, pictures) in &kinds {
             let mut all = Vec::new();
             for picture in pictures {
                 let key = [picture.name.as_str(), &name, &gip::EFFORT.to_string()];
@@ -79,8 +79,8 @@ fn kinds(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
                 })?);
             }
             let [gaussians, bytes, psnr, seconds] = means(&all);
-            if bytes > dearest.0 {
-                dearest = (bytes, *kind);
+            if bytes > largest.0 {
+                largest = (bytes, *kind);
             }
             if *kind == PHOTOGRAPH {
                 photograph = bytes;
@@ -95,16 +95,16 @@ fn kinds(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
             ]);
         }
         text.push_str(&format!(
-            "\nTarget: {name}.\n{}\nWorst: {}, with {:.1} times the bytes of a photograph.\n",
+            "\nTarget: {name}.\n{}\nLargest: {}, with {:.1} times the bytes of a photograph.\n",
             table.finish(),
-            dearest.1,
-            dearest.0 / photograph,
+            largest.1,
+            largest.0 / photograph,
         ));
     }
     Ok(text)
 }
 
-/// What gray saves and alpha costs.
+/// The bytes that gray saves and alpha costs.
 fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut store = bench.store(
         "content-colors.csv",
@@ -159,8 +159,8 @@ fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     }
     Ok(format!(
         "\nCompared with {RGB}: the photographs with at most {GAUSSIANS} Gaussians in other colour \
-         models; PSNR is over all samples of the model, alpha included.\n{}\nWorse than {RGB} in \
-         bytes: {}.\n",
+         models; PSNR is over all samples of the model, alpha included.\n{}\nMore bytes than \
+         {RGB}: {}.\n",
         table.finish(),
         list_or_none(larger.into_iter()),
     ))
@@ -170,7 +170,7 @@ fn means<const N: usize>(all: &[[f64; N]]) -> [f64; N] {
     std::array::from_fn(|column| mean(all.iter().map(|row| row[column])).unwrap_or(f64::NAN))
 }
 
-/// The middle of a photograph; of a smaller one, what there is and its mirror images.
+/// The middle of a photograph; a smaller one is continued in mirror images.
 fn middle(photo: &TestPicture) -> TestPicture {
     let (left, top) = (photo.width.saturating_sub(SIDE) / 2, photo.height.saturating_sub(SIDE) / 2);
     let mut part = photo.mirrored(photo.width.max(SIDE), photo.height.max(SIDE));
@@ -186,7 +186,7 @@ fn middle(photo: &TestPicture) -> TestPicture {
     TestPicture { width: SIDE, height: SIDE, ..part }
 }
 
-fn made(name: &str, pixel: impl Fn(u32, u32) -> [u8; 3]) -> TestPicture {
+fn synthetic(name: &str, pixel: impl Fn(u32, u32) -> [u8; 3]) -> TestPicture {
     let rgb = (0..SIDE * SIDE).flat_map(|i| pixel(i % SIDE, i / SIDE)).collect();
     TestPicture { name: name.into(), path: "".into(), width: SIDE, height: SIDE, rgb }
 }
@@ -230,7 +230,7 @@ fn gray(picture: &TestPicture) -> impl Iterator<Item = u8> {
     })
 }
 
-/// Opaque in the middle, and from there on less and less.
+/// Alpha samples: opaque in the middle, fading out towards the corners.
 fn alpha() -> impl Iterator<Item = u8> {
     (0..SIDE * SIDE).map(|i| {
         let (x, y) = ((i % SIDE).abs_diff(SIDE / 2), (i / SIDE).abs_diff(SIDE / 2));
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn noise_is_the_same_every_time_and_as_strong_as_stated() {
-        let gray = made("gray", |_, _| [128; 3]);
+        let gray = synthetic("gray", |_, _| [128; 3]);
         let a = noisy(&gray, NOISE);
         assert_eq!(a.rgb, noisy(&gray, NOISE).rgb);
         let psnr = gray.distortion(&a.rgb).expect("equal sizes").psnr;

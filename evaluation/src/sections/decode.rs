@@ -1,4 +1,5 @@
-//! Decoding: from a file in memory to 8-bit samples, next to other decoders in the same run.
+//! Decoding time, from a file in memory to 8-bit samples: ours and that of other decoders, measured
+//! in the same run.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -21,34 +22,38 @@ use crate::table::{Table, mean, median};
 
 /// Rates of the files, in bits per pixel.
 const RATES: [f64; 3] = [0.25, 0.5, 1.0];
-/// On how many pictures.
+/// How many pictures are decoded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
-/// DecoderProfile are medians over so many runs.
+/// Parts of our decoder are timed as medians over so many runs.
 const REPEATS: usize = 15;
-/// What is compared takes turns, since a machine is now faster and now slower: so many, of so many
-/// runs each. All threads take more turns, since what else the machine does shows more with them.
+/// Decoders that are compared take turns, because the speed of a machine drifts: so many turns of
+/// so many runs each. With all threads there are more turns, because other programs disturb them
+/// more.
 const TURNS: usize = 21;
 const TURNS_ALL_THREADS: usize = 63;
-const IN_A_TURN: usize = 5;
-/// How much smaller thumbnails are along each side.
+const RUNS_PER_TURN: usize = 5;
+/// The sides of a picture are so many times those of its thumbnail.
 const THUMBNAIL: u32 = 8;
-/// How much smaller a preview of the first bytes is along each side.
+/// The same for a preview from the first tenth of a file.
 const PREVIEW: u32 = 4;
-/// Bytes that a Gaussian takes in the list that a caller gets.
+/// Bytes of a Gaussian in the decoder's list.
 const GAUSSIAN_BYTES: f64 = size_of::<Gaussian>() as f64;
-/// The picture of which a region is decoded: its width, its rate and its effort, and the region.
+/// The picture of which a region is decoded: its width, rate and effort.
 const LARGE_PICTURE: (u32, f64, u8) = (2048, 0.5, 2);
+/// The side of the region in pixels.
 const REGION: u32 = 128;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let pictures = bench.sample(if bench.quick { QUICK_PICTURES } else { PICTURES });
     let mut text = format!(
         "Compared with: the decoders of libjpeg-turbo, libwebp, OpenJPEG, libavif with dav1d, and \
-         libjxl, on files of about the same rate of the same pictures. From a file in memory to \
-         8-bit RGB in memory that is there already. What is compared takes {TURNS} turns of \
-         {IN_A_TURN} decodings, {TURNS_ALL_THREADS} where all threads are used; times are medians, and a ratio is the median of those of the turns. \
-         {}. Their times include some microseconds of Python.\n",
+         libjxl, on files of the same pictures at about the same rate; {}. Decoding goes from a \
+         file in memory to 8-bit RGB in memory that is allocated beforehand. Decoders that are \
+         compared take turns: {TURNS} turns of {RUNS_PER_TURN} decodings each, \
+         {TURNS_ALL_THREADS} turns where all threads are used. A time is the median over all \
+         turns, a ratio the median of the ratios in each turn. The times of the other decoders \
+         include some microseconds of Python.\n",
         bench.pictures_used(pictures.len()),
     );
     let mut files = RateStore::open(bench)?;
@@ -62,15 +67,16 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     Ok(text)
 }
 
-/// A decoder at a rate: on each picture bits per pixel, PSNR, seconds, and ours as a share of them.
+/// A decoder at a rate.
 struct DecoderRow {
     decoder: &'static str,
+    /// For each picture: bits per pixel, PSNR, seconds, and our seconds divided by these.
     points: Vec<[f64; 4]>,
 }
 
 impl DecoderRow {
-    /// The median over the pictures.
-    fn share(&self) -> f64 {
+    /// Our time divided by this decoder's: the median over the pictures.
+    fn ratio(&self) -> f64 {
         median(self.points.iter().map(|point| point[3])).unwrap_or(f64::NAN)
     }
 
@@ -79,37 +85,38 @@ impl DecoderRow {
     }
 }
 
-/// What our own decoder takes for a file, in seconds.
+/// What our decoder takes for one file; times are seconds with one thread.
 #[derive(Clone, Copy, Debug)]
 struct DecoderProfile {
     bytes: f64,
     psnr: f64,
-    /// Of the whole, with one thread.
+    /// From the whole file to all samples.
     whole: f64,
-    /// How many times as fast all threads are.
+    /// The speedup of all threads that decode one file together.
     scaling: f64,
-    /// How many times as much they do when each decodes on its own: what the machine allows.
+    /// The speedup, in files per second, of all threads that decode a file each: what the machine
+    /// allows.
     one_each: f64,
     /// From bytes to Gaussians.
     parse: f64,
     /// From no Gaussians to samples.
     output: f64,
-    /// How many times as fast a thumbnail is.
+    /// The speedup of decoding a thumbnail.
     thumbnail: f64,
-    /// What it is worth next to one of all Gaussians.
+    /// PSNR of the thumbnail against one rendered from all Gaussians.
     thumbnail_psnr: f64,
-    /// From the first tenth of the bytes, at full size and at a quarter of it along each side.
+    /// From the first tenth of the bytes to samples, at full size and as a preview.
     tenth: [f64; 2],
-    /// How many Gaussians that tenth has.
+    /// Number of Gaussians in the first tenth of the bytes.
     tenth_gaussians: f64,
-    /// Most bytes held at a time with one thread, without the file and the output.
+    /// Peak memory with one thread, without the file and the output.
     memory: f64,
     gaussians: f64,
     /// Kernel evaluations.
     evaluations: f64,
 }
 
-/// Our file of a picture, made when it is needed.
+/// Our file of a picture, encoded when it is first needed.
 struct LazyFile<'a> {
     picture: &'a TestPicture,
     rate: f64,
@@ -126,16 +133,17 @@ impl LazyFile<'_> {
     }
 }
 
-/// DecoderProfile of some things that take so many turns, and the first as a share of each.
+/// Times tasks that take turns: the median of each task's times, and the median over the turns of
+/// the first task's time divided by each task's. A task returns its seconds.
 fn interleaved<const N: usize>(
     turns: usize,
-    mut things: [&mut dyn FnMut() -> Result<f64>; N],
+    mut tasks: [&mut dyn FnMut() -> Result<f64>; N],
 ) -> Result<([f64; N], [f64; N])> {
     let mut all = Vec::new();
     for _ in 0..turns {
         let mut turn = [0.0; N];
-        for (time, thing) in turn.iter_mut().zip(&mut things) {
-            *time = thing()?;
+        for (time, task) in turn.iter_mut().zip(&mut tasks) {
+            *time = task()?;
         }
         all.push(turn);
     }
@@ -144,15 +152,15 @@ fn interleaved<const N: usize>(
     Ok((times, array::from_fn(|index| of(&|turn| turn[0] / turn[index]))))
 }
 
-/// How long a decoding takes when every thread of the machine decodes on its own, per decoding.
+/// Seconds per decoding when every core of the machine decodes on its own.
 fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result<f64> {
-    let wanted = 2 * IN_A_TURN * cores();
-    let begun = AtomicUsize::new(0);
+    let decodings = 2 * RUNS_PER_TURN * cores();
+    let started = AtomicUsize::new(0);
     let start = Instant::now();
     thread::scope(|scope| {
         let work = || {
             let mut out = vec![0; samples];
-            while begun.fetch_add(1, Ordering::Relaxed) < wanted {
+            while started.fetch_add(1, Ordering::Relaxed) < decodings {
                 render(file, options, &mut out)?;
             }
             Ok(())
@@ -160,7 +168,7 @@ fn one_file_each(file: &[u8], options: &RenderOptions, samples: usize) -> Result
         let workers: Vec<_> = (0..cores()).map(|_| scope.spawn(work)).collect();
         workers.into_iter().try_for_each(|worker| worker.join().expect("it does not panic"))
     })
-    .map(|()| start.elapsed().as_secs_f64() / wanted as f64)
+    .map(|()| start.elapsed().as_secs_f64() / decodings as f64)
 }
 
 fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
@@ -196,7 +204,7 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
         rendered?;
         let whole_turn = |options: &RenderOptions| {
             let mut out = vec![0; picture.rgb.len()];
-            gip::median_seconds(IN_A_TURN, || render(file, options, &mut out))
+            gip::median_seconds(RUNS_PER_TURN, || render(file, options, &mut out))
         };
         let all = RenderOptions::new();
         let ([whole, ..], [_, scaling, one_each]) = interleaved(
@@ -214,7 +222,7 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
         let (_, [_, faster]) = interleaved(
             TURNS,
             [&mut || whole_turn(&one), &mut || {
-                gip::median_seconds(IN_A_TURN, || thumbnail(file, &small, &mut out))
+                gip::median_seconds(RUNS_PER_TURN, || thumbnail(file, &small, &mut out))
             }],
         )?;
         let mut of_all = vec![0; picture_of().output_len(&small)?];
@@ -270,7 +278,7 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
     })
 }
 
-/// The least and the most.
+/// The least and the largest.
 fn min_and_max(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [values.clone().fold(f64::NAN, f64::min), values.fold(f64::NAN, f64::max)]
 }
@@ -279,7 +287,7 @@ fn seconds(work: impl FnMut() -> Result<()>) -> Result<f64> {
     gip::median_seconds(REPEATS, work)
 }
 
-/// Decodes and renders as much of a file as shows, into the first of the samples.
+/// Decodes as many layers as the output size needs and renders them, into the first of the samples.
 fn thumbnail(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
     let mut decoder = Decoder::new(file)?;
     decoder.set_options(options.clone());
@@ -297,32 +305,33 @@ fn render(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()
     Ok(decoder.decode_into(samples)?)
 }
 
-/// Decodes and renders what the beginning of a file has, into the first of the samples.
-fn render_prefix(bytes: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
-    gip::open(bytes, |picture| {
+/// Decodes and renders the Gaussians in a prefix of a file, into the first of the samples.
+fn render_prefix(prefix: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result<()> {
+    gip::open(prefix, |picture| {
         let length = picture.output_len(options)?;
         Ok(picture.render_u8(options, &mut samples[..length])?)
     })
 }
 
-/// Pixels of all tiles of 8 x 8 that the Gaussians touch, each time that one does.
+/// Kernel evaluations of the decoder: it evaluates a Gaussian at every pixel of the tiles of 8 x 8
+/// that the Gaussian touches.
 fn evaluations(gaussians: &[Gaussian], width: u32, height: u32) -> f64 {
     const TILE: (u32, u32) = (8, 8);
     let touched = |gaussian: &Gaussian, row: u32| {
-        let chords = (row * TILE.1..(row + 1) * TILE.1).filter_map(|y| chord(gaussian, y, width));
-        let whole = chords.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        whole.map_or(0, |(first, last)| last / TILE.0 - first / TILE.0 + 1)
+        let spans = (row * TILE.1..(row + 1) * TILE.1).filter_map(|y| span(gaussian, y, width));
+        let hull = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        hull.map_or(0, |(first, last)| last / TILE.0 - first / TILE.0 + 1)
     };
     let rows = height.div_ceil(TILE.1);
     let tiles = gaussians.iter().flat_map(|gaussian| (0..rows).map(|row| touched(gaussian, row)));
     f64::from(tiles.sum::<u32>()) * f64::from(TILE.0 * TILE.1)
 }
 
-/// The first and the last pixel of a row in which a Gaussian of the quartic kernel shows.
-fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
+/// The first and the last pixel of a row where a Gaussian of the quartic kernel is not zero.
+fn span(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
     let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
     let [x, cy] = gaussian.center.map(f64::from);
-    // q <= 4, solved for dx.
+    // q <= 4, solved for dx at the dy of this row.
     let (yy, dy) = (l21 * l21 + l22 * l22, f64::from(y) + 0.5 - cy);
     let squared = 4.0 - dy * dy / yy;
     let half = (squared > 0.0).then(|| l11 * l22 / yy.sqrt() * squared.sqrt())?;
@@ -332,12 +341,12 @@ fn chord(gaussian: &Gaussian, y: u32, width: u32) -> Option<(u32, u32)> {
     (first <= last).then_some((first as u32, last as u32))
 }
 
-/// What was measured at a rate.
+/// All that was measured at one rate.
 struct RateResults {
     rate: f64,
     /// All decoders, ours first.
     rows: Vec<DecoderRow>,
-    /// More of ours, picture by picture.
+    /// What else was measured of our decoder, for each picture.
     ours: Vec<DecoderProfile>,
 }
 
@@ -387,15 +396,15 @@ fn theirs(
         let ([_, theirs], [_, share]) = interleaved(
             TURNS,
             [
-                &mut || gip::median_seconds(IN_A_TURN, || render(&ours.file, &one, &mut out)),
-                &mut || worker.decode_again(IN_A_TURN),
+                &mut || gip::median_seconds(RUNS_PER_TURN, || render(&ours.file, &one, &mut out)),
+                &mut || worker.decode_again(RUNS_PER_TURN),
             ],
         )?;
         Ok([picture.rate(trip.bytes), trip.distortion.psnr, theirs, share])
     })
 }
 
-/// DecoderProfile of all decoders with one thread, and ours as a share of theirs.
+/// Tables of all decoders' times with one thread, and of our time divided by theirs.
 fn ratios(all: &[RateResults]) -> String {
     let mut text = String::from("\n### One thread\n");
     for RateResults { rate, rows, .. } in all {
@@ -406,23 +415,23 @@ fn ratios(all: &[RateResults]) -> String {
             "ms",
             "ours / theirs, median",
             "least",
-            "most",
+            "largest",
         ]);
         for row in rows {
-            let [least, most] = min_and_max(row.points.iter().map(|point| point[3]));
+            let [least, largest] = min_and_max(row.points.iter().map(|point| point[3]));
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),
                 format!("{:.2}", row.mean(1)),
                 format!("{:.2}", 1000.0 * row.mean(2)),
-                format!("{:.2}", row.share()),
+                format!("{:.2}", row.ratio()),
                 format!("{least:.2}"),
-                format!("{most:.2}"),
+                format!("{largest:.2}"),
             ]);
         }
-        let faster = rows.iter().filter(|row| row.share() > 1.0);
+        let faster = rows.iter().filter(|row| row.ratio() > 1.0);
         text.push_str(&format!(
-            "\nFiles of about {rate} bits per pixel:\n{}\nWorse: ours is slower than {}.\n",
+            "\nFiles of about {rate} bits per pixel:\n{}\nFaster than ours: {}.\n",
             table.finish(),
             list_or_none(faster.map(|row| row.decoder)),
         ));
@@ -430,7 +439,7 @@ fn ratios(all: &[RateResults]) -> String {
     text
 }
 
-/// What our decoder's time consists of, and how it is with threads, thumbnails and beginnings.
+/// Tables of our decoder: its stages; threads, thumbnails and prefixes; memory.
 fn breakdown(all: &[RateResults], pictures: &[TestPicture]) -> String {
     let floor = kernel_benchmark::seconds_per_evaluation();
     let mut stages = Table::new(&[
@@ -445,26 +454,21 @@ fn breakdown(all: &[RateResults], pictures: &[TestPicture]) -> String {
     ]);
     let mut gains = Table::new(&[
         "bpp",
-        "all threads, times as fast",
-        "one file each, times as many",
-        "thumbnail, times as fast",
-        "its PSNR to one of all Gaussians, dB",
-        "first tenth, share of the time",
-        "and at a quarter of the size",
+        "speedup of all threads, one file",
+        "speedup of all threads, a file each",
+        "speedup of a thumbnail",
+        "PSNR of the thumbnail in dB",
+        "time of the first tenth",
+        "time of its preview",
         "Gaussians in it",
     ]);
-    let mut memory = Table::new(&[
-        "bpp",
-        "beside file and output, kB",
-        "of which listed Gaussians, kB",
-        "the rest, kB",
-    ]);
+    let mut memory = Table::new(&["bpp", "all, kB", "list of Gaussians, kB", "the rest, kB"]);
     for RateResults { rate, ours, .. } in all {
         let mean = |get: fn(&DecoderProfile) -> f64| mean(ours.iter().map(get)).unwrap_or(f64::NAN);
         let of = |get: fn(&DecoderProfile) -> f64| median(ours.iter().map(get)).unwrap_or(f64::NAN);
         let spread = |get: fn(&DecoderProfile) -> f64| {
-            let [least, most] = min_and_max(ours.iter().map(get));
-            format!("{:.2} ({least:.2} to {most:.2})", of(get))
+            let [least, largest] = min_and_max(ours.iter().map(get));
+            format!("{:.2} ({least:.2} to {largest:.2})", of(get))
         };
         let pixels = f64::from(pictures[0].width * pictures[0].height);
         let [whole, parse, output] = [mean(|t| t.whole), mean(|t| t.parse), mean(|t| t.output)];
@@ -499,17 +503,18 @@ fn breakdown(all: &[RateResults], pictures: &[TestPicture]) -> String {
         ]);
     }
     format!(
-        "\n### Where the time goes\n\nOurs, one thread. The output is what a picture without \
-         Gaussians takes; the floor is what the evaluations would take in a loop of nothing but \
-         them, whose data stay in registers and in the first cache: {:.3} ns each on this machine, \
-         in this run.\n{}\n### Less than all\n\nCompared with ours for the whole picture on one \
-         thread. Thumbnails are 1/{THUMBNAIL} as wide and as high and take as many of the layers as \
-         make a fair one; the first tenth of the bytes is shown at the whole picture's size, and \
-         smaller as a preview; all times start from the file in memory. All threads decode one \
-         file together; what they do when each has a file of its own is what the machine allows. \
-         Ratios are medians of those of the pictures, with the least and the most where \
-         threads are used; shares are means.\n{}\n### Memory\n\nMost \
-         bytes held at a time with one thread.\n{}",
+        "\n### Stages\n\nOur decoder with one thread. The time of the output is that of a picture \
+         without Gaussians. The floor of splatting is the time that the kernel evaluations would \
+         take in a loop of nothing else, whose data stay in registers and the first-level cache: \
+         {:.3} ns each on this machine, in this run.\n{}\n### Threads and partial \
+         decoding\n\nCompared with: our decoder for the whole picture with one thread, from the \
+         file in memory. A thumbnail has 1/{THUMBNAIL} of the width and height and is made from as \
+         many layers as that size needs; its PSNR is against a thumbnail made from all layers. \
+         The first tenth of the bytes is rendered at full size, and as a preview of 1/{PREVIEW} \
+         of the width and height. The speedup of threads that decode a file each, in files per \
+         second, is what the machine allows. Speedups are medians over the pictures, those of \
+         threads with the least and the largest; all else are means.\n{}\n### Memory\n\nPeak \
+         memory with one thread, without the file and the output.\n{}",
         1e9 * floor,
         stages.finish(),
         gains.finish(),
@@ -517,7 +522,7 @@ fn breakdown(all: &[RateResults], pictures: &[TestPicture]) -> String {
     )
 }
 
-/// A small region of a large picture.
+/// Times a small region of a large picture.
 fn region(bench: &Bench) -> Result<String> {
     let mut store = bench.store(
         "decode-region.csv",
@@ -554,10 +559,11 @@ fn region(bench: &Bench) -> Result<String> {
     })?;
     let [gaussians, whole, whole_rendered, region, region_rendered] = values;
     Ok(format!(
-        "\n### A region\n\nCompared with ours for the whole picture on one thread: {REGION} x \
-         {REGION} pixels in the middle of {} mirrored to {width} x {height}, {rate} bits per pixel, \
-         {gaussians} Gaussians. From a file that is open already, as a viewer has it: {:.3} ms \
-         against {:.2} ms, {:.0} times as fast. From the bytes, of which the layers that show are decoded: \
+        "\n### A region\n\nCompared with: our decoder for the whole picture, both with one thread. \
+         The region is {REGION} x {REGION} pixels in the middle of {} mirrored to {width} x \
+         {height}, at {rate} bits per pixel, {gaussians} Gaussians. Rendering, from Gaussians \
+         that are decoded already, as in a viewer: {:.3} ms against {:.2} ms, {:.0} times as \
+         fast. Decoding and rendering, from the bytes, only the layers that reach the region: \
          {:.2} ms against {:.2} ms, {:.1} times as fast.\n",
         picture.name,
         1000.0 * region_rendered,

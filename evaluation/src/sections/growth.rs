@@ -19,7 +19,7 @@ const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
 /// The effort with which growth is measured: it only scales the number of iterations.
 const GROWTH_EFFORT: u8 = 1;
 
-/// What a size and a number of Gaussians cost.
+/// What a picture of some size with some number of Gaussians costs.
 #[derive(Clone, Copy, Debug)]
 struct Cost {
     megapixels: f64,
@@ -27,7 +27,7 @@ struct Cost {
     psnr: f64,
     /// Kernel evaluations of training, per pixel and iteration.
     evaluations: f64,
-    /// What each took on average, in nanoseconds of wall-clock time.
+    /// Encoding time divided by the evaluations.
     nanoseconds: f64,
     encode: f64,
     encode_memory: f64,
@@ -35,7 +35,7 @@ struct Cost {
     decode_memory: f64,
 }
 
-/// A figure of a cost with its name.
+/// A quantity of [`Cost`] with its name.
 type Quantity = (&'static str, fn(&Cost) -> f64);
 
 const MEBIBYTE: f64 = (1 << 20) as f64;
@@ -109,12 +109,13 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
     let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
 
     let mut text = format!(
-        "\n### Growth\n\nCompared with itself: our codec alone, at effort {GROWTH_EFFORT}, on {}, \
-         cut or continued in mirror images. Other efforts multiply the encoding time by their \
-         iterations. Evaluations are those of the kernel in training, each with its gradient, per \
-         pixel and iteration; what each takes is the whole encoding time shared among them. Memory is what the program's allocator gave out at a time, at most: to the \
-         encoder beside the source, to the decoder (with all threads) beside the file, its samples \
-         included.\n",
+        "\n### Growth\n\nCompared with each other: our codec at effort {GROWTH_EFFORT} with \
+         growing numbers of pixels and Gaussians, on {}, cropped or continued in mirror images. \
+         The encoding time of other efforts grows with their iterations. Evaluations are kernel \
+         evaluations in training, each with its gradient, per pixel and iteration; the time of \
+         each is the whole encoding time divided by their number. Memory is peak memory: of the \
+         encoder without the source, of the decoder (with all threads) without the file, its \
+         samples included.\n",
         picture.name
     );
     for (name, title, costs, x) in [
@@ -173,15 +174,15 @@ fn growth_table(costs: &[Cost]) -> String {
     table.finish()
 }
 
-/// Says which costs grow faster than what makes them grow, from the first to the last.
+/// Says by which factors the costs grow from the first to the last, and which grow faster than `x`.
 fn steeper(costs: &[Cost], (label, x): Quantity) -> String {
     let [first, .., last] = costs else { return String::new() };
     let grown = |of: fn(&Cost) -> f64| of(last) / of(first);
     let base = grown(x);
-    let factors = COSTS.iter().map(|(name, of)| format!("{name} {:.1}", grown(*of)));
+    let factors = COSTS.iter().map(|(name, of)| format!("{name} by {:.1}", grown(*of)));
     let steep = COSTS.iter().filter(|(_, of)| grown(*of) > base).map(|(name, _)| *name);
     format!(
-        "\nFor {base:.1} times the {label}, times more of: {}. Worse than in proportion: {}.\n",
+        "\n{base:.1} times the {label} multiply: {}. More than in proportion: {}.\n",
         factors.collect::<Vec<_>>().join(", "),
         list_or_none(steep),
     )
@@ -217,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_grows_faster_than_its_cause_is_named() {
+    fn what_grows_more_than_in_proportion_is_named() {
         let cost = |megapixels: f64, encode: f64| Cost {
             megapixels,
             gaussians: 1.0,
@@ -231,9 +232,12 @@ mod tests {
         };
         let costs = [cost(0.5, 1.0), cost(1.0, 2.0), cost(2.0, 5.0)];
         let text = steeper(&costs, ("megapixels", |cost| cost.megapixels));
-        assert!(text.contains("For 4.0 times the megapixels"), "{text}");
-        assert!(text.contains("encoding time 5.0") && text.contains("decoder's memory 1.0"));
-        assert!(text.ends_with("Worse than in proportion: encoding time.\n"), "{text}");
+        assert_eq!(
+            text,
+            "\n4.0 times the megapixels multiply: encoding time by 5.0, decoding time, one thread \
+             by 4.0, decoding time, all threads by 4.0, encoder's memory by 4.0, decoder's memory \
+             by 1.0. More than in proportion: encoding time.\n"
+        );
         assert_eq!(steeper(&costs[..1], ("megapixels", |cost| cost.megapixels)), "");
     }
 }

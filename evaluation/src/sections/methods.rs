@@ -5,9 +5,9 @@ use image_gip::training::{Filter, Schedule, Training};
 
 /// Iterations of the paper.
 pub(crate) const PAPER_ITERATIONS: u32 = 50_000;
-/// Where the paper halves its learning rates, as a share of all iterations.
+/// The interval at which the paper halves its learning rates, as a share of all iterations.
 const HALVING: f64 = 0.4;
-/// What GaussianImage adds to every variance, in square pixels.
+/// The filter of GaussianImage: what it adds to every variance, in square pixels.
 const GAUSSIAN_IMAGE_FILTER: Filter = Filter::Constant(0.5);
 
 /// The parameterizations, as tables call them.
@@ -17,17 +17,19 @@ pub(crate) const CHARTS: [(&str, Chart); 3] = [
     ("rotation and scale", Chart::RotationScale),
 ];
 
-/// What iterations and schedules mean in the tables.
+/// How the published methods were run, for the text of sections.
 pub(crate) fn description(iterations: u32) -> String {
     format!(
-        "The published methods run for {iterations} iterations (the paper: {PAPER_ITERATIONS}) and halve \
-         their learning rates at the same share ({HALVING}) of them; all else is as published. \
-         With fewer iterations than the paper's they are worse than they can be. All run in this \
-         crate, with its renderer and optimizer, on this machine's processor."
+        "The published methods run for {iterations} iterations (the paper: {PAPER_ITERATIONS}) and \
+         halve their learning rates each time the same share ({HALVING}) of the iterations has \
+         passed; all else is as published. With fewer iterations than in the paper they are worse \
+         than they can be. All run in this crate, with its renderer and optimizer, on this \
+         machine's processor."
     )
 }
 
-/// GaussianImage++ in a shorter time, with or without its two components.
+/// GaussianImage++ with fewer iterations, with or without its two components: distortion-driven
+/// densification (D3) and the context-aware filter (CAF).
 pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Training {
     let mut training = Training::paper();
     training.iterations = iterations;
@@ -43,7 +45,7 @@ pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Train
     training
 }
 
-/// Ours, with bit depths of position, shape and colour.
+/// Our training, with bit depths of position, shape and colour.
 pub(crate) fn ours(iterations: u32, [position, shape, color]: [u8; 3]) -> Training {
     let mut training = Training::fast(iterations);
     training.quantization.position_bits = position;

@@ -7,13 +7,13 @@ use image_gip::{Precision, Target};
 use super::float_file::FloatFile;
 use super::methods;
 use crate::bench::Bench;
-use crate::comparison::{Better, NamedFigures, where_worse};
+use crate::comparison::{Better, NamedFigures, better_than};
 use crate::curve::{Curve, bd_rate};
 use crate::gip::{self, MeasuredFile};
 use crate::pictures::TestPicture;
 use crate::table::{Table, decibels, mean, percent};
 
-/// Bits of a coordinate: the paper's, and so many that they are as good as exact.
+/// Bits of a coordinate: the paper's, and enough for positions that are practically exact.
 const PAPER: u8 = 12;
 const FINE: u8 = 16;
 /// Bits of shape and colour: the paper's.
@@ -25,9 +25,9 @@ const PRINTED: [f64; 2] = [0.2511, 0.1777];
 /// How positions are stored.
 #[derive(Clone, Copy, Debug)]
 enum PositionFormat {
-    /// Trained with LSQ+ of so many bits: [`PAPER`] or [`FINE`].
+    /// Trained with LSQ+ quantizers of so many bits: [`PAPER`] or [`FINE`].
     Trained(u8),
-    /// From the fit with [`FINE`] bits, changed afterwards, with so many bits of a coordinate.
+    /// Trained with [`FINE`] bits and then rounded by a function to so many bits per coordinate.
     Rounded(u8, fn(&mut FloatFile)),
 }
 
@@ -39,7 +39,7 @@ const FORMATS: [(&str, PositionFormat); 5] = [
     ("half floats before tanh", PositionFormat::Rounded(16, half_before_tanh)),
 ];
 
-/// Of one picture, or on average.
+/// Means over the pictures.
 #[derive(Clone, Copy, Debug)]
 struct FormatMeans {
     rate: f64,
@@ -63,7 +63,7 @@ pub(super) fn measure(
     for &count in counts {
         let mut all = vec![Vec::new(); FORMATS.len()];
         for picture in pictures {
-            // All that is rounded afterwards comes from one fit.
+            // The fit that all rounded formats start from.
             let mut fine = None;
             for ((name, format), all) in FORMATS.iter().zip(&mut all) {
                 let key = [*name, &iterations.to_string(), &count.to_string(), &picture.name];
@@ -78,17 +78,17 @@ pub(super) fn measure(
         }
     }
     Ok(format!(
-        "\n### Positions as half floats\n\nCompared with: LSQ+ positions, in our own encoder at \
-         {iterations} iterations, with equal numbers of Gaussians, shapes of {SHAPE} and colours \
-         of {COLOR} bits by LSQ+ in all rows. The first two rows are trained with their \
-         quantizers. The others are the fit of the second row whose positions were rounded after \
-         training: to a uniform grid of {PAPER} bits between the least and the largest; to IEEE \
-         half floats of pixels, the coordinates of GaussianImage++; and to half floats of atanh(2 \
-         x / width - 1), as GaussianImage stores them, but for centres outside of the picture, \
-         which that cannot tell and which stay as they are. So half floats get no training that \
-         adapts to them, and LSQ+ in the third row neither. Sizes are whole files; those of \
-         rounded rows are the second row's less the bits saved. Means; {}. The printed row is the \
-         paper's, over its own rates.\n{}",
+        "\n### Positions as half floats\n\nCompared with: positions by LSQ+. All rows are of our \
+         encoder at {iterations} iterations, packed, with equal numbers of Gaussians, and with \
+         shapes of {SHAPE} bits and colours of {COLOR} bits by LSQ+; they differ in the positions. \
+         The first two rows are trained with their quantizers. The others take the fit of the \
+         second row and round its positions after training, so that nothing adapts to the \
+         rounding: to a uniform grid of {PAPER} bits between the least and the largest \
+         coordinate; to IEEE half floats of pixels, the coordinates of GaussianImage++; and to \
+         half floats of atanh(2 x / width - 1), the coordinates of GaussianImage, where centres \
+         outside of the picture have no such coordinate and are not rounded. Sizes are those of \
+         whole files; for rounded rows, the second row's minus the bits saved. Means; {}. The \
+         printed row is the paper's, over its own rates.\n{}",
         bench.pictures_used(pictures.len()),
         text(counts, &rows),
     ))
@@ -127,11 +127,11 @@ fn text(counts: &[u32], rows: &[Vec<FormatMeans>]) -> String {
         ("MS-SSIM", Better::Higher),
         ("bits per Gaussian", Better::Lower),
     ];
-    format!("{}{}", table.finish(), where_worse(&figures, &named[0], &named[1..]))
+    format!("{}{}", table.finish(), better_than(&figures, &named[0], &named[1..]))
 }
 
-/// Bits per pixel, bits per Gaussian, PSNR as floats, MS-SSIM. `fine` is the fit with [`FINE`]
-/// bits, made when it is first needed.
+/// Bits per pixel, bits per Gaussian, PSNR of the float rendering, MS-SSIM. `fine` is the fit with
+/// [`FINE`] bits, made when it is first needed.
 fn stored(
     format: PositionFormat,
     count: u32,
@@ -172,7 +172,7 @@ fn stored(
     Ok([picture.rate(bytes), 8.0 * bytes / gaussians, psnr, ms_ssim])
 }
 
-/// The nearest of as many steps as the paper's bits give, per axis.
+/// Rounds to a uniform grid along each axis, with as many steps as the paper's bits give.
 fn uniform(file: &mut FloatFile) {
     for axis in 0..2 {
         let values = || file.gaussians.iter().map(|row| row[axis]);
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
     use image_gip::Kernel;
 
-    /// How far each rounding moves centres all over a picture of 768 x 512, at most, along x.
+    /// The largest distance that a rounding moves centres along x, in a picture of 768 x 512.
     fn largest_move(round: fn(&mut FloatFile)) -> f32 {
         let xs = (0..7680).map(|i| 0.05 + 0.1 * i as f32);
         let rows = xs.map(|x| [x, 100.0, 1.0, 0.0, 1.0, 0.1, 0.1, 0.1]).collect();

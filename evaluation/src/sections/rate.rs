@@ -8,7 +8,7 @@ use image_gip::Target;
 
 use crate::baselines::{BASELINES, Baseline, DESCRIPTION, Worker};
 use crate::bench::Bench;
-use crate::comparison::{Better, NamedFigures, list_or_none, where_worse};
+use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::pictures::TestPicture;
@@ -19,14 +19,14 @@ use crate::table::{Table, decibels, from_decibels, mean, percent};
 /// Rates in bits per pixel at which our codec is measured.
 const RATES: [f64; 9] = [0.1, 0.15, 0.2, 0.25, 0.35, 0.5, 0.75, 1.0, 1.25];
 const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.05];
-/// Of the baselines' settings a quick run takes one in so many, and the last.
+/// A quick run takes one in so many of a baseline's settings, and the last.
 const QUICK_STEP: usize = 3;
-/// Rates of the tables.
+/// Rates that the tables show.
 const TABLE_RATES: [f64; 6] = [0.15, 0.25, 0.35, 0.5, 0.75, 1.0];
-/// Rates over which mean differences are taken.
+/// The range of rates for BD-rates and plots.
 const BD_RANGE: (f64, f64) = (0.1, 1.25);
 
-/// One file.
+/// What one file contributes to a rate-distortion curve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     bytes: f64,
@@ -36,7 +36,7 @@ pub(super) struct Point {
     ms_ssim: f64,
 }
 
-/// All files that were measured.
+/// Measurements of whole files at many settings, for every codec: `rate.csv`.
 #[derive(Debug)]
 pub(super) struct RateStore(Store<3, 4>);
 
@@ -87,13 +87,13 @@ impl RateStore {
     }
 }
 
-/// All files of a codec.
+/// A codec with the measurements of all its files.
 #[derive(Debug)]
 struct Codec {
     id: &'static str,
     name: &'static str,
     settings: Vec<String>,
-    /// Picture by picture, and in each setting by setting.
+    /// For each picture, a point for each setting.
     points: Vec<Vec<Point>>,
 }
 
@@ -121,7 +121,7 @@ impl Metric {
         }
     }
 
-    /// The mean over pictures, of qualities in dB.
+    /// The mean over pictures in dB, of qualities in dB.
     fn average(self, qualities: &[f64]) -> Option<f64> {
         match self {
             Self::Psnr => mean(qualities.iter().copied()),
@@ -131,8 +131,8 @@ impl Metric {
         }
     }
 
-    /// That mean as tables show it.
-    fn mean(self, qualities: &[f64]) -> Option<String> {
+    /// That mean, formatted for a table.
+    fn mean_cell(self, qualities: &[f64]) -> Option<String> {
         self.average(qualities).map(|quality| match self {
             Self::Psnr => format!("{quality:.2}"),
             Self::MsSsim => format!("{:.4} ({quality:.2})", from_decibels(quality)),
@@ -174,7 +174,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         rates(bench.quick).iter().map(f64::to_string).collect::<Vec<_>>().join(", "),
     );
     if let Some(path) = &bench.reference {
-        text.push_str(&reference(path, bench, &codecs)?);
+        text.push_str(&against_reference(path, bench, &codecs)?);
     }
     for metric in Metric::ALL {
         let plot = plot(bench, &codecs, metric)?;
@@ -183,7 +183,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             metric.name(),
             at_equal_rates(&codecs, metric),
             mean_curves(&codecs, metric),
-            differences(bench, &codecs, metric),
+            bd_rates(bench, &codecs, metric),
         ));
     }
     Ok(text)
@@ -233,8 +233,8 @@ fn codecs(bench: &mut Bench) -> Result<Vec<Codec>> {
     Ok(codecs)
 }
 
-/// A table with one row per codec, one column per rate, and at which rates which codecs are better
-/// than ours; `quality` is in dB, `None` where there is none to compare.
+/// A table with one row per codec and one column per rate, followed by the codecs that are better
+/// than ours and at which rates. `quality` is in dB, `None` where there is nothing to compare.
 fn by_rate(
     codecs: &[Codec],
     metric: Metric,
@@ -255,7 +255,7 @@ fn by_rate(
     }
     let figures = names.map(|name| format!("{} at {name}", metric.name()));
     let figures = figures.each_ref().map(|figure| (figure.as_str(), Better::Higher));
-    format!("{}{}", table.finish(), where_worse(&figures, &compared[0], &compared[1..]))
+    format!("{}{}", table.finish(), better_than(&figures, &compared[0], &compared[1..]))
 }
 
 fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
@@ -270,34 +270,34 @@ fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
         metric,
         |codec, rate| metric.average(&all(codec, rate)?),
         |codec, rate| {
-            let shown = all(codec, rate).and_then(|all| metric.mean(&all));
+            let shown = all(codec, rate).and_then(|all| metric.mean_cell(&all));
             shown.unwrap_or_else(|| {
                 format!("({}/{} reach)", reached(codec, rate).len(), codec.points.len())
             })
         },
     );
     format!(
-        "\nEvery picture at exactly this rate: each picture's own curve interpolated, then the \
-         mean. Where some pictures have no files on both sides of the rate, there is no \
-         mean.\n{table}"
+        "\nMean over the pictures at equal rates: the curve of each picture is interpolated at \
+         exactly this rate. There is no mean where the curves of some pictures do not reach the \
+         rate.\n{table}"
     )
 }
 
 fn mean_curves(codecs: &[Codec], metric: Metric) -> String {
     let quality = |codec: &Codec, rate: f64| codec.mean_curve(metric).quality(rate);
     let table = by_rate(codecs, metric, quality, |codec, rate| {
-        let shown = quality(codec, rate).and_then(|quality| metric.mean(&[quality]));
+        let shown = quality(codec, rate).and_then(|quality| metric.mean_cell(&[quality]));
         shown.unwrap_or_else(|| "-".into())
     });
     format!(
-        "\nThe mean curve, as papers plot it: mean rate and mean quality at each setting, \
-         interpolated. Settings of equal quality give more bits to difficult pictures; ours are \
-         settings of equal rate.\n{table}"
+        "\nThe mean curve, as papers plot it: mean rate and mean quality over the pictures at each \
+         setting, interpolated. Settings that mean equal quality spend more bits on difficult \
+         pictures; our settings mean equal rate.\n{table}"
     )
 }
 
-/// Mean differences in rate, picture by picture and on average.
-fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
+/// BD-rates, for each picture and on average.
+fn bd_rates(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
     let [ours, others @ ..] = codecs else { return String::new() };
     let mut columns = vec!["picture"];
     columns.extend(others.iter().map(|codec| codec.name));
@@ -330,7 +330,7 @@ fn differences(bench: &Bench, codecs: &[Codec], metric: Metric) -> String {
         list_or_none(of_kind.map(|(codec, _)| codec.name))
     };
     format!(
-        "\nBD-rate of our codec against each other one, from {} to {} bits per pixel: how much \
+        "\nBD-rate of our codec against each of the others, from {} to {} bits per pixel: how much \
          larger (+) or smaller (-) our files are at equal {}.\n{}\nOurs is worse than: {}. It is \
          better than: {}.\n",
         BD_RANGE.0,
@@ -365,8 +365,8 @@ fn plot(bench: &Bench, codecs: &[Codec], metric: Metric) -> Result<String> {
     Ok(name)
 }
 
-/// Compares the baselines' files with the same ones of another source.
-fn reference(path: &Path, bench: &Bench, codecs: &[Codec]) -> Result<String> {
+/// Compares our measurements of the baselines with those of a CSV, at equal settings.
+fn against_reference(path: &Path, bench: &Bench, codecs: &[Codec]) -> Result<String> {
     let columns = ["codec", "quality", "image", "bytes", "psnr", "msssim"];
     let mut reader =
         csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -384,7 +384,7 @@ fn reference(path: &Path, bench: &Bench, codecs: &[Codec]) -> Result<String> {
             cell(index).parse::<f64>().with_context(|| format!("{}: {row:?}", path.display()))
         };
         let image = cell(2).trim_end_matches(".png").to_owned();
-        // Bits: equal settings are written alike as numbers, not as text.
+        // By value: "0.50" and "0.5" are one setting.
         let key = (cell(0).to_owned(), number(1)?.to_bits(), image);
         known.insert(key, [number(3)?, number(4)?, number(5)?]);
     }
@@ -416,7 +416,8 @@ fn reference(path: &Path, bench: &Bench, codecs: &[Codec]) -> Result<String> {
     }
     ensure!(compared > 0, "{} has none of these files", path.display());
     Ok(format!(
-        "\nThe baselines against {}, which other programs measured:\n{}",
+        "\nOur measurements of the baselines against those in {}, which were made by other \
+         programs:\n{}",
         path.file_name().unwrap_or_default().to_string_lossy(),
         table.finish()
     ))

@@ -6,7 +6,7 @@ use image_gip::{Chart, Precision, Target};
 
 use super::{methods, two_level};
 use crate::bench::Bench;
-use crate::comparison::{Better, NamedFigures, where_worse};
+use crate::comparison::{Better, NamedFigures, better_than};
 use crate::gip;
 use crate::pictures::TestPicture;
 use crate::table::{Table, mean};
@@ -15,7 +15,7 @@ use crate::table::{Table, mean};
 const GAUSSIANS: [u32; 2] = [5_000, 10_000];
 const QUICK_GAUSSIANS: [u32; 1] = [5_000];
 const QUICK_PICTURES: usize = 1;
-/// The effort beside the default one: what it gains over the next is next to nothing.
+/// The effort that is shown beside the default one; a higher one gains next to nothing.
 const BEST_EFFORT: u8 = 8;
 /// Attributes of a Gaussian: two for the centre, three for the shape, three for the colour.
 const PARAMETERS: f64 = 8.0;
@@ -70,14 +70,14 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         ("two levels, like LIG", Method::TwoLevels(without(Chart::Covariance))),
     ];
     let mut text = format!(
-        "Compared with: GaussianImage, GaussianImage++, the direct covariance without its two \
-         components, and two levels of that: a fifth of the Gaussians for a picture of half the \
-         size, the others for what is then missing at full size, each for all iterations; LIG's \
-         own constants are not used. {} Ours is the encoder at effort {}, its default, and \
-         {BEST_EFFORT}. Attributes are 32-bit \
-         floats; PSNR is that of the float rendering, as papers have it. Memory is what the \
-         encoder holds beside the source, at most. Means; {}; all threads. Rows marked as printed \
-         are the paper's own figures for all of Kodak on an NVIDIA A30, with GPU memory.\n",
+        "Compared with: GaussianImage; GaussianImage++, with and without its two components; and a \
+         two-level method like LIG: GaussianImage++ without its components, with a fifth of the \
+         Gaussians for the picture at half its size and the others for the residual at full size, \
+         each trained for all iterations, without LIG's own constants. {} Ours is the encoder at \
+         effort {}, its default, and {BEST_EFFORT}. Attributes are 32-bit floats; PSNR is that of \
+         the float rendering, as in papers. Memory is the encoder's peak memory without the \
+         source. Means; {}; all threads. Rows marked as printed are the paper's own figures for \
+         all of Kodak on an NVIDIA A30, with GPU memory.\n",
         methods::description(iterations),
         gip::EFFORT,
         bench.pictures_used(pictures.len()),
@@ -114,12 +114,12 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             compared.push((format!("*{method}*"), figures.to_vec()));
         }
         text.push_str(&format!("\n{count} Gaussians:\n{}", table.finish()));
-        text.push_str(&where_worse(&CRITERIA, &compared[0], &compared[1..]));
+        text.push_str(&better_than(&CRITERIA, &compared[0], &compared[1..]));
     }
     Ok(text)
 }
 
-/// PSNR, MS-SSIM, Gaussians used, bytes held, seconds, frames per second.
+/// PSNR, MS-SSIM, Gaussians used, peak memory in bytes, seconds, frames per second.
 fn fit(method: &Method, count: u32, picture: &TestPicture) -> Result<[f64; 6]> {
     let (effort, training) = match method {
         Method::TwoLevels(training) => {

@@ -1,4 +1,4 @@
-//! Time against error, next to the baselines.
+//! Encoding and decoding time against PSNR, of our codec and the baselines.
 
 use anyhow::Result;
 use image_gip::Target;
@@ -7,16 +7,16 @@ use super::growth;
 use super::rate::RateStore;
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::{Bench, timing_version};
-use crate::comparison::{Better, NamedFigures, where_worse};
+use crate::comparison::{Better, NamedFigures, better_than};
 use crate::gip;
 use crate::pictures::TestPicture;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::Table;
 
-/// The rate that all files have, about.
+/// The rate of all files, approximately, in bits per pixel.
 const RATE: f64 = 0.5;
-/// On how many pictures.
+/// How many pictures are coded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
 const EFFORTS: [u8; 9] = [1, 2, 3, 4, 5, 6, 7, 8, 9];
@@ -24,7 +24,7 @@ const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
 
-/// What the codecs are judged by.
+/// What the codecs are compared by.
 const CRITERIA: [(&str, Better); 5] = [
     ("PSNR at about this rate", Better::Higher),
     ("encoding time with one thread", Better::Lower),
@@ -34,13 +34,13 @@ const CRITERIA: [(&str, Better); 5] = [
 ];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let rows = against_error(bench)?;
+    let rows = measure_all(bench)?;
     let mut text = format!(
-        "Compared with: {DESCRIPTION} Each is at the setting that comes nearest to {RATE} bits per \
-         pixel on each picture; ours is asked for {RATE} at every effort. Wall-clock time from \
-         samples in memory to a file in memory and back, means; {}; all threads are {}. JPEG, JPEG \
-         2000 and WebP have one thread here in any case. Other programs on the machine make times \
-         longer.\n",
+        "Compared with: {DESCRIPTION} On each picture they are at the setting whose rate is \
+         nearest to {RATE} bits per pixel; ours is asked for {RATE} bits per pixel at every \
+         effort. Times are wall-clock times from samples in memory to a file in memory and back. \
+         Means; {}; all threads are {}. JPEG, JPEG 2000 and WebP use one thread in any case. Other \
+         programs that run on the machine make the times longer.\n",
         bench.pictures_used(pictures(bench).len()),
         cores(),
     );
@@ -89,7 +89,7 @@ fn pictures(bench: &Bench) -> Vec<TestPicture> {
     bench.sample(if bench.quick { QUICK_PICTURES } else { PICTURES })
 }
 
-fn against_error(bench: &mut Bench) -> Result<Vec<CodecRow>> {
+fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
     let mut store = bench.store(
         "speed.csv",
         ["codec", "quality", "threads", "image"],
@@ -138,7 +138,8 @@ fn against_error(bench: &mut Bench) -> Result<Vec<CodecRow>> {
     Ok(rows)
 }
 
-/// Of settings from small files to large ones, that whose rate is nearest to the one `wanted`.
+/// The setting whose rate is nearest to `wanted`, by bisection. `settings` go from small files to
+/// large ones.
 pub(super) fn nearest<'a>(
     settings: &[&'a str],
     wanted: f64,
@@ -211,7 +212,7 @@ fn table(rows: &[CodecRow]) -> String {
     table.finish()
 }
 
-/// What our codec at its default effort is worse at than which others.
+/// In what our codec at its default effort is worse than the baselines.
 fn worse_than_baselines(rows: &[CodecRow]) -> String {
     let default = format!("effort {}", gip::EFFORT);
     let Some(ours) = rows.iter().find(|row| row.setting == default) else {
@@ -224,7 +225,7 @@ fn worse_than_baselines(rows: &[CodecRow]) -> String {
     let others: Vec<NamedFigures> =
         rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
     let (name, figures) = named(ours);
-    where_worse(
+    better_than(
         &CRITERIA,
         &(format!("{name} at its default effort ({})", gip::EFFORT), figures),
         &others,

@@ -1,5 +1,5 @@
-//! Numerical stability: the decoder against exact arithmetic and against itself, the encoder on
-//! hard pictures.
+//! Numerical stability: the decoder against f64 and against its own other paths, the encoder on
+//! pictures that are hard to fit.
 
 use anyhow::{Context, Result, ensure};
 use image_gip::{
@@ -13,7 +13,7 @@ use crate::comparison::list_or_none;
 use crate::gip;
 use crate::table::Table;
 
-/// Size of the pictures made of chosen Gaussians.
+/// Size of the pictures of chosen Gaussians.
 const SIZE: (u32, u32) = (96, 64);
 /// Gaussians and effort for the hard pictures.
 const GAUSSIANS: u32 = 500;
@@ -23,7 +23,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     Ok(format!("{}{}{}", decoder(bench)?, product_tests::measure()?, encoder(bench)?))
 }
 
-/// Gaussians that strain the arithmetic.
+/// Gaussians that are extreme for the arithmetic.
 fn cases() -> Vec<(&'static str, Vec<[f32; COMPONENTS]>)> {
     let (width, height) = (SIZE.0 as f32, SIZE.1 as f32);
     let mut random = fastrand::Rng::with_seed(gip::SEED);
@@ -80,8 +80,8 @@ fn decoder(bench: &Bench) -> Result<String> {
         "Gaussians",
         "kernel",
         "largest difference from f64",
-        "scalar from SIMD",
-        "one thread from all",
+        "scalar against SIMD",
+        "one thread against all",
         "samples that are not finite",
     ]);
     let mut worst: Vec<(f64, String)> = Vec::new();
@@ -121,7 +121,7 @@ fn decoder(bench: &Bench) -> Result<String> {
             worst.push((from_f64, name));
         }
     }
-    // What is not a number comes first.
+    // The largest first, and NaN before all.
     worst.sort_by(|a, b| b.0.total_cmp(&a.0));
     let worst = worst
         .iter()
@@ -129,10 +129,11 @@ fn decoder(bench: &Bench) -> Result<String> {
         .map(|(difference, name)| format!("{name}: {:.2} steps of 8 bits", 255.0 * difference));
     Ok(format!(
         "### Decoder\n\nCompared with: the formula of the specification in f64, on files of chosen \
-         Gaussians, {} x {} pixels; 1 is a full sample, and an 8-bit step is 3.9e-3. The \
-         exponential kernel ends with a step of 1/255 of the amplitude, on whose two sides f32 and \
-         f64 may lie; the quartic one has none. The last three columns must be zero; SIMD is the \
-         widest that this machine has.\n{}\nWorst: {}. Not zero where it must be: {}.\n",
+         Gaussians, {} x {} pixels. A full sample is 1, an 8-bit step 3.9e-3. The exponential \
+         kernel drops to zero at its cut-off, where it is 1/255; a pixel near the cut-off may lie \
+         inside it in f32 and outside in f64. The quartic kernel is continuous. The last three \
+         columns must be zero; SIMD is the widest level of this machine.\n{}\nLargest \
+         differences: {}. Not zero where it must be: {}.\n",
         SIZE.0,
         SIZE.1,
         table.finish(),
@@ -148,7 +149,7 @@ fn planes(picture: &Picture<'_>, options: &RenderOptions) -> Result<Vec<f64>> {
     Ok(planes.into_iter().map(f64::from).collect())
 }
 
-/// The largest difference; not a number if one is.
+/// The largest difference; NaN if any sample is NaN.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     let largest = |most: f64, (a, b): (&f64, &f64)| {
         let difference = if a == b { 0.0 } else { (a - b).abs() };
@@ -201,7 +202,7 @@ fn on(on: bool) -> u16 {
     if on { u16::MAX } else { 0 }
 }
 
-/// Noise that needs no state.
+/// Noise by hashing the coordinates.
 fn hash(x: u32, y: u32, c: u32) -> u16 {
     let seed = u64::from(x) << 40 | u64::from(y) << 16 | u64::from(c);
     fastrand::Rng::with_seed(seed).u16(..)
@@ -245,10 +246,10 @@ fn encoder(bench: &Bench) -> Result<String> {
     }
     Ok(format!(
         "\n### Encoder\n\nCompared with each other: pictures that are hard to fit, with at most \
-         {GAUSSIANS} Gaussians at effort {EFFORT}. Values are all those of the file's Gaussians \
-         and of its samples as floats. The file must not depend on the number of \
-         threads.\n{}\nWorst: {} ({:.2} dB). With values that are not finite, or files that depend \
-         on threads: {}.\n",
+         {GAUSSIANS} Gaussians at effort {EFFORT}. Values are those of all the \
+         file's Gaussians and of its samples as floats. The file must not depend on the number of \
+         threads.\n{}\nLowest PSNR: {} ({:.2} dB). With values that are not finite, or with a file \
+         that depends on threads: {}.\n",
         table.finish(),
         worst.1,
         worst.0,
@@ -294,7 +295,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_do_not_hide_what_is_no_number() {
+    fn nan_is_never_hidden() {
         assert_eq!(difference(&[1.0, 5.0], &[1.0, 2.0]), 3.0);
         assert_eq!(difference(&[f64::INFINITY], &[f64::INFINITY]), 0.0);
         assert!(difference(&[f64::NAN, 7.0], &[1.0, 5.0]).is_nan());
