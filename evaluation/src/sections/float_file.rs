@@ -28,7 +28,8 @@ impl FloatFile {
         Self { size, kernel, base: [0x8080; 3], gaussians }
     }
 
-    /// The Gaussians of any `.gip` file of an RGB picture.
+    /// The Gaussians of any `.gip` file of an RGB picture, but for those whose covariance has no
+    /// Cholesky factor, which are not drawn either.
     pub(super) fn read(file: &[u8]) -> Result<Self> {
         gip::open(file, |picture| {
             let header = picture.header();
@@ -39,6 +40,7 @@ impl FloatFile {
                 let [r, g, b, _] = gaussian.color;
                 [x, y, l11, l21, l22, r, g, b]
             });
+            let gaussians = gaussians.filter(|row| row.iter().all(|value| value.is_finite()));
             Ok(Self {
                 size: (header.width, header.height),
                 kernel: header.kernel,
@@ -111,5 +113,20 @@ mod tests {
             assert_eq!((read.size, read.kernel), (written.size, written.kernel));
             assert_eq!((read.base, read.gaussians), (written.base, written.gaussians));
         }
+    }
+
+    #[test]
+    fn covariances_without_a_cholesky_factor_are_left_out() {
+        // In the covariance chart: x, y, xx, xy, yy and three amplitudes.
+        let sound = [3.0, 2.0, 4.0, 2.0, 2.0, 0.5, 0.0, -0.5];
+        let indefinite = [3.0, 2.0, 4.0, 2.0, 0.5, 0.5, 0.0, -0.5];
+        let mut bytes = FloatFile::new((6, 4), Kernel::Quartic, vec![sound, indefinite]).to_bytes();
+        // The header's payload begins after the signature, a length and a kind.
+        let (kind, payload, end) = (12, 16, 16 + 36);
+        bytes[payload + 19] = 0;
+        let crc = crc32fast::hash(&bytes[kind..end]).to_le_bytes();
+        bytes[end..end + 4].copy_from_slice(&crc);
+        let read = FloatFile::read(&bytes).expect("it is RGB");
+        assert_eq!(read.gaussians, [[3.0, 2.0, 2.0, 1.0, 1.0, 0.5, 0.0, -0.5]]);
     }
 }
