@@ -4,7 +4,7 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use image_gip::{
-    ColorModel, Encoded, Encoder, Picture, RenderOptions, Source, StreamDecoder, Target,
+    ColorModel, Encoded, Encoder, Picture, RenderOptions, Source, StreamDecoder, Target, Threads,
 };
 
 const WIDTH: u32 = 256;
@@ -32,7 +32,7 @@ fn encode(pixels: &[u8]) -> Encoded {
 }
 
 fn render(picture: &Picture<'_>, options: &RenderOptions, out: &mut Vec<u8>) {
-    out.resize(options.output_len(picture.header()).expect("small"), 0);
+    out.resize(picture.output_len(options).expect("small"), 0);
     picture.render_u8(options, out).expect("within the limits");
 }
 
@@ -49,12 +49,12 @@ fn decoding(criterion: &mut Criterion) {
         bencher.iter(|| StreamDecoder::new().feed(&file));
     });
     group.throughput(Throughput::Elements(u64::from(WIDTH * HEIGHT)));
-    let serial = RenderOptions::new().parallel(false);
+    let serial = RenderOptions::new().with_threads(Threads::One);
     for (name, options) in [
         ("render", RenderOptions::new()),
         ("render, one thread", serial.clone()),
-        ("render, reference code", serial.clone().reference(true)),
-        ("render, quarter size", serial.size(WIDTH / 4, HEIGHT / 4)),
+        ("render, reference code", serial.clone().with_reference(true)),
+        ("render, quarter size", serial.with_size(WIDTH / 4, HEIGHT / 4)),
     ] {
         group.bench_function(name, |bencher| {
             bencher.iter(|| render(&picture, &options, &mut out));

@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The library reads its input once, in order, in pieces: there is no need to buffer it.
     let mut decoder = Decoder::new(File::open(input)?)?;
     let header = decoder.header().clone();
-    let count = decoder.output_len().ok_or("too large for this machine")?;
+    let count = decoder.output_len()?;
     let samples = match header.depth {
         SampleDepth::Sixteen => {
             let mut samples = vec![0; count];

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Any `Read` will do: a file, a socket, a slice.
     let mut decoder = Decoder::new(encoded.bytes.as_slice())?;
-    let mut decoded = vec![0; decoder.output_len().ok_or("too large for this machine")?];
+    let mut decoded = vec![0; decoder.output_len()?];
     decoder.decode_into(&mut decoded)?;
 
     let errors = pixels.iter().zip(&decoded).map(|(a, b)| a.abs_diff(*b));

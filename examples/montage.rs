@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         fed = bytes;
         let picture = stream.picture().ok_or("too little to know the size")?;
         let mut part = RgbImage::new(picture.header().width, picture.header().height);
-        picture.render_u8(&RenderOptions::new().color(ColorModel::Rgb), &mut part)?;
+        picture.render_u8(&RenderOptions::new().with_color(ColorModel::Rgb), &mut part)?;
         println!("{bytes} bytes, {} Gaussians", stream.gaussians().len());
         parts.push(part);
     }

@@ -48,9 +48,9 @@ fn preview(picture: &Picture<'_>) -> Result<String, Box<dyn Error>> {
     let header = picture.header();
     // A character is about twice as high as it is wide.
     let rows = (COLUMNS * header.height / header.width / 2).clamp(1, 40);
-    let options = RenderOptions::new().size(COLUMNS, rows);
+    let options = RenderOptions::new().with_size(COLUMNS, rows);
     let channels = header.color.channels();
-    let mut samples = vec![0; options.output_len(header).ok_or("too large")?];
+    let mut samples = vec![0; picture.output_len(&options)?];
     picture.render_u8(&options, &mut samples)?;
 
     let mut text = String::new();

@@ -25,35 +25,35 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Few pixels need few Gaussians, and the strongest come first: the rest need not even be read.
     let longer = width.max(height);
     let side = |side: u32| (side * THUMBNAIL).div_ceil(longer);
-    let small = RenderOptions::new().size(side(width), side(height));
+    let small = RenderOptions::new().with_size(side(width), side(height));
     decoder.read_at_least(decoder.header().gaussians_for(side(width), side(height)))?;
-    save(thumbnail, &decoder.picture(), small)?;
+    save(thumbnail, &decoder.picture()?, small)?;
 
     // What follows takes all of them.
     decoder.read_to_end()?;
-    let picture = decoder.picture();
+    let picture = decoder.picture()?;
     let middle = Region {
         x: width / 4,
         y: height / 4,
         width: width.div_ceil(2),
         height: height.div_ceil(2),
     };
-    save(crop, &picture, RenderOptions::new().region(middle))?;
+    save(crop, &picture, RenderOptions::new().with_region(middle))?;
 
     // A region is given in pixels of the output.
-    let enlarged = RenderOptions::new().size(width * CLOSE_UP, height * CLOSE_UP);
+    let enlarged = RenderOptions::new().with_size(width * CLOSE_UP, height * CLOSE_UP);
     let part = Region {
         x: (width * CLOSE_UP - width) / 2,
         y: (height * CLOSE_UP - height) / 2,
         width,
         height,
     };
-    save(close_up, &picture, enlarged.region(part))
+    save(close_up, &picture, enlarged.with_region(part))
 }
 
 /// Renders to a PPM file.
 fn save(path: &str, picture: &Picture<'_>, options: RenderOptions) -> Result<(), Box<dyn Error>> {
-    let options = options.color(ColorModel::Rgb);
+    let options = options.with_color(ColorModel::Rgb);
     let mut samples = vec![0; picture.output_len(&options)?];
     picture.render_u8(&options, &mut samples)?;
     let (width, height) = options.output_size(picture.header());

@@ -7,7 +7,12 @@ use core::fmt;
 
 use thiserror::Error;
 
-use crate::container::ChunkType;
+use crate::chunk::ChunkType;
+use crate::color::ColorModel;
+use crate::region::Region;
+
+/// Largest width and height of an output. Up to here every pixel centre is exact in `f32`.
+pub(crate) const MAX_OUTPUT_SIDE: u32 = 1 << 23;
 
 /// Why a file was not decoded, or not to its end.
 ///
@@ -54,10 +59,9 @@ pub enum DecodeError {
         /// What the limits allow.
         allowed: u64,
     },
-    /// The caller asked for something that cannot be done: a buffer of the wrong length, an empty
-    /// region, a region outside the picture.
+    /// The caller asked for something that cannot be done.
     #[error("invalid request: {0}")]
-    Request(String),
+    Request(#[from] RequestError),
     /// An earlier call failed, and the decoder cannot go on from there.
     #[error("decoding already failed")]
     AlreadyFailed,
@@ -89,6 +93,49 @@ impl DecodeError {
     pub fn is_unexpected_end(&self) -> bool {
         matches!(self, Self::UnexpectedEnd { .. })
     }
+}
+
+/// What a caller asked for that cannot be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum RequestError {
+    /// The output buffer has the wrong length.
+    #[error("the output buffer holds {found} samples, {wanted} are needed")]
+    BufferLength {
+        /// Samples that the buffer holds.
+        found: usize,
+        /// Samples that the output has.
+        wanted: usize,
+    },
+    /// The size of the whole output is out of range: each side is 1 to 2^23 pixels.
+    #[error("an output of {width}x{height} pixels; each side must be 1 to {MAX_OUTPUT_SIDE}")]
+    OutputSize {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// The region is empty or reaches beyond the output.
+    #[error(
+        "the region {}x{} at ({}, {}) is empty or not inside the {width}x{height} output",
+        region.width, region.height, region.x, region.y
+    )]
+    Region {
+        /// The region.
+        region: Region,
+        /// Width of the whole output in pixels.
+        width: u32,
+        /// Height of the whole output in pixels.
+        height: u32,
+    },
+    /// The colour model lacks a channel of the stored one.
+    #[error("{from:?} cannot be written as {to:?}")]
+    ColorModel {
+        /// The colour model of the file.
+        from: ColorModel,
+        /// The one asked for.
+        to: ColorModel,
+    },
 }
 
 /// Which bound of [`Limits`](crate::Limits) was exceeded.

@@ -1,4 +1,4 @@
-//! One Gaussian, and the charts in which its shape is stored (spec, section 8).
+//! One Gaussian, and the parameterizations in which its shape is stored (spec, section 8).
 
 use crate::math;
 
@@ -70,12 +70,12 @@ impl Gaussian {
     }
 
     /// A Gaussian from its stored components, in file order.
-    pub(crate) fn from_components(values: &[f32], chart: Chart) -> Self {
+    pub(crate) fn from_components(values: &[f32], parameterization: Parameterization) -> Self {
         let mut color = [0.0; 4];
         color[..values.len() - 5].copy_from_slice(&values[5..]);
         Self {
             center: [values[0], values[1]],
-            cholesky: chart.to_cholesky([values[2], values[3], values[4]]),
+            cholesky: parameterization.to_cholesky([values[2], values[3], values[4]]),
             color,
         }
     }
@@ -91,7 +91,7 @@ pub(crate) fn inverse_cholesky([l11, l21, l22]: [f32; 3]) -> [f32; 3] {
 /// Splatting": the three parameterizations).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Chart {
+pub enum Parameterization {
     /// The covariance itself: (xx, xy, yy) in square pixels. The paper's own choice. Not every
     /// triple is a covariance; those that are not are not drawn.
     Covariance,
@@ -102,7 +102,7 @@ pub enum Chart {
     RotationScale,
 }
 
-impl Chart {
+impl Parameterization {
     /// The code that the header stores.
     #[cfg(feature = "encode")]
     pub(crate) const fn code(self) -> u8 {
@@ -113,7 +113,7 @@ impl Chart {
         }
     }
 
-    /// The chart that a header's code names.
+    /// The parameterization that a header's code names.
     pub(crate) const fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Covariance),
@@ -153,13 +153,13 @@ mod tests {
     use crate::testing::config;
     use proptest::prelude::*;
 
-    /// The covariance that a chart's values stand for, in f64.
-    fn covariance(chart: Chart, values: [f32; 3]) -> [f64; 3] {
+    /// The covariance that a parameterization's values stand for, in f64.
+    fn covariance(parameterization: Parameterization, values: [f32; 3]) -> [f64; 3] {
         let [a, b, c] = values.map(f64::from);
-        match chart {
-            Chart::Covariance => [a, b, c],
-            Chart::Cholesky => [a * a, a * b, b * b + c * c],
-            Chart::RotationScale => {
+        match parameterization {
+            Parameterization::Covariance => [a, b, c],
+            Parameterization::Cholesky => [a * a, a * b, b * b + c * c],
+            Parameterization::RotationScale => {
                 let (sin, cos) = c.sin_cos();
                 let (a, b) = (a * a, b * b);
                 [cos * cos * a + sin * sin * b, cos * sin * (a - b), sin * sin * a + cos * cos * b]
@@ -176,17 +176,17 @@ mod tests {
         ) {
             // Comparable axes keep the direct covariance well conditioned in f32.
             let s2 = s2.clamp(s1 / 30.0, s1 * 30.0);
-            let [xx, xy, yy] = covariance(Chart::RotationScale, [s1, s2, angle]);
+            let [xx, xy, yy] = covariance(Parameterization::RotationScale, [s1, s2, angle]);
             let l11 = xx.sqrt();
             let cholesky = [l11, xy / l11, f64::from(s1) * f64::from(s2) / l11];
-            for (chart, values) in [
-                (Chart::Covariance, [xx, xy, yy].map(|v| v as f32)),
-                (Chart::Cholesky, cholesky.map(|v| v as f32)),
-                (Chart::RotationScale, [s1, s2, angle]),
+            for (parameterization, values) in [
+                (Parameterization::Covariance, [xx, xy, yy].map(|v| v as f32)),
+                (Parameterization::Cholesky, cholesky.map(|v| v as f32)),
+                (Parameterization::RotationScale, [s1, s2, angle]),
             ] {
                 let gaussian = Gaussian {
                     center: [0.0; 2],
-                    cholesky: chart.to_cholesky(values),
+                    cholesky: parameterization.to_cholesky(values),
                     color: [0.0; 4],
                 };
                 prop_assert!(gaussian.is_drawable());
@@ -194,7 +194,7 @@ mod tests {
                 let found = gaussian.covariance();
                 for (found, expected) in found.into_iter().zip([xx, xy, yy]) {
                     let error = (f64::from(found) - expected).abs();
-                    prop_assert!(error <= 4e-6 * size, "{chart:?}: {found} against {expected}");
+                    prop_assert!(error <= 4e-6 * size, "{parameterization:?}: {found} against {expected}");
                 }
             }
         }
@@ -219,12 +219,12 @@ mod tests {
         for values in
             [[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [1.0, 1.0, 1.0], [0.0; 3], [1.0, 2.0, 1.0]]
         {
-            let cholesky = Chart::Covariance.to_cholesky(values);
+            let cholesky = Parameterization::Covariance.to_cholesky(values);
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
             assert!(!gaussian.is_drawable(), "{values:?} gives {cholesky:?}");
         }
         for values in [[0.0, 1.0, 0.0], [1.0, 1.0, f32::NAN], [1.0, 1.0, 1e9], [-1.0, 1.0, 0.0]] {
-            let cholesky = Chart::RotationScale.to_cholesky(values);
+            let cholesky = Parameterization::RotationScale.to_cholesky(values);
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
             assert!(!gaussian.is_drawable(), "{values:?} gives {cholesky:?}");
         }

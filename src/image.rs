@@ -13,12 +13,13 @@ use ::image::error::{
 use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
 use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
 
+use crate::chunk::SIGNATURE;
 use crate::color::{ColorModel, SampleDepth};
-use crate::container::SIGNATURE;
-use crate::decoder::Decoder;
+use crate::decode::Decoder;
 use crate::error::{DecodeError, LimitKind};
 use crate::limits::Limits;
-use crate::render::{Region, RenderOptions};
+use crate::region::Region;
+use crate::render::RenderOptions;
 
 /// The extension of `.gip` files, in the form in which `image` keeps it.
 const EXTENSION: &str = "gip";
@@ -52,7 +53,9 @@ pub fn register() -> bool {
         };
         let registered = register_decoding_hook(
             EXTENSION.into(),
-            Box::new(move |reader| Ok(Box::new(GipDecoder::with_limits(reader, limits.clone())?))),
+            Box::new(move |reader| {
+                Ok(Box::new(GipDecoder::new_with_limits(reader, limits.clone())?))
+            }),
         );
         if registered {
             register_format_detection_hook(EXTENSION.into(), &SIGNATURE, None);
@@ -79,21 +82,21 @@ impl<R: Read> GipDecoder<R> {
     /// # Errors
     /// As [`Decoder::new`].
     pub fn new(reader: R) -> ImageResult<Self> {
-        Self::with_limits(reader, Limits::default())
+        Self::new_with_limits(reader, Limits::default())
     }
 
     /// Reads header and metadata, with the given limits.
     ///
     /// # Errors
-    /// As [`Decoder::with_limits`].
-    pub fn with_limits(reader: R, limits: Limits) -> ImageResult<Self> {
-        let decoder = Decoder::with_limits(reader, limits.clone())?;
+    /// As [`Decoder::new_with_limits`].
+    pub fn new_with_limits(reader: R, limits: Limits) -> ImageResult<Self> {
+        let decoder = Decoder::new_with_limits(reader, limits.clone())?;
         let size = (decoder.header().width, decoder.header().height);
         Ok(Self { decoder, limits, size })
     }
 
     /// Renders the whole picture `width` by `height` pixels large instead of at its stored size;
-    /// see [`RenderOptions::size`]. Dimensions and rectangles are in pixels of that size then.
+    /// see [`RenderOptions::with_size`]. Dimensions and rectangles are in pixels of that size then.
     ///
     /// # Errors
     /// When a side is zero or exceeds the limits. The size stays as it was then.
@@ -108,24 +111,24 @@ impl<R: Read> GipDecoder<R> {
 
     /// Renders a rectangle into rows that begin `row_pitch` bytes apart.
     fn render(&mut self, region: Region, buf: &mut [u8], row_pitch: usize) -> ImageResult<()> {
-        self.decoder.read_to_end()?;
         let (width, height) = self.size;
-        let options = RenderOptions::new().size(width, height).region(region);
-        let picture = self.decoder.picture();
+        let options = RenderOptions::new().with_size(width, height).with_region(region);
+        self.decoder.set_options(options);
+        let depth = self.decoder.header().depth;
         let row = region.width as usize * usize::from(self.color_type().bytes_per_pixel());
-        let samples = options.output_len(picture.header()).unwrap_or(usize::MAX);
-        // A copy of the output stands next to what the renderer holds.
-        let copy = (samples as u64).saturating_mul(picture.header().depth.bytes() as u64);
+        let samples = self.decoder.output_len()?;
+        // A copy of the output stands next to what the decoder holds.
+        let copy = (samples as u64).saturating_mul(depth.bytes() as u64);
         let scratch = || self.limits.check_memory(copy);
-        match picture.header().depth {
+        match depth {
             SampleDepth::Eight if row_pitch == row => {
                 let length = samples.min(buf.len());
-                picture.render_u8(&options, &mut buf[..length])?;
+                self.decoder.decode_into(&mut buf[..length])?;
             }
             SampleDepth::Eight => {
                 scratch()?;
                 let mut out = vec![0; samples];
-                picture.render_u8(&options, &mut out)?;
+                self.decoder.decode_into(&mut out)?;
                 for (to, from) in buf.chunks_mut(row_pitch).zip(out.chunks_exact(row)) {
                     to[..row].copy_from_slice(from);
                 }
@@ -133,7 +136,7 @@ impl<R: Read> GipDecoder<R> {
             SampleDepth::Sixteen => {
                 scratch()?;
                 let mut out = vec![0_u16; samples];
-                picture.render_u16(&options, &mut out)?;
+                self.decoder.decode_into_u16(&mut out)?;
                 for (to, from) in buf.chunks_mut(row_pitch).zip(out.chunks_exact(row / 2)) {
                     for (to, from) in to.chunks_exact_mut(2).zip(from) {
                         to.copy_from_slice(&from.to_ne_bytes());
@@ -201,8 +204,9 @@ impl<R: Read> ImageDecoder for GipDecoder<R> {
 }
 
 impl<R: Read> ImageDecoderRect for GipDecoder<R> {
-    /// Renders only this rectangle, at a cost that follows its size. It may be called any number
-    /// of times; the reader is read to its end by the first call.
+    /// Renders only this rectangle, at a cost that follows its size: of a large picture, layers that do
+    /// not show in it are not decoded. It may be called any number of times; the reader is read to its
+    /// end by the first call.
     fn read_rect(
         &mut self,
         x: u32,
@@ -245,7 +249,7 @@ impl From<DecodeError> for ImageError {
                 let kind = UnsupportedErrorKind::GenericFeature(error.to_string());
                 Self::Unsupported(UnsupportedError::from_format_and_kind(hint(), kind))
             }
-            DecodeError::Request(what) => parameter(what),
+            DecodeError::Request(request) => parameter(request.to_string()),
             DecodeError::AlreadyFailed => {
                 Self::Parameter(ParameterError::from_kind(ParameterErrorKind::FailedAlready))
             }
@@ -280,7 +284,7 @@ mod encoder {
 
     use super::{hint, parameter};
     use crate::color::{ColorModel, SampleDepth};
-    use crate::encode::{EncodeError, Encoder, Source};
+    use crate::encode::{EncodeError, Encoder, Source, SourceError};
 
     /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and RGB
     /// pictures with or without alpha.
@@ -367,6 +371,12 @@ mod encoder {
         fn set_exif_metadata(&mut self, exif: Vec<u8>) -> Result<(), UnsupportedError> {
             self.encoder.metadata.exif = Some(exif);
             Ok(())
+        }
+    }
+
+    impl From<SourceError> for ImageError {
+        fn from(error: SourceError) -> Self {
+            EncodeError::from(error).into()
         }
     }
 

@@ -4,106 +4,57 @@ use alloc::vec::Vec;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-#[cfg(feature = "rayon")]
-use rayon::iter::plumbing::{Folder, Reducer, UnindexedConsumer};
-#[cfg(feature = "rayon")]
-use rayon::iter::{ParallelExtend, ParallelIterator};
+/// The threads that work is shared among. What comes out does not depend on them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Threads {
+    /// Those of the current `rayon` pool: the global one, or the one whose `install` makes the call.
+    /// Without the feature `rayon`, the same as [`Threads::One`].
+    #[default]
+    Pool,
+    /// The caller's thread alone.
+    One,
+}
 
-/// How many threads [`for_each`] uses at most.
-pub(crate) fn count(parallel: bool) -> usize {
-    #[cfg(feature = "rayon")]
-    if parallel {
-        return rayon::current_num_threads();
+impl Threads {
+    /// How many there are.
+    pub(crate) fn count(self) -> usize {
+        #[cfg(feature = "rayon")]
+        if self == Self::Pool {
+            return rayon::current_num_threads();
+        }
+        1
     }
-    let _ = parallel;
-    1
 }
 
 /// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
 /// lends its memory from one item to the next.
 pub(crate) fn for_each<M: Default, T: Send>(
-    parallel: bool,
+    threads: Threads,
     items: Vec<T>,
     work: impl Fn(&mut M, T) + Send + Sync,
 ) {
     #[cfg(feature = "rayon")]
-    if parallel && items.len() > 1 {
-        on_threads(items, work);
+    if threads == Threads::Pool && items.len() > 1 {
+        on_pool(items, work);
         return;
     }
-    let _ = parallel;
+    let _ = threads;
     let mut memory = M::default();
     items.into_iter().for_each(|item| work(&mut memory, item));
 }
 
 /// What `work` makes of every item, in their order.
 pub(crate) fn map<T: Send, R: Send>(
-    parallel: bool,
+    threads: Threads,
     items: impl Iterator<Item = T>,
     work: impl Fn(T) -> R + Send + Sync,
 ) -> Vec<R> {
     let items: Vec<T> = items.collect();
     let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
     let items = items.into_iter().zip(&mut results).collect();
-    for_each(parallel, items, |(): &mut (), (item, result)| *result = Some(work(item)));
+    for_each(threads, items, |(): &mut (), (item, result)| *result = Some(work(item)));
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
-}
-
-/// Fewest copies that are shared among threads.
-#[cfg(feature = "rayon")]
-const LEAST_SHARED: usize = 2048;
-
-/// Adds copies of a value to a vector. Every thread adds some: memory that is new, or in the cache of
-/// another core, takes a single one long to write to.
-pub(crate) fn extend<T: Copy + Send + Sync>(
-    parallel: bool,
-    items: &mut Vec<T>,
-    value: T,
-    count: usize,
-) {
-    #[cfg(feature = "rayon")]
-    if parallel && count >= LEAST_SHARED {
-        items.par_extend(Copies { value, count });
-        return;
-    }
-    let _ = parallel;
-    items.resize(items.len() + count, value);
-}
-
-/// Copies of a value, for `rayon` to put in their places: without `unsafe`, it alone can let several
-/// threads write to memory that holds nothing yet.
-#[cfg(feature = "rayon")]
-struct Copies<T> {
-    value: T,
-    count: usize,
-}
-
-#[cfg(feature = "rayon")]
-impl<T: Copy + Send + Sync> ParallelIterator for Copies<T> {
-    type Item = T;
-
-    fn opt_len(&self) -> Option<usize> {
-        Some(self.count)
-    }
-
-    fn drive_unindexed<C: UnindexedConsumer<T>>(self, consumer: C) -> C::Result {
-        let Self { value, count } = self;
-        let (mut rest, mut left) = (consumer, count);
-        let (mut parts, mut reducers) = (Vec::new(), Vec::new());
-        for threads in (1..=self::count(true)).rev() {
-            let length = left.div_ceil(threads);
-            let (part, others, reducer) = rest.split_at(length);
-            (rest, left) = (others, left - length);
-            parts.push((part, length));
-            reducers.push(reducer);
-        }
-        let results = map(true, parts.into_iter(), |(part, length)| {
-            part.into_folder().consume_iter(core::iter::repeat_n(value, length)).complete()
-        });
-        let nothing = rest.into_folder().complete();
-        let all = results.into_iter().zip(reducers);
-        all.rfold(nothing, |others, (result, reducer)| reducer.reduce(result, others))
-    }
 }
 
 /// How often a thread asks whether the others are done before it falls asleep: some milliseconds.
@@ -124,17 +75,17 @@ impl Drop for Expected<'_> {
 /// Wakes up a thread of the current pool for work that is about to come: that takes as long as some
 /// of the work does.
 #[cfg(feature = "std")]
-pub(crate) fn wake(parallel: bool) {
+pub(crate) fn wake(threads: Threads) {
     #[cfg(feature = "rayon")]
-    if count(parallel) > 1 {
+    if threads.count() > 1 {
         rayon::spawn(|| ());
     }
-    let _ = parallel;
+    let _ = threads;
 }
 
 #[cfg(feature = "rayon")]
-fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send + Sync) {
-    let others = count(true).min(items.len()).saturating_sub(1);
+fn on_pool<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send + Sync) {
+    let others = Threads::Pool.count().min(items.len()).saturating_sub(1);
     let items = std::sync::Mutex::new(items.into_iter());
     let next = || items.lock().expect("taking an item does not panic").next();
     let expected = AtomicUsize::new(others + 1);
@@ -163,22 +114,4 @@ fn on_threads<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Sen
             }
         }
     });
-}
-
-#[cfg(all(test, feature = "rayon"))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn threads_add_as_many_copies_as_one() {
-        for before in [0, 3] {
-            for count in [0, 1, LEAST_SHARED - 1, LEAST_SHARED, LEAST_SHARED + 1, 10_007] {
-                let mut items = vec![1_u64; before];
-                extend(true, &mut items, 7, count);
-                assert_eq!(items.len(), before + count);
-                assert!(items[..before].iter().all(|&item| item == 1));
-                assert!(items[before..].iter().all(|&item| item == 7));
-            }
-        }
-    }
 }

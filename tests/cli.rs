@@ -137,14 +137,19 @@ fn encode_info_decode_compare() {
         assert_eq!(info[field], report[field], "{field}");
     }
     assert_eq!((&info["color"], &info["depth"]), (&"rgb".into(), &8.into()));
-    for field in ["version", "layers", "kernel", "cutoff", "chart", "base_color", "metadata"] {
+    for field in
+        ["version", "layers", "kernel", "cutoff", "parameterization", "base_color", "metadata"]
+    {
         assert!(!info[field].is_null(), "{field}: {info}");
     }
     let chunks = info["chunks"].as_array().expect("an array");
     let sum: u64 = chunks.iter().map(|c| c["bytes"].as_u64().expect("a number")).sum();
     assert_eq!(sum + 8, bytes, "the chunks and the signature are the whole file");
-    assert_eq!(info["coding"], "set");
-    assert_eq!(info["steps"].as_array().expect("an array").len(), 7);
+    assert_eq!(info["coding"], "entropy");
+    for step in ["position", "size", "ratio", "slant"] {
+        assert!(info["lattice_steps"][step].is_number(), "{step}: {info}");
+    }
+    assert_eq!(info["lattice_steps"]["color"].as_array().expect("an array").len(), 3);
     let bits = |info: &Value, names: &[&str]| -> f64 {
         let bits = &info["bits_per_gaussian"];
         names.iter().map(|&name| bits[name].as_f64().expect("a number")).sum()
@@ -159,7 +164,7 @@ fn encode_info_decode_compare() {
     let packed = ["--gaussians", "30", "--effort", "1", "--precision", "packed"];
     room.ok(&[&["encode", "a.png", "p.gip"], &packed[..]].concat());
     let info = room.json(&["info", "p.gip", "--json"]);
-    assert_eq!(info["coding"], "fixed");
+    assert_eq!(info["coding"], "packed");
     let components = info["components"].as_array().expect("an array");
     assert_eq!(components.len(), 8);
     let sum: u64 = components.iter().map(|c| c["bits"].as_u64().expect("a number")).sum();
@@ -507,12 +512,12 @@ fn failures_leave_no_output() {
     room.encode("a.png", "a.gip");
     let gip = fs::read(room.path("a.gip")).expect("just written");
     fs::write(room.path("short.gip"), &gip[..gip.len() - 5]).expect("writable");
-    fs::write(room.path("kept"), "precious").expect("writable");
+    fs::write(room.path("kept.gip"), "precious").expect("writable");
     fs::write(room.path("kept.png"), "precious").expect("writable");
     let before = room.names();
 
     for input in ["corrupt.png", "short.png", "text.png", "missing.png", "short.gip"] {
-        for output in ["new", "kept"] {
+        for output in ["new.gip", "kept.gip"] {
             let error = room.fails(&["encode", input, output, "--effort", "1"]);
             assert!(error.contains(input), "{error}");
         }
@@ -529,8 +534,28 @@ fn failures_leave_no_output() {
     room.fails(&["compare", "a.png", "corrupt.png"]);
 
     assert_eq!(room.names(), before, "nothing new, no temporary file");
-    for kept in ["kept", "kept.png"] {
+    for kept in ["kept.gip", "kept.png"] {
         assert_eq!(fs::read(room.path(kept)).expect("kept"), b"precious");
+    }
+}
+
+#[test]
+fn a_name_of_another_format_is_refused() {
+    let room = Room::new();
+    room.save("a.png", ColorType::Rgb8);
+    fs::write(room.path("kept.jpg"), "precious").expect("writable");
+    for output in ["kept.jpg", "new.jpg", "new"] {
+        let args = ["encode", "a.png", output, "--gaussians", "20", "--effort", "1"];
+        let error = room.fails(&args);
+        assert!(error.contains(output) && error.contains("--force"), "{error}");
+        assert!(!room.names().iter().any(|name| name.starts_with("new")), "{output}");
+    }
+    assert_eq!(fs::read(room.path("kept.jpg")).expect("kept"), b"precious");
+    // Upper case is as good, and who insists is obeyed.
+    for output in [&["B.GIP"][..], &["kept.jpg", "--force"]] {
+        room.ok(&[&["encode", "a.png", "--gaussians", "20", "--effort", "1"], output].concat());
+        let file = fs::read(room.path(output[0])).expect("just written");
+        assert!(file.starts_with(b"\xC7GIP"), "{output:?}");
     }
 }
 

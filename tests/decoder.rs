@@ -91,7 +91,7 @@ proptest! {
         sixteen in any::<bool>(),
         size in (1_u32..=1 << 16, 1_u32..=4096),
         kernel in prop_oneof![Just((QUARTIC, 4.0)), (Just(EXPONENTIAL), 1e-30_f32..=64.0)],
-        chart in 0_u8..3,
+        parameterization in 0_u8..3,
         base in any::<[u16; 4]>(),
     ) {
         let mut base = base;
@@ -100,7 +100,7 @@ proptest! {
         let (kernel, cutoff) = kernel;
         let (width, height) = size;
         let header =
-            Ghdr { color, depth, width, height, kernel, chart, cutoff, base, ..Ghdr::default() };
+            Ghdr { color, depth, width, height, kernel, parameterization, cutoff, base, ..Ghdr::default() };
         let decoder = decode_valid(&File::of_floats(header, &[]).bytes());
         let found = decoder.header().expect("a complete file");
         prop_assert_eq!((found.version, found.width, found.height), (1, width, height));
@@ -109,7 +109,7 @@ proptest! {
         prop_assert_eq!((found.gaussians, found.layers), (0, 0));
         prop_assert_eq!(found.kernel.cutoff(), cutoff);
         prop_assert_eq!(matches!(found.kernel, Kernel::Quartic), kernel == QUARTIC);
-        prop_assert_eq!(found.chart as u8, chart);
+        prop_assert_eq!(found.parameterization as u8, parameterization);
         prop_assert_eq!(found.base_color, base);
     }
 
@@ -344,12 +344,12 @@ fn the_adapter_reads_from_awkward_readers() {
     let mut decoder = Decoder::new(awkward(cut, true)).expect("a valid header");
     let error = decoder.read_to_end().expect_err("the reader fails");
     assert!(matches!(&error, DecodeError::Io(io) if io.to_string().contains("cut")), "{error}");
-    assert!(decoder.picture().gaussians().len() >= 4);
+    assert!(decoder.picture().expect("every layer is sound").gaussians().len() >= 4);
     // So is a file that ends early.
     let mut decoder = Decoder::new(awkward(cut, false)).expect("a valid header");
     let error = decoder.read_to_end().expect_err("the file is too short");
     assert!(error.is_unexpected_end(), "{error}");
-    assert!(decoder.picture().gaussians().len() >= 4);
+    assert!(decoder.picture().expect("every layer is sound").gaussians().len() >= 4);
     // A file that ends before its first layer has no picture to open.
     let error = Decoder::new(&bytes[..100]).expect_err("the file is too short");
     assert!(error.is_unexpected_end(), "{error}");
@@ -365,7 +365,7 @@ fn layers_are_read_until_there_are_enough_gaussians() {
         let mut decoder = Decoder::new(Awkward { bytes: &bytes, calls: 0, fails: false })
             .expect("it begins well");
         decoder.read_at_least(wanted).expect("it is sound");
-        let found = bits(decoder.picture().gaussians());
+        let found = bits(decoder.picture().expect("every layer is sound").gaussians());
         assert_eq!(found, bits(&whole.gaussians()[..arrived]), "{wanted}");
     }
     let header = whole.header().expect("read");
@@ -404,7 +404,7 @@ fn errors_name_the_chunk_and_the_rule() {
         (&|h| h.color = 4, "GHDR: unsupported: colour model 4"),
         (&|h| h.depth = 10, "GHDR: unsupported: sample depth 10"),
         (&|h| h.kernel = 2, "GHDR: unsupported: kernel 2"),
-        (&|h| h.chart = 3, "GHDR: unsupported: chart 3"),
+        (&|h| h.parameterization = 3, "GHDR: unsupported: parameterization 3"),
         (&|h| h.transform = 1, "GHDR: unsupported: colour transform 1"),
         (&|h| h.width = 0, "GHDR: the width is zero"),
         (&|h| h.height = 0, "GHDR: the height is zero"),

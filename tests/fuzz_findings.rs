@@ -2,23 +2,24 @@
 
 mod common;
 
-use common::coding1::Code;
+use common::entropy::Code;
 use common::{File, Ghdr, RGB, chunk, decode, of_chunks};
 use image_gip::Decoder;
 
-/// `buf_independent`: two layers so short that they are read with the header, the first without its
-/// last word, the second with a wrong CRC. The second was what opening complained about.
+/// `buf_independent`: two layers so short that they are read at once, the first without its last word,
+/// the second with a wrong CRC. The second was what the decoder complained about.
 #[test]
-fn opening_tells_what_was_wrong_first() {
+fn what_is_wrong_with_the_first_layer_is_told_first() {
     let header = Ghdr { color: RGB, ..Ghdr::default() };
     let code = Code { axes: vec![1, 2, 3], place: [2000, 3000], ..Code::default() };
-    let file = File::of_sets(header, vec![0.5; 7], vec![vec![code; 3]; 2]);
+    let file = File::of_entropy_coded(header, vec![0.5; 7], vec![vec![code; 3]; 2]);
     let mut chunks = file.chunks();
     chunks[2] = chunk(b"GAUS", &chunks[2][8..chunks[2].len() - 6]);
     *chunks[3].last_mut().expect("a CRC") ^= 1;
     let bytes = of_chunks(&chunks);
     let expected = decode(&bytes).1.expect_err("damaged").to_string();
-    let found = Decoder::new(bytes.as_slice()).expect_err("damaged").to_string();
+    let mut decoder = Decoder::new(bytes.as_slice()).expect("it begins well");
+    let found = decoder.read_to_end().expect_err("damaged").to_string();
     assert_eq!(found, expected);
     assert!(!found.contains("CRC"), "{found}");
 }

@@ -5,12 +5,14 @@ mod common;
 use core::time::Duration;
 
 use cap::Cap;
-use common::coding1::Code;
+use common::entropy::Code;
 use common::memory::peak;
 use common::{
     CHOLESKY, Entry, File, Ghdr, RGB, RGBA, SIGNATURE, chunk, decode_pieces, decode_valid,
 };
-use image_gip::{DecodeError, LimitKind, Limits, Picture, Region, RenderOptions, StreamDecoder};
+use image_gip::{
+    DecodeError, LimitKind, Limits, Picture, Region, RenderOptions, StreamDecoder, Threads,
+};
 use std::alloc::System;
 use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
@@ -148,7 +150,7 @@ fn a_small_file_of_large_gaussians_is_refused_by_its_work() {
     assert!(start.elapsed() < Duration::from_secs(5), "refused late");
     assert!(out.iter().all(|&sample| sample == 7), "the buffer was touched");
     // The cost follows the output: a thumbnail of the same file is fine.
-    let options = RenderOptions::new().size(64, 64);
+    let options = RenderOptions::new().with_size(64, 64);
     picture.render_u8(&options, &mut out[..64 * 64]).expect("little work");
 }
 
@@ -191,9 +193,9 @@ fn the_memory_limit_holds() {
     let mut out = vec![0; 450 * 450 * 4];
     let mut attempt = |max_memory: u64| {
         let limits = limits(|l| l.max_memory = max_memory);
-        let options = RenderOptions::new().parallel(false);
+        let options = RenderOptions::new().with_threads(Threads::One);
         peak(&MEMORY, || {
-            let mut decoder = StreamDecoder::with_limits(limits);
+            let mut decoder = StreamDecoder::new().with_limits(limits);
             decoder.feed(&bytes)?;
             decoder.picture().expect("a complete file").render_u8(&options, &mut out)
         })
@@ -217,16 +219,17 @@ fn the_memory_limit_holds() {
 #[test]
 fn output_sizes_count_against_the_limits() {
     let _alone = alone();
-    let header = Ghdr { color: RGB, chart: CHOLESKY, ..Ghdr::default() };
+    let header = Ghdr { color: RGB, parameterization: CHOLESKY, ..Ghdr::default() };
     let bytes = File::of_floats(header, &[]).bytes();
     let (decoder, result) = decode_pieces([bytes.as_slice()], limits(|l| l.max_pixels = 1000));
     result.expect("16x16 is within bounds");
     let picture = decoder.picture().expect("a complete file");
     let mut out = vec![0; 3 * 1024];
-    let error = picture.render_u8(&RenderOptions::new().size(32, 32), &mut out).expect_err("large");
+    let error =
+        picture.render_u8(&RenderOptions::new().with_size(32, 32), &mut out).expect_err("large");
     assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Pixels, wanted: 1024, .. }));
     let region = Region { x: 900_000, y: 900_000, width: 10, height: 10 };
-    let close_up = RenderOptions::new().size(1 << 20, 1 << 20).region(region);
+    let close_up = RenderOptions::new().with_size(1 << 20, 1 << 20).with_region(region);
     picture.render_u8(&close_up, &mut out[..300]).expect("only the region counts");
 }
 
@@ -273,7 +276,7 @@ fn hostile_set() -> Vec<(String, Vec<u8>)> {
     // Layers that wait for each other.
     let code = |n: u32| Code { axes: vec![1], place: [n << 7; 2], ..Code::default() };
     let layers = (0..1700).map(|n| vec![code(n)]).collect();
-    add("layers", File::of_sets(wide, vec![1.0, 1.0, 1.0, 1.0, 0.1], layers).bytes());
+    add("layers", File::of_entropy_coded(wide, vec![1.0, 1.0, 1.0, 1.0, 0.1], layers).bytes());
     let mut texts = File::of_floats(wide, &[]);
     for _ in 0..SIZE / 15 - 100 {
         texts = texts.with(b"tEXt", b"a\0b");
@@ -291,9 +294,9 @@ fn a_hostile_set_costs_no_more_than_its_limits_say() {
     let mut out = vec![0; 1 << 24];
     let mut rendered = 0;
     // What came before the flaw can still be shown.
-    let mut show = |picture: Picture<'_>, parallel| {
-        for options in [RenderOptions::new(), RenderOptions::new().size(64, 64)] {
-            let options = options.parallel(parallel);
+    let mut show = |picture: Picture<'_>, threads| {
+        for options in [RenderOptions::new(), RenderOptions::new().with_size(64, 64)] {
+            let options = options.with_threads(threads);
             let length = picture.output_len(&options).unwrap_or(0);
             let outcome = picture.render_u8(&options, &mut out[..length]);
             rendered += usize::from(outcome.is_ok());
@@ -304,17 +307,18 @@ fn a_hostile_set_costs_no_more_than_its_limits_say() {
         let (_, alone) = peak(&MEMORY, || {
             let (decoder, _) = decode_pieces([bytes.as_slice()], allowed.clone());
             if let Some(picture) = decoder.picture() {
-                show(picture, false);
+                show(picture, Threads::One);
             }
         });
         assert!(alone <= allowed.max_memory + 30_000, "{name}: {alone} bytes held");
         #[cfg(feature = "std")]
         {
             let (_, side_by_side) = peak(&MEMORY, || {
-                let decoder = image_gip::Decoder::with_limits(bytes.as_slice(), allowed.clone());
+                let decoder =
+                    image_gip::Decoder::new_with_limits(bytes.as_slice(), allowed.clone());
                 if let Ok(mut decoder) = decoder {
                     let _ = decoder.read_to_end();
-                    show(decoder.picture(), true);
+                    show(decoder.picture().expect("what is left is sound"), Threads::Pool);
                 }
             });
             let allowed = allowed.max_memory + 100_000;

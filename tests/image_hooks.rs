@@ -233,7 +233,7 @@ fn renders_at_another_size() {
     assert_eq!(decoder.dimensions(), (50, 10));
 
     let mut own = Decoder::new(&file[..]).unwrap();
-    own.set_options(RenderOptions::new().size(50, 10));
+    own.set_options(RenderOptions::new().with_size(50, 10));
     let mut expected = vec![0; 50 * 10 * ColorModel::Rgba.channels()];
     own.decode_into(&mut expected).unwrap();
     assert_eq!(read_all(decoder), expected);
@@ -260,6 +260,6 @@ fn damaged_files_are_errors() {
 
     let mut limits = Limits::default();
     limits.max_height = HEIGHT - 1;
-    let refused = GipDecoder::with_limits(&file[..], limits);
+    let refused = GipDecoder::new_with_limits(&file[..], limits);
     assert!(matches!(refused, Err(ImageError::Limits(_))));
 }

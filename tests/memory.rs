@@ -28,16 +28,16 @@ fn waves(width: u32, height: u32) -> Vec<u8> {
 
 #[test]
 fn a_pixel_takes_40_bytes_and_a_gaussian_300() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     for (width, height, gaussians) in [(600, 400, 1_000), (400, 250, 5_000), (400, 250, 20_000)] {
         let samples = waves(width, height);
         let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
-        for precision in [Precision::Float, Precision::Packed, Precision::Coded] {
+        for precision in [Precision::Float, Precision::Packed, Precision::Entropy] {
             let encoder = Encoder::new()
                 .with_effort(1)
                 .with_target(Target::Gaussians(gaussians))
-                .with_precision(precision)
-                .with_threads(Some(2));
-            let (encoded, peak) = peak(&MEMORY, || encoder.encode(&source));
+                .with_precision(precision);
+            let (encoded, peak) = peak(&MEMORY, || pool.install(|| encoder.encode(&source)));
             let encoded = encoded.expect("a sound picture");
             let case = format!("{width}x{height}, {gaussians} Gaussians, {precision:?}");
             let found = encoded.report.gaussians;

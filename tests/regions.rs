@@ -5,7 +5,7 @@ mod common;
 
 use std::io::Read;
 
-use common::coding1::{Code, Grid};
+use common::entropy::{Code, Grid};
 use common::{File, Ghdr, RGB, Random, bits, chunk, decode, decode_valid, of_chunks};
 use image_gip::{DecodeError, Decoder, Region, RenderOptions};
 
@@ -32,7 +32,7 @@ fn sample() -> File {
         (0..IN_A_LAYER).map(&mut code).collect()
     };
     let layers = (0..LAYERS).map(layer).collect();
-    File::of_sets(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
+    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
 }
 
 /// The chunks of the sample, with bounds.
@@ -63,7 +63,7 @@ fn a_region_is_that_part_of_the_picture() {
             };
             let ((x, width_of), (y, height_of)) = (part(width), part(height));
             let region = Region { x, y, width: width_of, height: height_of };
-            let options = RenderOptions::new().size(width, height).region(region);
+            let options = RenderOptions::new().with_size(width, height).with_region(region);
             let mut expected = vec![0; picture.output_len(&options).expect("it fits")];
             picture.render_u8(&options, &mut expected).expect("it renders");
             let found = rendered(&bytes, &options).expect("it decodes");
@@ -78,16 +78,17 @@ fn layers_that_do_not_show_are_not_decoded() {
     let first = &mut chunks[BEFORE];
     *first = chunk(b"GAUS", &first[8..first.len() - 6]);
     let bytes = of_chunks(&chunks);
-    let part = |x, y| RenderOptions::new().region(Region { x, y, width: 20, height: 20 });
+    let part = |x, y| RenderOptions::new().with_region(Region { x, y, width: 20, height: 20 });
     rendered(&bytes, &part(280, 180)).expect("what is not sound is far away");
     let (expected, error) = decode(&bytes);
     let error = error.expect_err("the first layer is not sound").to_string();
-    for options in [part(0, 0), RenderOptions::new(), part(280, 180).prefix(1000)] {
+    for options in [part(0, 0), RenderOptions::new(), part(280, 180).with_prefix(1000)] {
         assert_eq!(rendered(&bytes, &options).expect_err("it shows").to_string(), error);
     }
     let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
     assert_eq!(decoder.read_to_end().expect_err("all are decoded").to_string(), error);
-    assert_eq!(bits(decoder.picture().gaussians()), bits(expected.gaussians()));
+    let picture = decoder.picture().expect("what is left is sound");
+    assert_eq!(bits(picture.gaussians()), bits(expected.gaussians()));
 }
 
 #[test]
@@ -99,7 +100,7 @@ fn after_a_region_there_is_still_all_else() {
     let (first, rest) = bytes.split_at(of_chunks(&chunks[..BEFORE + 3]).len());
     let mut decoder = Decoder::new(first.chain(rest)).expect("it begins well");
     decoder.read_at_least(3 * IN_A_LAYER as u32).expect("it is sound");
-    let options = RenderOptions::new().region(Region { x: 270, y: 10, width: 30, height: 30 });
+    let options = RenderOptions::new().with_region(Region { x: 270, y: 10, width: 30, height: 30 });
     let mut expected = vec![0; 3 * 30 * 30];
     whole.picture().expect("whole").render_u8(&options, &mut expected).expect("it renders");
     decoder.set_options(options);
@@ -108,9 +109,30 @@ fn after_a_region_there_is_still_all_else() {
         decoder.decode_into(&mut samples).expect("it is sound");
         assert_eq!(samples, expected);
     }
-    assert_eq!(decoder.picture().gaussians().len(), 3 * IN_A_LAYER);
+    // The region has left out layers, which only the picture asks for.
+    assert_eq!(decoder.stream().gaussians().len(), 3 * IN_A_LAYER);
+    let picture = decoder.picture().expect("every layer is sound");
+    assert_eq!(bits(picture.gaussians()), bits(whole.gaussians()));
     decoder.read_to_end().expect("it is sound");
-    assert_eq!(bits(decoder.picture().gaussians()), bits(whole.gaussians()));
+    assert_eq!(bits(decoder.stream().gaussians()), bits(whole.gaussians()));
+}
+
+#[test]
+fn the_picture_after_a_region_says_what_the_region_left_out() {
+    let mut chunks = chunks();
+    let first = &mut chunks[BEFORE];
+    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
+    let bytes = of_chunks(&chunks);
+    let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+    let far = Region { x: 280, y: 180, width: 20, height: 20 };
+    decoder.set_options(RenderOptions::new().with_region(far));
+    let mut samples = vec![0; decoder.output_len().expect("it fits")];
+    decoder.decode_into(&mut samples).expect("what is not sound is far away");
+    let (expected, error) = decode(&bytes);
+    let error = error.expect_err("the first layer is not sound").to_string();
+    assert_eq!(decoder.picture().expect_err("it is not sound").to_string(), error);
+    let picture = decoder.picture().expect("what is left is sound");
+    assert_eq!(bits(picture.gaussians()), bits(expected.gaussians()));
 }
 
 #[test]

@@ -8,17 +8,23 @@ use common::{
     CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Ghdr, QUARTIC, RGB, RGBA,
     ROTATION_SCALE, Random, cases, decode_valid,
 };
-use image_gip::{ColorModel, DecodeError, Region, RenderOptions};
+use image_gip::{ColorModel, DecodeError, Region, RenderOptions, Threads};
 use proptest::prelude::*;
 
 /// A file of floats with these rows of components.
-fn scene(color: u8, chart: u8, kernel: (u8, f32), size: (u32, u32), rows: &[Vec<f32>]) -> File {
+fn scene(
+    color: u8,
+    parameterization: u8,
+    kernel: (u8, f32),
+    size: (u32, u32),
+    rows: &[Vec<f32>],
+) -> File {
     let mut base = [0; 4];
     base[..=usize::from(color)].fill(0x7FFF);
     let (width, height) = size;
     let header = Ghdr {
         color,
-        chart,
+        parameterization,
         kernel: kernel.0,
         cutoff: kernel.1,
         width,
@@ -33,19 +39,19 @@ const SMOOTH: (u8, f32) = (QUARTIC, 4.0);
 const PAPER: (u8, f32) = (EXPONENTIAL, 11.082_527);
 const WIDE: (u8, f32) = (EXPONENTIAL, 64.0);
 
-/// Random Gaussians over a picture and somewhat beyond, in any chart.
+/// Random Gaussians over a picture and somewhat beyond, in any parameterization.
 fn random_rows(
     random: &mut Random,
     count: usize,
     file: (u8, u8),
     size: (u32, u32),
 ) -> Vec<Vec<f32>> {
-    let (color, chart) = file;
+    let (color, parameterization) = file;
     let row = |_| {
         let (width, height) = (size.0 as f32, size.1 as f32);
         let mut row = vec![random.range(-0.2, 1.2) * width, random.range(-0.2, 1.2) * height];
         let (s1, s2) = (random.decades(0.2, 30.0), random.decades(0.2, 30.0));
-        match chart {
+        match parameterization {
             // Correlated by up to 0.95.
             COVARIANCE => row.extend([s1 * s1, s1 * s2 * random.range(-0.95, 0.95), s2 * s2]),
             CHOLESKY => row.extend([s1, random.range(-2.0, 2.0) * s2, s2]),
@@ -58,25 +64,22 @@ fn random_rows(
 }
 
 /// The planes that the crate renders, by the given code path.
-fn planes(file: &File, request: &Request, reference: bool, parallel: bool) -> Vec<u32> {
+fn planes(file: &File, request: &Request, reference: bool, threads: Threads) -> Vec<u32> {
     let decoder = decode_valid(&file.bytes());
     let picture = decoder.picture().expect("the header has arrived");
-    let options = options(request).reference(reference).parallel(parallel);
-    let mut out = vec![f32::NAN; options.output_len(picture.header()).expect("fits")];
+    let options = options(request).with_reference(reference).with_threads(threads);
+    let mut out = vec![f32::NAN; picture.output_len(&options).expect("fits")];
     picture.render_planes(&options, &mut out).expect("a sound request");
     out.into_iter().map(f32::to_bits).collect()
 }
 
 fn options(request: &Request) -> RenderOptions {
     let (x, y, width, height) = request.region;
-    let options = RenderOptions::new().size(request.size.0, request.size.1).region(Region {
-        x,
-        y,
-        width,
-        height,
-    });
+    let options = RenderOptions::new()
+        .with_size(request.size.0, request.size.1)
+        .with_region(Region { x, y, width, height });
     match u32::try_from(request.prefix) {
-        Ok(count) => options.prefix(count),
+        Ok(count) => options.with_prefix(count),
         Err(_) => options,
     }
 }
@@ -86,10 +89,12 @@ fn options(request: &Request) -> RenderOptions {
 fn assert_matches_oracle(file: &File, request: &Request) {
     let expected = oracle::render(file, request);
     let bits: Vec<u32> = expected.concat().into_iter().map(f32::to_bits).collect();
-    for (reference, parallel) in [(true, false), (false, false), (false, true)] {
-        let found = planes(file, request, reference, parallel);
+    for (reference, threads) in
+        [(true, Threads::One), (false, Threads::One), (false, Threads::Pool)]
+    {
+        let found = planes(file, request, reference, threads);
         let wrong = found.iter().zip(&bits).position(|(found, expected)| found != expected);
-        assert_eq!(wrong, None, "reference {reference}, parallel {parallel}, {request:?}");
+        assert_eq!(wrong, None, "reference {reference}, {threads:?}, {request:?}");
     }
     let decoder = decode_valid(&file.bytes());
     let picture = decoder.picture().expect("the header has arrived");
@@ -106,11 +111,11 @@ fn assert_matches_oracle(file: &File, request: &Request) {
 fn random_scenes_match_the_oracle_bit_for_bit() {
     let mut random = Random(1);
     for color in [GRAY, GRAY_ALPHA, RGB, RGBA] {
-        for chart in [COVARIANCE, CHOLESKY, ROTATION_SCALE] {
+        for parameterization in [COVARIANCE, CHOLESKY, ROTATION_SCALE] {
             for kernel in [SMOOTH, PAPER, WIDE, (EXPONENTIAL, 0.5)] {
                 let size = (37, 21);
-                let rows = random_rows(&mut random, 40, (color, chart), size);
-                let file = scene(color, chart, kernel, size, &rows);
+                let rows = random_rows(&mut random, 40, (color, parameterization), size);
+                let file = scene(color, parameterization, kernel, size, &rows);
                 for (width, height) in [size, (80, 50), (11, 6), (90, 5), (1, 1)] {
                     assert_matches_oracle(&file, &Request::at(width, height));
                 }
@@ -242,7 +247,7 @@ fn pictures_of_any_size_match_the_oracle() {
 fn no_gaussian_leaves_the_base_color() {
     let file = scene(RGBA, CHOLESKY, SMOOTH, (33, 9), &[]);
     let expected = vec![(f32::from(0x7FFF_u16) / 65535.0).to_bits(); 33 * 9 * 4];
-    assert_eq!(planes(&file, &Request::whole(&file), false, true), expected);
+    assert_eq!(planes(&file, &Request::whole(&file), false, Threads::Pool), expected);
 }
 
 #[test]
@@ -273,7 +278,10 @@ fn what_is_out_of_bounds_is_not_drawn() {
     let all = scene(GRAY, CHOLESKY, SMOOTH, (40, 40), &rows);
     let one = scene(GRAY, CHOLESKY, SMOOTH, (40, 40), &rows[..1]);
     let request = Request::whole(&all);
-    assert_eq!(planes(&all, &request, false, false), planes(&one, &request, false, false));
+    assert_eq!(
+        planes(&all, &request, false, Threads::One),
+        planes(&one, &request, false, Threads::One)
+    );
     let decoder = decode_valid(&all.bytes());
     let drawable: Vec<_> = decoder.gaussians().iter().map(|g| g.is_drawable()).collect();
     assert_eq!(drawable.iter().position(|drawn| *drawn), Some(0));
@@ -322,7 +330,7 @@ fn single_precision_stays_close_to_the_exact_model() {
         for rows in scenes {
             let file = scene(GRAY, CHOLESKY, kernel, size, &rows);
             let (exact, bounds) = exact(&file);
-            let found = planes(&file, &Request::whole(&file), false, true);
+            let found = planes(&file, &Request::whole(&file), false, Threads::Pool);
             for ((found, exact), bound) in found.into_iter().zip(exact).zip(bounds) {
                 let error = (f64::from(f32::from_bits(found)) - exact).abs();
                 assert!(error <= bound, "an error of {error:e}, allowed {bound:e}");
@@ -332,7 +340,7 @@ fn single_precision_stays_close_to_the_exact_model() {
     // What that means for an ordinary picture: a quarter of a 16-bit step.
     let rows = random_rows(&mut random, 300, (GRAY, CHOLESKY), (70, 50));
     let file = scene(GRAY, CHOLESKY, SMOOTH, (70, 50), &rows);
-    let found = planes(&file, &Request::whole(&file), false, true);
+    let found = planes(&file, &Request::whole(&file), false, Threads::Pool);
     let worst = found
         .iter()
         .zip(exact(&file).0)
@@ -358,8 +366,8 @@ proptest! {
         };
         let (x, width) = part(corner.0, extent.0, size.0);
         let (y, height) = part(corner.1, extent.1, size.1);
-        let all = planes(&file, &whole, false, true);
-        let found = planes(&file, &Request { region: (x, y, width, height), ..whole }, false, true);
+        let all = planes(&file, &whole, false, Threads::Pool);
+        let found = planes(&file, &Request { region: (x, y, width, height), ..whole }, false, Threads::Pool);
         let row = |plane: u32, row: u32| {
             let start = ((plane * size.1 + y + row) * size.0 + x) as usize;
             &all[start..start + width as usize]
@@ -376,8 +384,8 @@ proptest! {
         let few = scene(GRAY_ALPHA, COVARIANCE, SMOOTH, (40, 30), &rows[..count.min(rows.len())]);
         let prefix = Request { prefix: count, ..Request::whole(&all) };
         prop_assert_eq!(
-            planes(&all, &prefix, false, true),
-            planes(&few, &Request::whole(&few), false, true)
+            planes(&all, &prefix, false, Threads::Pool),
+            planes(&few, &Request::whole(&few), false, Threads::Pool)
         );
     }
 
@@ -425,7 +433,7 @@ fn a_smaller_output_is_close_to_the_area_average() {
     }));
     let file = scene(GRAY, CHOLESKY, SMOOTH, size, &rows);
     let floats = |request: &Request| -> Vec<f32> {
-        planes(&file, request, false, true).into_iter().map(f32::from_bits).collect()
+        planes(&file, request, false, Threads::Pool).into_iter().map(f32::from_bits).collect()
     };
     let large = floats(&Request::whole(&file));
     for factor in [2_u32, 4, 8] {
@@ -481,7 +489,7 @@ fn a_color_model_widens_but_never_narrows() {
         let picture = decoder.picture().expect("the header has arrived");
         let own = oracle::samples(&oracle::render(&file, &Request::whole(&file)), 8);
         for output in models {
-            let options = RenderOptions::new().color(output);
+            let options = RenderOptions::new().with_color(output);
             let mut out = vec![7; 19 * 11 * output.channels()];
             let result = picture.render_u8(&options, &mut out);
             let is_gray = stored.channels() <= 2;
@@ -525,16 +533,16 @@ fn requests_that_make_no_sense_are_refused() {
         (whole(), 199),
         (whole(), 201),
         (whole(), 0),
-        (whole().size(0, 10), 0),
-        (whole().size(10, 0), 0),
-        (whole().size((1 << 23) + 1, 1), (1 << 23) + 1),
-        (whole().size(1 << 31, 1 << 31).region(region(0, 0, 1, 1)), 1),
-        (whole().region(region(0, 0, 0, 1)), 0),
-        (whole().region(region(0, 0, 21, 1)), 21),
-        (whole().region(region(20, 0, 1, 1)), 1),
-        (whole().region(region(0, 10, 1, 1)), 1),
-        (whole().region(region(u32::MAX, 0, 2, 1)), 2),
-        (whole().region(region(1, 0, u32::MAX, 1)), 1),
+        (whole().with_size(0, 10), 0),
+        (whole().with_size(10, 0), 0),
+        (whole().with_size((1 << 23) + 1, 1), (1 << 23) + 1),
+        (whole().with_size(1 << 31, 1 << 31).with_region(region(0, 0, 1, 1)), 1),
+        (whole().with_region(region(0, 0, 0, 1)), 0),
+        (whole().with_region(region(0, 0, 21, 1)), 21),
+        (whole().with_region(region(20, 0, 1, 1)), 1),
+        (whole().with_region(region(0, 10, 1, 1)), 1),
+        (whole().with_region(region(u32::MAX, 0, 2, 1)), 2),
+        (whole().with_region(region(1, 0, u32::MAX, 1)), 1),
     ] {
         let mut out = vec![7; length];
         let error = picture.render_u8(&options, &mut out).expect_err("refused");
@@ -543,6 +551,6 @@ fn requests_that_make_no_sense_are_refused() {
     }
     // The largest sides are fine.
     let corner = region((1 << 23) - 5, (1 << 23) - 5, 5, 5);
-    let options = whole().size(1 << 23, 1 << 23).region(corner);
+    let options = whole().with_size(1 << 23, 1 << 23).with_region(corner);
     picture.render_u8(&options, &mut [0; 25]).expect("within bounds");
 }

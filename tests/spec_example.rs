@@ -3,8 +3,8 @@
 
 mod common;
 
-use common::entropy::Op;
-use common::{coding1, decode_valid};
+use common::rans::Op;
+use common::{decode_valid, entropy};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
 const SPECIFICATION: &str = include_str!("../spec/gip.md");
@@ -13,14 +13,14 @@ const SPECIFICATION: &str = include_str!("../spec/gip.md");
 #[derive(Clone, Copy)]
 struct Example(&'static str);
 
-/// Of coding 0.
+/// Of the packed coding.
 fn fixed() -> Example {
     let (_, text) = SPECIFICATION.split_once("\n### 14.1 ").expect("section 14.1");
     Example(text.split_once("\n### ").expect("another section").0)
 }
 
-/// Of coding 1.
-fn sets() -> Example {
+/// Of the entropy coding.
+fn entropy_coded() -> Example {
     Example(SPECIFICATION.split_once("\n### 14.2 ").expect("section 14.2").1)
 }
 
@@ -93,7 +93,7 @@ fn the_hex_decodes_to_the_values_and_pixels_that_are_printed() {
 
     let printed = fixed().blocks("pixels");
     assert_eq!(render(&picture, &RenderOptions::new()), pixels(printed[0]));
-    assert_eq!(render(&picture, &RenderOptions::new().prefix(1)), pixels(printed[1]));
+    assert_eq!(render(&picture, &RenderOptions::new().with_prefix(1)), pixels(printed[1]));
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn the_trace_of_one_pixel_is_what_prefixes_give() {
     assert_eq!(trace.len(), 3);
     for (index, (row, gaussian)) in trace.iter().zip(decoder.gaussians()).enumerate() {
         let mut planes = [0.0; 6 * 4 * 3];
-        let options = RenderOptions::new().prefix(index as u32 + 1);
+        let options = RenderOptions::new().with_prefix(index as u32 + 1);
         picture.render_planes(&options, &mut planes).expect("a sound request");
         let found = [0, 1, 2].map(|plane| planes[plane * 24 + 6 + 1]);
         assert_eq!(found, [row[3], row[4], row[5]].map(number));
@@ -136,19 +136,22 @@ fn the_trace_of_one_pixel_is_what_prefixes_give() {
 
 #[test]
 fn the_hex_of_coding_1_decodes_to_the_values_and_pixels_that_are_printed() {
-    let decoder = decode_valid(&sets().file());
-    sets().check_values(decoder.gaussians());
+    let decoder = decode_valid(&entropy_coded().file());
+    entropy_coded().check_values(decoder.gaussians());
     let picture = decoder.picture().expect("a complete file");
-    assert_eq!(render(&picture, &RenderOptions::new()), pixels(sets().blocks("pixels")[0]));
+    assert_eq!(
+        render(&picture, &RenderOptions::new()),
+        pixels(entropy_coded().blocks("pixels")[0])
+    );
 }
 
 #[test]
 fn the_symbols_of_coding_1_are_those_in_the_bytes() {
-    let file = sets().file();
+    let file = entropy_coded().file();
     let (quantizers, layer) = (8 + 48 + 8, 8 + 48 + 40 + 8);
     let steps = file[quantizers..quantizers + 28].as_chunks().0;
     let steps: Vec<f32> = steps.iter().map(|step| f32::from_le_bytes(*step)).collect();
-    let layer = coding1::read([6, 4], &steps, &file[layer..layer + 20]);
+    let layer = entropy::read([6, 4], &steps, &file[layer..layer + 20]);
     let layer = layer.expect("a sound layer");
     let found = layer.ops.iter().zip(&layer.states[1..]).filter_map(|(op, state)| {
         let (read, value) = match op {
@@ -159,9 +162,9 @@ fn the_symbols_of_coding_1_are_those_in_the_bytes() {
         };
         Some([read, value.to_string(), format!("`{state:08X}`")])
     });
-    let printed = sets().table("| read | value |");
+    let printed = entropy_coded().table("| read | value |");
     assert!(found.eq(printed.iter().map(|row| [0, 1, 2].map(|cell| row[cell].to_string()))));
-    assert!(sets().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
+    assert!(entropy_coded().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
     // The values with which the first codes end.
     let first = &layer.codes[0];
     assert_eq!((first.class, &first.axes[..], first.ratio), (2, &[7, 1, -2][..], 1));

@@ -4,8 +4,8 @@
 //! `BLESS=1 cargo test --test spec_vectors` writes the folder anew.
 
 mod common;
-#[path = "vectors/sets.rs"]
-mod sets;
+#[path = "vectors/entropy.rs"]
+mod entropy;
 
 use core::fmt::Write as _;
 use std::fs;
@@ -17,7 +17,7 @@ use common::{
     ROTATION_SCALE, Random, chunk, crc32, decode, decode_pieces, gaus, of_chunks, qntz,
 };
 use image_gip::{
-    ColorModel, DecodeError, Limits, Region, RenderOptions, SampleDepth, StreamDecoder,
+    ColorModel, DecodeError, Limits, Region, RenderOptions, SampleDepth, StreamDecoder, Threads,
 };
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/spec/vectors");
@@ -62,11 +62,11 @@ impl Rendering {
         let region = |(x, y, width, height)| Region { x, y, width, height };
         match self {
             Self::Whole => options,
-            Self::Size(w, h) => options.size(w, h),
-            Self::Region(x, y, w, h) => options.region(region((x, y, w, h))),
-            Self::SizeAndRegion((w, h), part) => options.size(w, h).region(region(part)),
-            Self::Prefix(count) => options.prefix(count),
-            Self::Color(color) => options.color(color),
+            Self::Size(w, h) => options.with_size(w, h),
+            Self::Region(x, y, w, h) => options.with_region(region((x, y, w, h))),
+            Self::SizeAndRegion((w, h), part) => options.with_size(w, h).with_region(region(part)),
+            Self::Prefix(count) => options.with_prefix(count),
+            Self::Color(color) => options.with_color(color),
         }
     }
 
@@ -163,8 +163,12 @@ fn valid_vectors() -> Vec<Vector> {
         entries[4] = Entry::log(10, 0.004_882_812_5, -2.0);
         entries
     };
-    let paper =
-        Ghdr { chart: COVARIANCE, kernel: EXPONENTIAL, cutoff: 11.082_527, ..header(RGB, 40, 24) };
+    let paper = Ghdr {
+        parameterization: COVARIANCE,
+        kernel: EXPONENTIAL,
+        cutoff: 11.082_527,
+        ..header(RGB, 40, 24)
+    };
     let depths = [1, 3, 5, 7, 9, 11, 13, 15, 16];
     let spans = [24.0, 16.0, 4.0, 3.0, 4.0, 1.0, 1.0, 1.0, 1.0];
     let lows = [0.0, 0.0, 0.5, -1.5, 0.5, -0.5, -0.5, -0.5, -0.5];
@@ -222,7 +226,7 @@ fn valid_vectors() -> Vec<Vector> {
     vec![
         Vector::valid(
             "gray8",
-            "gray, 8 bits, quartic kernel, Cholesky chart, packed; other sizes, regions, models",
+            "gray, 8 bits, quartic kernel, Cholesky parameterization, packed; other sizes, regions, models",
             random_file(60, header(GRAY, 24, 16), 20),
         )
         .also(&[
@@ -262,7 +266,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "paper",
-            "the paper's choices: exp(-q/2) cut off at weight 1/255, covariance chart with variances \
+            "the paper's choices: exp(-q/2) cut off at weight 1/255, covariance parameterization with variances \
              in log, 12/12 + 10/10/10 + 6/6/6 bits; codes that are no covariance are not drawn",
             {
                 let codes = codes(66, &covariance_entries, 40);
@@ -271,10 +275,10 @@ fn valid_vectors() -> Vec<Vector> {
         )
         .also(&[Rendering::Size(20, 12)]),
         Vector::valid(
-            "chart-covariance",
-            "covariance chart in floats, with an indefinite, a singular and a negative one",
+            "parameterization-covariance",
+            "covariance parameterization in floats, with an indefinite, a singular and a negative one",
             floats(
-                Ghdr { chart: COVARIANCE, ..gray },
+                Ghdr { parameterization: COVARIANCE, ..gray },
                 &[
                     [6.0, 5.0, 4.0, 1.5, 2.0, 0.8],
                     [12.0, 8.0, 9.0, -5.9, 4.0, 0.5],
@@ -286,11 +290,11 @@ fn valid_vectors() -> Vec<Vector> {
             ),
         ),
         Vector::valid(
-            "chart-rotation-scale",
+            "parameterization-rotation-scale",
             "rotation and scale in floats: all quadrants, many turns, an angle over 1024, negative \
              scales",
             floats(
-                Ghdr { chart: ROTATION_SCALE, ..gray },
+                Ghdr { parameterization: ROTATION_SCALE, ..gray },
                 &[
                     rotated(5.0, 0.7, 0.0),
                     rotated(5.0, 0.7, 0.5),
@@ -654,7 +658,11 @@ fn invalid_vectors() -> Vec<Vector> {
                 (h.kernel, h.cutoff) = (QUARTIC, 9.0);
             }),
         ),
-        Vector::invalid("xchart", "an unknown chart", with_header(&|h| h.chart = 3)),
+        Vector::invalid(
+            "xparameterization",
+            "an unknown parameterization",
+            with_header(&|h| h.parameterization = 3),
+        ),
         Vector::invalid(
             "xtransform",
             "an unknown colour transform",
@@ -726,7 +734,7 @@ fn invalid_vectors() -> Vec<Vector> {
 /// The CRC-32 of the interleaved samples at the file's depth, 16-bit ones big-endian.
 fn render(decoder: &StreamDecoder, options: &RenderOptions) -> u32 {
     let picture = decoder.picture().expect("the header has arrived");
-    let mut bytes = vec![0; options.output_len(picture.header()).expect("fits")];
+    let mut bytes = vec![0; picture.output_len(options).expect("fits")];
     match picture.header().depth {
         SampleDepth::Eight => picture.render_u8(options, &mut bytes).expect("a sound request"),
         _ => {
@@ -766,8 +774,8 @@ fn lines(vector: &Vector) -> String {
     for request in requests {
         let crc = render(&decoder, &request.options());
         for reference in [false, true] {
-            for parallel in [false, true] {
-                let options = request.options().reference(reference).parallel(parallel);
+            for threads in [Threads::One, Threads::Pool] {
+                let options = request.options().with_reference(reference).with_threads(threads);
                 let found = render(&by_bytes, &options);
                 assert_eq!(found, crc, "{name}, {}: reference {reference}", request.name());
             }
@@ -791,7 +799,7 @@ fn lines(vector: &Vector) -> String {
 #[test]
 fn the_folder_holds_what_the_specification_describes() {
     let folder = Path::new(FOLDER);
-    let vectors = [valid_vectors(), sets::valid(), invalid_vectors(), sets::invalid()];
+    let vectors = [valid_vectors(), entropy::valid(), invalid_vectors(), entropy::invalid()];
     let vectors = vectors.into_iter().flatten().collect::<Vec<Vector>>();
     let mut index = String::from("file\trendering\tresult\tshows\n");
     for vector in &vectors {

@@ -2,9 +2,9 @@
 
 mod common;
 
-use common::coding1::{Code, Grid};
+use common::entropy::{Code, Grid};
 use common::{File, Ghdr, RGB, Random, bits, chunk, decode, decode_valid, of_chunks};
-use image_gip::{DecodeError, Decoder, Gaussian, RenderOptions};
+use image_gip::{DecodeError, Decoder, Gaussian, RenderOptions, Threads};
 
 /// Numbers of threads, fewer and more than layers, and than this machine has.
 const THREADS: [usize; 4] = [1, 2, 3, 9];
@@ -28,7 +28,7 @@ fn sample() -> File {
         Code { class: 2, axes, size, ratio, slant, place }
     };
     let layers = LAYERS.map(|count| (0..count).map(&mut code).collect()).into();
-    File::of_sets(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
+    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
 }
 
 /// The file with a layer that lacks its last word.
@@ -43,7 +43,7 @@ fn damaged(layer: usize) -> Vec<u8> {
 fn adapted(bytes: &[u8]) -> (Vec<Gaussian>, Result<(), DecodeError>) {
     let mut decoder = Decoder::new(bytes).expect("it begins well");
     let result = decoder.read_to_end();
-    (decoder.picture().gaussians().to_vec(), result)
+    (decoder.picture().expect("what is left is sound").gaussians().to_vec(), result)
 }
 
 #[test]
@@ -86,16 +86,16 @@ fn a_picture_is_the_same_on_any_number_of_threads() {
     let decoder = decode_valid(&sample().bytes());
     let picture = decoder.picture().expect("it has arrived");
     for (width, height) in [(200, 150), (75, 160)] {
-        let options = RenderOptions::new().size(width, height);
-        let render = |parallel| {
-            let mut out = vec![f32::NAN; options.output_len(picture.header()).expect("fits")];
-            let options = options.clone().parallel(parallel);
+        let options = RenderOptions::new().with_size(width, height);
+        let render = |threads| {
+            let mut out = vec![f32::NAN; picture.output_len(&options).expect("fits")];
+            let options = options.clone().with_threads(threads);
             picture.render_planes(&options, &mut out).expect("a sound request");
             out.into_iter().map(f32::to_bits).collect::<Vec<_>>()
         };
-        let expected = render(false);
+        let expected = render(Threads::One);
         for threads in THREADS {
-            assert!(on_threads(threads, || render(true)) == expected, "{threads} threads");
+            assert!(on_threads(threads, || render(Threads::Pool)) == expected, "{threads} threads");
         }
     }
 }

@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use image_gip::{ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder};
+use image_gip::{
+    ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder, Threads,
+};
 
 use crate::memory;
 use crate::pictures::{Distortion, TestPicture};
@@ -34,11 +36,11 @@ pub(crate) fn encoder(effort: u8) -> Encoder {
     Encoder::new().with_effort(effort).with_seed(SEED)
 }
 
-/// Encodes a picture with so many threads (`None` for all) and measures the file.
+/// Encodes a picture and measures the file.
 pub(crate) fn encode(
     encoder: Encoder,
     picture: &TestPicture,
-    threads: Option<usize>,
+    threads: Threads,
 ) -> Result<MeasuredFile> {
     let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
     let encoder = encoder.with_threads(threads);
@@ -61,7 +63,7 @@ pub(crate) fn open<T>(
 
 /// The distortion of a file against its source.
 pub(crate) fn distortion(file: &[u8], picture: &TestPicture) -> Result<Distortion> {
-    picture.distortion(&decode(file, true)?)
+    picture.distortion(&decode(file, Threads::Pool)?)
 }
 
 /// PSNR in dB of the float rendering, clamped but not rounded, as papers measure it.
@@ -85,23 +87,23 @@ pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
 }
 
 /// The samples of a file.
-fn decode(file: &[u8], parallel: bool) -> Result<Vec<u8>> {
+fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
     let mut decoder = Decoder::new(file)?;
-    decoder.set_options(RenderOptions::new().parallel(parallel));
-    let mut samples = vec![0; decoder.output_len().context("too many samples")?];
+    decoder.set_options(RenderOptions::new().with_threads(threads));
+    let mut samples = vec![0; decoder.output_len()?];
     decoder.decode_into(&mut samples)?;
     Ok(samples)
 }
 
 /// Peak memory of decoding in bytes, without the file but with the samples.
 pub(crate) fn decode_memory(file: &[u8]) -> Result<f64> {
-    let (samples, bytes) = memory::peak(|| decode(file, true));
+    let (samples, bytes) = memory::peak(|| decode(file, Threads::Pool));
     samples.map(|_| bytes)
 }
 
-/// Seconds of decoding, from the file to samples, with all threads or with one.
-pub(crate) fn decode_seconds(file: &[u8], parallel: bool) -> Result<f64> {
-    median_seconds(REPEATS, || decode(file, parallel).map(|_| ()))
+/// Seconds of decoding, from the file to samples.
+pub(crate) fn decode_seconds(file: &[u8], threads: Threads) -> Result<f64> {
+    median_seconds(REPEATS, || decode(file, threads).map(|_| ()))
 }
 
 /// Seconds of rendering, from Gaussians to samples, with all threads.
@@ -134,7 +136,7 @@ mod tests {
         let picture =
             TestPicture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
         let encoder = encoder(1).with_target(image_gip::Target::Gaussians(20));
-        let measured = encode(encoder, &picture, None).expect("a small picture");
+        let measured = encode(encoder, &picture, Threads::Pool).expect("a small picture");
         let psnr = psnr_float(&measured.file, &picture).expect("it decodes");
         assert!((psnr - measured.report.psnr_float).abs() < 1e-3, "{psnr}");
         assert_eq!(measured.distortion.psnr, measured.report.psnr);

@@ -47,7 +47,7 @@ impl State {
 }
 
 fn outcome<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> Outcome {
-    let mut decoder = StreamDecoder::with_limits(image_gip_fuzz::limits());
+    let mut decoder = StreamDecoder::new().with_limits(image_gip_fuzz::limits());
     let mut used = 0;
     let mut error = None;
     for piece in pieces {
@@ -66,13 +66,17 @@ fn outcome<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> Outcome {
 
 /// Pieces of 0 to 40 bytes, mostly short, from a generator that the contents seed.
 struct Pieces<'a> {
+    whole: &'a [u8],
+    /// What is left of it.
     bytes: &'a [u8],
+    /// How many bytes of it a reader has taken.
+    read: usize,
     random: u32,
 }
 
 impl<'a> Pieces<'a> {
     fn of(bytes: &'a [u8]) -> Self {
-        Self { bytes, random: crc32fast::hash(bytes) | 1 }
+        Self { whole: bytes, bytes, read: 0, random: crc32fast::hash(bytes) | 1 }
     }
 
     fn random(&mut self) -> u32 {
@@ -105,8 +109,11 @@ impl Read for Pieces<'_> {
             None => Ok(0),
             Some([]) => Err(io::ErrorKind::Interrupted.into()),
             Some(piece) => {
-                buffer[..piece.len()].copy_from_slice(piece);
-                Ok(piece.len())
+                let taken = &piece[..piece.len().min(buffer.len())];
+                buffer[..taken.len()].copy_from_slice(taken);
+                self.read += taken.len();
+                self.bytes = &self.whole[self.read..];
+                Ok(taken.len())
             }
         }
     }
@@ -127,12 +134,13 @@ fuzz_target!(|input: &[u8]| {
     assert_eq!(outcome(bytes.chunks(1)), whole, "byte by byte");
     assert_eq!(outcome(Pieces::of(bytes)), whole, "in pieces");
 
-    match Decoder::with_limits(Pieces::of(bytes), image_gip_fuzz::limits()) {
+    match Decoder::new_with_limits(Pieces::of(bytes), image_gip_fuzz::limits()) {
         Ok(mut decoder) => {
             let result = decoder.read_to_end();
+            let complete = result.is_ok();
             assert_eq!(
                 result.err().map(|error| error.to_string()),
-                whole.end.err(),
+                whole.end.clone().err(),
                 "through a reader"
             );
             let mut state = State::of(decoder.stream());
@@ -141,6 +149,10 @@ fuzz_target!(|input: &[u8]| {
                 state.chunks.clone_from(&whole.state.chunks);
             }
             assert_eq!(state, whole.state, "through a reader");
+            if complete {
+                let used = decoder.into_reader().read;
+                assert_eq!(Ok(used), whole.end, "read beyond the end of the file");
+            }
         }
         Err(error) => assert_eq!(Some(error.to_string()), whole.end.err(), "through a reader"),
     }

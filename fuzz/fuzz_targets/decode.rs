@@ -6,7 +6,7 @@ use image_gip::StreamDecoder;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {
-    let mut decoder = StreamDecoder::with_limits(image_gip_fuzz::limits());
+    let mut decoder = StreamDecoder::new().with_limits(image_gip_fuzz::limits());
     let fed = decoder.feed(bytes);
     assert_eq!(fed.is_ok() && decoder.is_complete(), decoder.finish().is_ok());
     image_gip_fuzz::check(&decoder);

@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|file: File| {
     let bytes = file.to_bytes();
-    let mut decoder = StreamDecoder::with_limits(image_gip_fuzz::limits());
+    let mut decoder = StreamDecoder::new().with_limits(image_gip_fuzz::limits());
     let error = decoder.feed(&bytes).err();
     file.check(&decoder, error.as_ref());
     image_gip_fuzz::check(&decoder);

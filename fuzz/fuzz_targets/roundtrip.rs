@@ -5,7 +5,7 @@
 use arbitrary::Arbitrary;
 use image_gip::{
     ColorModel, DecodeError, EncodeError, Encoder, Picture, Precision, RenderOptions, SampleDepth,
-    Source, StreamDecoder, Target, metrics,
+    Source, StreamDecoder, Target, Threads, metrics,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -68,11 +68,11 @@ fuzz_target!(|case: Case| {
         .with_effort(1 + case.effort % 3)
         .with_precision(match (case.float, case.effort & 4) {
             (true, _) => Precision::Float,
-            (false, 0) => Precision::Coded,
+            (false, 0) => Precision::Entropy,
             (false, _) => Precision::Packed,
         })
         .with_seed(case.seed)
-        .with_threads(Some(1))
+        .with_threads(Threads::One)
         .encode(&source)
     {
         Ok(encoded) => encoded,
@@ -108,7 +108,7 @@ fn rendered<'a, T: Clone + Default>(
     render: impl Fn(&Picture<'a>, &RenderOptions, &mut [T]) -> Result<(), DecodeError>,
 ) -> Vec<T> {
     let options = RenderOptions::new();
-    let mut samples = vec![T::default(); options.output_len(picture.header()).expect("small")];
+    let mut samples = vec![T::default(); picture.output_len(&options).expect("small")];
     render(picture, &options, &mut samples).expect("within the default limits");
     samples
 }

@@ -1,9 +1,9 @@
-//! Symbols and bits, or bytes in their place, for two entropy coders.
+//! Symbols and bits, or bytes in their place, for two rans coders.
 
 use arbitrary::Arbitrary;
 use image_gip::fuzzing::{Item, contexts, decode, encode};
 
-use crate::entropy::{self, Decoder, Op};
+use crate::rans::{self, Decoder, Op};
 
 /// What is coded, and bytes to be read in place of what the encoder makes of it.
 #[derive(Arbitrary, Debug)]
@@ -24,7 +24,7 @@ impl Case {
         let items: Vec<Item> = self.items.iter().map(Coded::item).collect();
         let ops: Vec<Op> = items.iter().map(op).collect();
         let bytes = encode(&items);
-        assert_eq!(bytes, entropy::encode(&ops), "the encoders differ");
+        assert_eq!(bytes, rans::encode(&ops), "the encoders differ");
         let values: Vec<u32> = items.iter().map(value).collect();
         assert_eq!(decode(&bytes, &items), (values, true), "what was encoded is not decoded");
 

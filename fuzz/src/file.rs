@@ -6,7 +6,7 @@
 use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
-use crate::sets::Sets;
+use crate::entropy_coded::EntropyCoded;
 
 const SIGNATURE: &[u8] = b"\xC7GIP\r\n\x1A\n";
 
@@ -17,10 +17,10 @@ pub struct File {
     height: Side,
     color: Color,
     sixteen_bit: bool,
-    /// Of coding 1, which leaves chart, quantizers and packed codes unused.
-    sets: Option<Sets>,
+    /// Of the entropy coding, which leaves parameterization, quantizers and packed codes unused.
+    entropy_coded: Option<EntropyCoded>,
     kernel: Kernel,
-    chart: Chart,
+    parameterization: Parameterization,
     base_color: [u16; 4],
     position: [Quantizer; 2],
     shape: [Quantizer; 3],
@@ -53,7 +53,7 @@ enum Kernel {
 }
 
 #[derive(Arbitrary, Clone, Copy, Debug)]
-enum Chart {
+enum Parameterization {
     Covariance,
     Cholesky,
     RotationScale,
@@ -106,9 +106,9 @@ impl File {
     /// The bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let layers = self.layers();
-        let quantizers = match &self.sets {
+        let quantizers = match &self.entropy_coded {
             None => self.quantizers().iter().flat_map(|quantizer| quantizer.entry()).collect(),
-            Some(sets) => sets.quantizers(self.channels()),
+            Some(entropy_coded) => entropy_coded.quantizers(self.channels()),
         };
         let mut chunks = vec![(*b"GHDR", self.header(&layers)), (*b"QNTZ", quantizers)];
         chunks.extend(layers.into_iter().map(|(_, payload)| (*b"GAUS", payload)));
@@ -136,8 +136,8 @@ impl File {
             return;
         }
         assert_eq!(error.is_none(), decoder.is_complete());
-        if let Some(sets) = &self.sets {
-            sets.check(self.sides(), self.channels(), decoder, error);
+        if let Some(entropy_coded) = &self.entropy_coded {
+            entropy_coded.check(self.sides(), self.channels(), decoder, error);
         } else if !self.quantizers().iter().any(|q| matches!(q, Quantizer::Float)) {
             match error {
                 None | Some(DecodeError::Limit { .. }) => {}
@@ -148,8 +148,8 @@ impl File {
 
     /// The payloads of layers that are not empty, each with its number of Gaussians.
     fn layers(&self) -> Vec<(u32, Vec<u8>)> {
-        if let Some(sets) = &self.sets {
-            return sets.layers(self.sides(), self.channels());
+        if let Some(entropy_coded) = &self.entropy_coded {
+            return entropy_coded.layers(self.sides(), self.channels());
         }
         let bits = self.quantizers().iter().map(|quantizer| usize::from(quantizer.bits())).sum();
         let layers = self.layers.iter().map(|codes| layer(codes, bits));
@@ -176,15 +176,15 @@ impl File {
         };
         let gaussians: u32 = layers.iter().map(|&(count, _)| count).sum();
         let depth = if self.sixteen_bit { 16 } else { 8 };
-        let (coding, chart) = match self.sets {
-            None => (0, self.chart),
-            Some(_) => (1, Chart::Cholesky),
+        let (coding, parameterization) = match self.entropy_coded {
+            None => (0, self.parameterization),
+            Some(_) => (1, Parameterization::Cholesky),
         };
         let mut payload = vec![1, coding, self.color as u8, depth];
         payload.extend(self.sides().into_iter().flat_map(u32::to_le_bytes));
         payload.extend(gaussians.to_le_bytes());
         payload.extend((layers.len() as u16).to_le_bytes());
-        payload.extend([kernel, chart as u8]);
+        payload.extend([kernel, parameterization as u8]);
         payload.extend(cutoff.to_le_bytes());
         payload.extend([0; 4]);
         for (channel, value) in self.base_color.iter().enumerate() {

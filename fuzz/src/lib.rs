@@ -2,20 +2,20 @@
 //! of files that look valid.
 
 pub mod coder;
-#[path = "../../tests/common/coding1.rs"]
-#[allow(dead_code, reason = "the tests use more of it")]
-mod coding1;
 #[path = "../../tests/common/entropy.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
 mod entropy;
+mod entropy_coded;
 #[path = "../../tests/common/exp.rs"]
 mod exp;
 pub mod file;
-mod sets;
+#[path = "../../tests/common/rans.rs"]
+mod rans;
 
 use fearless_simd::Level;
 use image_gip::{
     ChunkStatistics, ChunkType, DecodeError, Decoder, Limits, Picture, Region, RenderOptions,
-    StreamDecoder,
+    StreamDecoder, Threads,
 };
 
 /// Bounds that leave room for every branch and keep one input to a few milliseconds.
@@ -35,11 +35,11 @@ const MAX_SIDE: u32 = 40;
 pub fn check_levels(decoder: &StreamDecoder) {
     let Some(picture) = decoder.picture() else { return };
     for options in views(&picture) {
-        let one = options.clone().parallel(false);
+        let one = options.clone().with_threads(Threads::One);
         for level in [Level::new(), Level::baseline()] {
-            check_backend(&picture, &one.clone().simd_level(level));
+            check_backend(&picture, &one.clone().with_simd_level(level));
         }
-        let reference = options.clone().reference(true);
+        let reference = options.clone().with_reference(true);
         assert_eq!(samples(&picture, &options), samples(&picture, &reference));
     }
 }
@@ -49,7 +49,7 @@ pub fn check(decoder: &StreamDecoder) {
     let Some(picture) = decoder.picture() else { return };
     let header = picture.header();
     assert!(picture.gaussians().len() <= header.gaussians as usize);
-    let [small, middle] = views(&picture).map(|options| options.parallel(false));
+    let [small, middle] = views(&picture).map(|options| options.with_threads(Threads::One));
 
     check_backend(&picture, &small);
     let (width, height) = small.output_size(header);
@@ -62,16 +62,18 @@ pub fn check(decoder: &StreamDecoder) {
 /// Decodes the middle of a file from the layers that show in it: the same as from all of them, where
 /// the file does not say which these are.
 pub fn decode_region(bytes: &[u8]) {
-    let Ok(mut decoder) = Decoder::with_limits(bytes, limits()) else { return };
-    let [_, middle] = views(&decoder.picture()).map(|options| options.parallel(false));
-    let Ok(length) = decoder.picture().output_len(&middle) else { return };
+    let Ok(mut decoder) = Decoder::new_with_limits(bytes, limits()) else { return };
+    let Ok(picture) = decoder.picture() else { return };
+    let [_, middle] = views(&picture).map(|options| options.with_threads(Threads::One));
     decoder.set_options(middle.clone());
+    let Ok(length) = decoder.output_len() else { return };
     let mut samples = vec![0; length];
     let decoded = decoder.decode_into(&mut samples);
     let says_where = |chunk: &ChunkStatistics| chunk.kind == ChunkType::BNDS;
     if decoded.is_ok() && !decoder.stream().chunks().iter().any(says_where) {
         let mut expected = vec![0; length];
-        decoder.picture().render_u8(&middle, &mut expected).expect("it was rendered before");
+        let picture = decoder.picture().expect("every layer was decoded");
+        picture.render_u8(&middle, &mut expected).expect("it was rendered before");
         assert_eq!(samples, expected);
     }
 }
@@ -82,15 +84,15 @@ fn views(picture: &Picture<'_>) -> [RenderOptions; 2] {
     let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
     let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
     [
-        RenderOptions::new().size(width, height),
-        RenderOptions::new().region(Region { x, y, width, height }),
+        RenderOptions::new().with_size(width, height),
+        RenderOptions::new().with_region(Region { x, y, width, height }),
     ]
 }
 
 /// The fast code gives the bits of the reference code, or refuses just as it does.
 fn check_backend(picture: &Picture<'_>, options: &RenderOptions) {
     let fast = planes(picture, options);
-    let reference = planes(picture, &options.clone().reference(true));
+    let reference = planes(picture, &options.clone().with_reference(true));
     match (&fast, &reference) {
         (Some(fast), Some(reference)) => {
             let differs = fast.iter().zip(reference).position(|(a, b)| a.to_bits() != b.to_bits());
@@ -103,9 +105,9 @@ fn check_backend(picture: &Picture<'_>, options: &RenderOptions) {
 
 /// A region equals that part of the whole.
 fn check_region(picture: &Picture<'_>, options: &RenderOptions, width: u32, part: Region) {
-    let options = options.clone().parallel(false);
+    let options = options.clone().with_threads(Threads::One);
     let (Some(whole), Some(region)) =
-        (samples(picture, &options), samples(picture, &options.clone().region(part)))
+        (samples(picture, &options), samples(picture, &options.clone().with_region(part)))
     else {
         return;
     };
@@ -116,13 +118,13 @@ fn check_region(picture: &Picture<'_>, options: &RenderOptions, width: u32, part
 
 /// Float planes; `None` when a limit would be exceeded, the only reason to refuse there is.
 fn planes(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<f32>> {
-    let mut out = vec![0.0; options.output_len(picture.header()).expect("small")];
+    let mut out = vec![0.0; picture.output_len(&options).expect("small")];
     granted(picture.render_planes(options, &mut out)).then_some(out)
 }
 
 /// Interleaved samples, as [`planes`].
 fn samples(picture: &Picture<'_>, options: &RenderOptions) -> Option<Vec<u16>> {
-    let mut out = vec![0; options.output_len(picture.header()).expect("small")];
+    let mut out = vec![0; picture.output_len(&options).expect("small")];
     granted(picture.render_u16(options, &mut out)).then_some(out)
 }
 

@@ -1,12 +1,5 @@
-//! Symbols to bytes and back (spec, section 7).
+//! The two ways to store Gaussians: codes of a fixed length, packed, and entropy coding (spec,
+//! section 7).
 
-pub(crate) mod account;
-mod bits;
-pub(crate) mod fixed;
-#[cfg(all(fuzzing, feature = "encode"))]
-pub mod fuzzing;
-pub(crate) mod layers;
-mod rans;
-mod search;
-pub(crate) mod set;
-mod tables;
+pub(crate) mod entropy;
+pub(crate) mod packed;

@@ -2,16 +2,12 @@
 
 use byteorder::{ByteOrder, LittleEndian};
 
-use super::ChunkType;
+use crate::chunk::ChunkType;
 use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
-use crate::gaussian::Chart;
-use crate::render::Kernel;
-
-/// Of a small output: pixels for which one Gaussian is enough.
-const PIXELS_PER_GAUSSIAN: u64 = 12;
-/// Fewer of a file's Gaussians than one out of so many are not the same picture, however small.
-const MOST_LEFT_OUT: u64 = 6;
+use crate::gaussian::Parameterization;
+use crate::kernel::Kernel;
+use crate::layers::plan;
 
 /// The version that this crate reads and writes; 0 was a draft.
 pub(crate) const VERSION: u8 = 1;
@@ -25,24 +21,24 @@ pub(crate) const HEADER_LENGTH: usize = 36;
 #[non_exhaustive]
 pub enum Coding {
     /// Every component at a fixed bit depth, Gaussians in any order.
-    Fixed,
+    Packed,
     /// Each layer as a set, entropy coded, with steps as fine as a Gaussian is strong.
-    Set,
+    Entropy,
 }
 
 impl Coding {
     #[cfg(feature = "encode")]
     const fn code(self) -> u8 {
         match self {
-            Self::Fixed => 0,
-            Self::Set => 1,
+            Self::Packed => 0,
+            Self::Entropy => 1,
         }
     }
 
     const fn from_code(code: u8) -> Option<Self> {
         match code {
-            0 => Some(Self::Fixed),
-            1 => Some(Self::Set),
+            0 => Some(Self::Packed),
+            1 => Some(Self::Entropy),
             _ => None,
         }
     }
@@ -71,7 +67,7 @@ pub struct Header {
     /// The kernel and its cut-off.
     pub kernel: Kernel,
     /// What the three shape attributes mean.
-    pub chart: Chart,
+    pub parameterization: Parameterization,
     /// The colour that the Gaussians are added to: one value in 1/65535 per channel; channels
     /// that the colour model lacks are 0.
     pub base_color: [u16; 4],
@@ -113,10 +109,14 @@ impl Header {
             return Err(DecodeError::malformed(CHUNK, "Gaussians, but no layer"));
         }
         let kernel = Kernel::parse(payload[18], LittleEndian::read_f32(&payload[20..]))?;
-        let chart = Chart::from_code(payload[19])
-            .ok_or_else(|| DecodeError::unsupported(CHUNK, "chart", payload[19].into()))?;
-        if coding == Coding::Set && chart != Chart::Cholesky {
-            return Err(DecodeError::malformed(CHUNK, "a chart that this coding does not have"));
+        let parameterization = Parameterization::from_code(payload[19]).ok_or_else(|| {
+            DecodeError::unsupported(CHUNK, "parameterization", payload[19].into())
+        })?;
+        if coding == Coding::Entropy && parameterization != Parameterization::Cholesky {
+            return Err(DecodeError::malformed(
+                CHUNK,
+                "a parameterization that this coding does not have",
+            ));
         }
         if payload[24] != 0 {
             return Err(DecodeError::unsupported(CHUNK, "colour transform", payload[24].into()));
@@ -139,7 +139,7 @@ impl Header {
             gaussians,
             layers,
             kernel,
-            chart,
+            parameterization,
             base_color,
         })
     }
@@ -157,7 +157,7 @@ impl Header {
         LittleEndian::write_u32(&mut payload[12..], self.gaussians);
         LittleEndian::write_u16(&mut payload[16..], self.layers);
         payload[18] = self.kernel.code();
-        payload[19] = self.chart.code();
+        payload[19] = self.parameterization.code();
         LittleEndian::write_f32(&mut payload[20..], self.kernel.cutoff());
         LittleEndian::write_u16_into(&self.base_color, &mut payload[28..]);
         payload
@@ -179,8 +179,6 @@ impl Header {
     /// strongest.
     #[must_use]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
-        let all = u64::from(self.gaussians);
-        let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
-        shown.clamp(all / MOST_LEFT_OUT, all) as u32
+        plan::gaussians_for(self.gaussians, width, height)
     }
 }

@@ -3,9 +3,9 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use super::ChunkType;
+use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
-use super::chunk::MAX_CHUNK_LENGTH;
+use crate::chunk::MAX_CHUNK_LENGTH;
 use crate::error::DecodeError;
 
 /// Most bytes in a keyword.
@@ -25,8 +25,28 @@ pub struct Metadata {
     pub texts: Vec<Text>,
 }
 
+/// Why metadata cannot be stored.
+#[cfg(feature = "encode")]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MetadataError {
+    /// A profile, Exif or XMP is longer than a chunk can be.
+    #[error("metadata of more than 2^31 - 1 bytes")]
+    TooLong,
+    /// A keyword is empty or too long.
+    #[error("keyword {0:?}; it must be 1 to 79 bytes long")]
+    Keyword(String),
+    /// A keyword or the text of this keyword has a NUL.
+    #[error("a NUL in the text {0:?}")]
+    Nul(String),
+    /// The text of this keyword is longer than a chunk can be.
+    #[error("the text {0:?} is over 2^31 - 1 bytes long")]
+    TextTooLong(String),
+}
+
 /// A keyword and its text.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Text {
     /// 1 to 79 bytes of UTF-8 without NUL, such as `Title`, `Author`, `Copyright`.
     pub keyword: String,
@@ -71,22 +91,22 @@ impl Metadata {
         blobs as u64 + texts as u64 + (self.texts.len() * PER_TEXT) as u64
     }
 
-    /// Says what cannot be stored, if anything cannot, and what can.
+    /// Says what cannot be stored, if anything cannot.
     #[cfg(feature = "encode")]
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), MetadataError> {
         let blobs = [&self.icc_profile, &self.exif, &self.xmp];
         if blobs.into_iter().flatten().any(|blob| blob.len() > MAX_CHUNK_LENGTH as usize) {
-            return Err("metadata of more than 2^31 - 1 bytes".into());
+            return Err(MetadataError::TooLong);
         }
         for Text { keyword, text } in &self.texts {
             if !(1..=MAX_KEYWORD).contains(&keyword.len()) {
-                return Err(alloc::format!("keyword {keyword:?}; it must be 1 to 79 bytes long"));
+                return Err(MetadataError::Keyword(keyword.clone()));
             }
             if keyword.contains('\0') || text.contains('\0') {
-                return Err(alloc::format!("a NUL in the text {keyword:?}"));
+                return Err(MetadataError::Nul(keyword.clone()));
             }
             if keyword.len() + text.len() >= MAX_CHUNK_LENGTH as usize {
-                return Err(alloc::format!("the text {keyword:?} is over 2^31 - 1 bytes long"));
+                return Err(MetadataError::TextTooLong(keyword.clone()));
             }
         }
         Ok(())
@@ -106,6 +126,12 @@ impl Metadata {
 }
 
 impl Text {
+    /// A keyword of 1 to 79 bytes and its text, both without NUL.
+    #[must_use]
+    pub fn new(keyword: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { keyword: keyword.into(), text: text.into() }
+    }
+
     fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
         const CHUNK: ChunkType = ChunkType::TEXT;
         let nul = payload

@@ -2,8 +2,13 @@
 
 use byteorder::{ByteOrder, LittleEndian};
 
-use super::chunk::{ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
+#[cfg(feature = "std")]
+use crate::chunk::FRAMING;
+use crate::chunk::{ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
 use crate::error::DecodeError;
+
+/// Bytes of a CRC.
+const CRC_LENGTH: usize = 4;
 
 /// What the parser found next.
 #[derive(Debug)]
@@ -50,6 +55,21 @@ impl Parser {
             collected: 0,
             crc: crc32fast::Hasher::new(),
             length: 0,
+        }
+    }
+
+    /// How many of the next bytes are certain to be of this file, at least one before it ends: who
+    /// reads no more of them never reads past its end.
+    #[cfg(feature = "std")]
+    pub(crate) fn certain(&self) -> usize {
+        let chunk_after = |chunk| if chunk == ChunkType::GEND { 0 } else { FRAMING };
+        match self.state {
+            State::Signature => SIGNATURE.len() - self.collected + FRAMING,
+            State::ChunkHeader => FRAMING - self.collected,
+            State::Payload(chunk, missing) => {
+                (missing as usize).saturating_add(CRC_LENGTH + chunk_after(chunk))
+            }
+            State::Crc(chunk) => CRC_LENGTH - self.collected + chunk_after(chunk),
         }
     }
 
@@ -108,7 +128,7 @@ impl Parser {
                     return Ok(Event::Payload(payload));
                 }
                 State::Crc(chunk) => {
-                    if !self.collect(input, 4) {
+                    if !self.collect(input, CRC_LENGTH) {
                         return Ok(Event::NeedMore);
                     }
                     let stored = LittleEndian::read_u32(&self.word);

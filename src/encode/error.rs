@@ -2,17 +2,86 @@
 
 use thiserror::Error;
 
+use crate::color::ColorModel;
+use crate::container::{MAX_SIDE, MetadataError};
+
 /// Why a picture was not encoded.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
     /// The source is not a picture that the format can hold.
     #[error("invalid source: {0}")]
-    Source(String),
-    /// An option is out of range; the text says what is allowed.
+    Source(#[from] SourceError),
+    /// An option is out of range.
     #[error("invalid option: {0}")]
-    Option(String),
+    Option(#[from] OptionError),
     /// The progress callback asked to stop.
     #[error("encoding was cancelled")]
     Cancelled,
+}
+
+/// Why samples are not a picture that the format can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum SourceError {
+    /// A side is not 1 to 2^20 pixels long.
+    #[error("{width}x{height} pixels; each side must be 1 to {MAX_SIDE}")]
+    Size {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+    /// There are not as many samples as width x height x channels.
+    #[error("{found} samples; {width}x{height} {color:?} needs {wanted}")]
+    SampleCount {
+        /// Samples that were given.
+        found: usize,
+        /// Samples that the picture has.
+        wanted: u64,
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// What the channels mean.
+        color: ColorModel,
+    },
+}
+
+/// Which option is out of range; the text says what is allowed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum OptionError {
+    /// The effort is not 1 to 9.
+    #[error("effort {0}; it must be 1 to 9")]
+    Effort(u8),
+    /// The number in a [`Target`](crate::Target) is out of range.
+    #[error("{name} {value}; it must be {least} to {most}")]
+    Target {
+        /// What the number is.
+        name: &'static str,
+        /// The number.
+        value: f64,
+        /// The least that is allowed.
+        least: f64,
+        /// The most that is allowed.
+        most: f64,
+    },
+    /// The size asked for is less than a file takes without any Gaussian.
+    #[error("a size of {bytes} bytes; this picture takes at least {least} without any Gaussian")]
+    Size {
+        /// Bytes asked for.
+        bytes: u64,
+        /// The fewest that are possible.
+        least: u64,
+    },
+    /// The metadata cannot be stored.
+    #[error(transparent)]
+    Metadata(#[from] MetadataError),
+    /// A constant of [`Training`](crate::training::Training) breaks this rule.
+    #[error("training: {0}")]
+    Training(&'static str),
+    /// No thread could be started.
+    #[error("no thread could be started: {0}")]
+    Threads(String),
 }

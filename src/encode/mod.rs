@@ -1,253 +1,28 @@
-//! The encoder: pixels to Gaussians to bytes (paper: GaussianImage++).
+//! The encoder: pixels to Gaussians (`fit`), Gaussians to codes (`rdo`), codes to bytes (`file`);
+//! `pipeline` is the way through them (paper: GaussianImage++).
 
-mod budget;
-mod chart;
-mod coded;
-mod control;
-mod densify;
-mod descent;
-mod displacement;
+mod encoder;
+mod entropy;
 mod error;
+mod file;
 mod fit;
-mod gradient;
-mod layout;
-mod lsq;
-mod optimizer;
+mod job;
 mod options;
 mod packed;
-mod patch;
-mod plan;
+mod pipeline;
 mod progress;
 mod raster;
-mod rate;
-mod residuals;
+mod rate_model;
+mod rdo;
+mod shortfall;
 mod source;
-mod steering;
-mod tiling;
-pub(crate) mod training;
+mod strips;
 mod verify;
 
-use core::ops::ControlFlow;
-use std::time::Instant;
-
-pub use error::EncodeError;
+pub use encoder::{Encoded, Encoder, Report, encode};
+pub use error::{EncodeError, OptionError, SourceError};
+pub(crate) use fit::training;
 pub use options::{Precision, Target};
-use progress::Observer;
 pub use progress::Progress;
+pub use shortfall::Shortfall;
 pub use source::Source;
-use training::Training;
-
-use crate::container::Metadata;
-use crate::render::Kernel;
-
-/// Iterations by effort, from 1 to 9, and passes over the codes of coded Gaussians: where time is
-/// short, iterations gain more, and in the end they gain little without the passes.
-const EFFORTS: [(u32, u32); 9] = [
-    (60, 2),
-    (90, 2),
-    (180, 2),
-    (300, 4),
-    (600, 8),
-    (1_200, 12),
-    (2_400, 16),
-    (4_800, 16),
-    (9_600, 16),
-];
-/// Fewest iterations where the error decides how many Gaussians there are: after fewer, it would take
-/// far too many.
-const FEWEST_BY_ERROR: u32 = 180;
-/// Most threads that can be asked for.
-const MAX_THREADS: usize = 1024;
-
-/// Encodes pictures to `.gip`.
-///
-/// ```no_run
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use image_gip::{ColorModel, Encoder, Source, Target};
-///
-/// let pixels = vec![128; 640 * 480 * 3];
-/// let source = Source::new_u8(640, 480, ColorModel::Rgb, &pixels)?;
-/// let encoded = Encoder::new().with_target(Target::Gaussians(2000)).encode(&source)?;
-/// std::fs::write("picture.gip", &encoded.bytes)?;
-/// println!("{:.2} dB with {} Gaussians", encoded.report.psnr, encoded.report.gaussians);
-/// # Ok(())
-/// # }
-/// ```
-#[derive(Clone, Debug)]
-#[must_use]
-pub struct Encoder {
-    target: Target,
-    effort: u8,
-    precision: Precision,
-    seed: u64,
-    threads: Option<usize>,
-    pub(crate) metadata: Metadata,
-    training: Option<Training>,
-}
-
-impl Default for Encoder {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl Encoder {
-    /// An encoder that picks the number of Gaussians by itself, at default effort, entropy coded.
-    pub fn new() -> Self {
-        Self {
-            target: Target::default(),
-            effort: 5,
-            precision: Precision::Coded,
-            seed: 0,
-            threads: None,
-            metadata: Metadata::default(),
-            training: None,
-        }
-    }
-
-    /// What the file shall meet: a count, a size, a rate, a quality.
-    pub fn with_target(mut self, target: Target) -> Self {
-        self.target = target;
-        self
-    }
-
-    /// How much time to spend, 1 (least) to 9 (most). Default 5.
-    pub fn with_effort(mut self, effort: u8) -> Self {
-        self.effort = effort;
-        self
-    }
-
-    /// How attributes are stored. Default [`Precision::Coded`].
-    pub fn with_precision(mut self, precision: Precision) -> Self {
-        self.precision = precision;
-        self
-    }
-
-    /// Seed of everything random. Same source, options and seed give the same file.
-    pub fn with_seed(mut self, seed: u64) -> Self {
-        self.seed = seed;
-        self
-    }
-
-    /// How many threads to use; `None`, the default, uses the current `rayon` pool. The file does
-    /// not depend on it.
-    pub fn with_threads(mut self, threads: Option<usize>) -> Self {
-        self.threads = threads;
-        self
-    }
-
-    /// ICC profile, Exif, XMP and texts to store with the picture.
-    pub fn with_metadata(mut self, metadata: Metadata) -> Self {
-        self.metadata = metadata;
-        self
-    }
-
-    /// Sets the constants of training in place of those that the effort implies.
-    pub fn with_training(mut self, training: Training) -> Self {
-        self.training = Some(training);
-        self
-    }
-
-    /// Encodes `source`.
-    ///
-    /// # Errors
-    /// When an option is out of range, or no file can meet the target.
-    pub fn encode(&self, source: &Source<'_>) -> Result<Encoded, EncodeError> {
-        self.encode_with(source, &mut |_| ControlFlow::Continue(()))
-    }
-
-    /// Encodes `source` and calls `progress` at every iteration, and every few milliseconds of what
-    /// takes longer.
-    ///
-    /// # Errors
-    /// As [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` breaks.
-    pub fn encode_with(
-        &self,
-        source: &Source<'_>,
-        progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
-    ) -> Result<Encoded, EncodeError> {
-        let start = Instant::now();
-        let (training, passes) = self.check()?;
-        let mut observer = Observer::new(progress, training.iterations);
-        let mut run = || control::encode(self, source, &training, passes, &mut observer);
-        let outcome = match self.threads {
-            None => run(),
-            Some(threads) => pool(threads)?.install(run),
-        }?;
-        Ok(Encoded {
-            bytes: outcome.file,
-            report: Report {
-                gaussians: outcome.gaussians,
-                psnr: outcome.distortion.psnr,
-                psnr_float: outcome.distortion.psnr_float,
-                iterations: outcome.work.iterations,
-                evaluations: outcome.work.evaluations,
-                seconds: start.elapsed().as_secs_f64(),
-                peak_memory: outcome.work.peak_memory as u64,
-                shortfall: outcome.shortfall,
-            },
-        })
-    }
-
-    /// Checks all options and settles the training's constants and the passes over codes.
-    fn check(&self) -> Result<(Training, u32), EncodeError> {
-        let wrong = |text: String| Err(EncodeError::Option(text));
-        let Some(&(iterations, passes)) = EFFORTS.get(usize::from(self.effort).wrapping_sub(1))
-        else {
-            return wrong(format!("effort {}; it must be 1 to 9", self.effort));
-        };
-        if self.threads.is_some_and(|threads| !(1..=MAX_THREADS).contains(&threads)) {
-            return wrong(format!("the number of threads must be 1 to {MAX_THREADS}"));
-        }
-        self.target.check().map_err(EncodeError::Option)?;
-        let fewest = if self.target.is_by_error() { FEWEST_BY_ERROR } else { 1 };
-        let iterations = iterations.max(fewest);
-        self.metadata.check().map_err(EncodeError::Option)?;
-        let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
-        training.check().map_err(|rule| EncodeError::Option(format!("training: {rule}")))?;
-        if self.precision == Precision::Coded && training.kernel != Kernel::Quartic {
-            return wrong("training: coded Gaussians need the quartic kernel".into());
-        }
-        Ok((training, passes))
-    }
-}
-
-fn pool(threads: usize) -> Result<rayon::ThreadPool, EncodeError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| EncodeError::Option(format!("{threads} threads: {error}")))
-}
-
-/// A file and how it came about.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-#[must_use]
-pub struct Encoded {
-    /// The whole `.gip` file.
-    pub bytes: Vec<u8>,
-    /// Figures.
-    pub report: Report,
-}
-
-/// Figures of one encoding.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Report {
-    /// Gaussians in the file.
-    pub gaussians: u32,
-    /// PSNR of the decoded file against the source at the source's depth, in dB; infinite for an
-    /// exact copy.
-    pub psnr: f64,
-    /// PSNR of the decoded file before it is rounded to samples (but clamped), in dB: what papers
-    /// report.
-    pub psnr_float: f64,
-    /// Iterations of training.
-    pub iterations: u32,
-    /// Kernel evaluations of training: pairs of a Gaussian and a pixel, each with its gradient.
-    pub evaluations: u64,
-    /// Wall-clock time in seconds.
-    pub seconds: f64,
-    /// Most bytes that the encoder held at a time, the source and the file not counted.
-    pub peak_memory: u64,
-    /// Why the target was not met within 1 % of size or 0.05 dB; `None` when it was.
-    pub shortfall: Option<String>,
-}

@@ -1,5 +1,7 @@
 //! What a caller can ask of the encoder.
 
+use super::error::OptionError;
+
 /// What the file shall meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -34,12 +36,12 @@ const AUTO_QUALITY: f64 = 50.0;
 
 impl Target {
     /// Says what is out of range, if anything is, and what is allowed.
-    pub(crate) fn check(self) -> Result<(), String> {
-        let within = |name: &str, value: f64, low: f64, high: f64| {
-            if (low..=high).contains(&value) {
+    pub(crate) fn check(self) -> Result<(), OptionError> {
+        let within = |name, value, least, most| {
+            if (least..=most).contains(&value) {
                 Ok(())
             } else {
-                Err(format!("{name} {value}; it must be {low} to {high}"))
+                Err(OptionError::Target { name, value, least, most })
             }
         };
         match self {
@@ -89,5 +91,5 @@ pub enum Precision {
     /// Quantization-aware training and bit packing.
     Packed,
     /// Entropy coded, every code chosen by what it costs and what it does to the picture.
-    Coded,
+    Entropy,
 }

@@ -1,16 +1,16 @@
-//! From a fit to a file of coding 0 that meets its target.
+//! From a fit to a file of the packed coding that meets its target.
 
-use super::budget::Budget;
-use super::control::Finished;
-use super::fit::{Fit, Fitted};
-use super::layout::{Layout, layers_length};
-use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE};
+use super::error::EncodeError;
+use super::file::{FileLayout, packed_layers_length};
+use super::fit::budget::Budget;
+use super::fit::training::Training;
+use super::fit::{Fit, Work};
+use super::job::Job;
+use super::options::{PSNR_TOLERANCE, Precision, SIZE_TOLERANCE, Target};
 use super::progress::Observer;
 use super::source::Source;
-use super::training::Training;
 use super::verify::Verified;
-use super::{EncodeError, Precision, Target};
-use crate::quantizer::{Quantizer, Steps};
+use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
 
 /// How often a finished fit may be extended to meet its target.
 const MAX_ROUNDS: u32 = 8;
@@ -24,12 +24,12 @@ pub(crate) fn count_for_size(
     precision: Precision,
     training: &Training,
     channels: usize,
-    layout: &Layout<'_>,
+    layout: &FileLayout<'_>,
 ) -> Result<usize, EncodeError> {
     let quantizers = quantizers(precision, training, channels);
     let least = layout.least_length(&quantizers);
     layout.check_size(bytes, least)?;
-    let fits = |count: usize| least + layers_length(&quantizers, count) <= bytes;
+    let fits = |count: usize| least + packed_layers_length(&quantizers, count) <= bytes;
     let (mut low, mut high) = (0, most + 1);
     while high - low > 1 {
         let middle = usize::midpoint(low, high);
@@ -41,14 +41,13 @@ pub(crate) fn count_for_size(
 /// The file of a finished fit, which is extended or trimmed to the target.
 pub(crate) fn finish(
     mut fit: Fit<'_>,
-    layout: &Layout<'_>,
-    target: Target,
+    job: &Job<'_>,
     budget: Budget,
-    extension: u32,
-    source: &Source<'_>,
+    layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Finished, EncodeError> {
-    let mut file = layout.write(&fit.fitted());
+) -> Result<(Vec<u8>, Work), EncodeError> {
+    let Job { source, target, .. } = *job;
+    let mut file = layout.write_packed(&fit.fitted());
     for _ in 0..MAX_ROUNDS {
         let more = missing(target, budget, &file, source, &fit, observer)?;
         let more = more.min(fit.most().saturating_sub(fit.len()));
@@ -56,8 +55,8 @@ pub(crate) fn finish(
             break;
         }
         let before = fit.len();
-        fit.extend(more, extension, observer)?;
-        file = layout.write(&fit.fitted());
+        fit.extend(more, observer)?;
+        file = layout.write_packed(&fit.fitted());
         if fit.len() == before {
             // There is nothing left to correct.
             break;
@@ -66,13 +65,13 @@ pub(crate) fn finish(
     if let Target::Psnr(target) = target {
         file = trimmed(layout, layout.ordered(&fit.fitted()), file, source, target, observer)?;
     }
-    Ok(Finished { file, work: fit.work() })
+    Ok((file, fit.work()))
 }
 
 /// Quantizers of the depths that a file will have.
 fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec<Quantizer> {
     let depths = &training.quantization;
-    let packed = |bits| Quantizer::Linear(Steps { bits, scale: 1.0, offset: 0.0 });
+    let packed = |bits| Quantizer::Linear(UniformQuantizer { bits, scale: 1.0, offset: 0.0 });
     (0..5 + channels)
         .map(|component| match (precision, component) {
             (Precision::Float, _) => Quantizer::Float,
@@ -116,8 +115,8 @@ fn missing(
 /// those that are not needed among the last ones, where one Gaussian is worth more than the
 /// tolerance. The file as it is if it falls short.
 fn trimmed(
-    layout: &Layout<'_>,
-    mut fitted: Fitted,
+    layout: &FileLayout<'_>,
+    mut fitted: PackedCodes,
     mut file: Vec<u8>,
     source: &Source<'_>,
     target: f64,
@@ -125,7 +124,7 @@ fn trimmed(
 ) -> Result<Vec<u8>, EncodeError> {
     let fewest = least_prefix(&Verified::new(&file, source), target, observer)?;
     fitted.codes.truncate(fewest as usize);
-    file = layout.write(&fitted);
+    file = layout.write_packed(&fitted);
     let mut psnr = Verified::new(&file, source).distortion(u32::MAX, observer)?.psnr;
     for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
         if psnr <= target + PSNR_TOLERANCE {
@@ -133,7 +132,7 @@ fn trimmed(
         }
         let mut fewer = fitted.clone();
         fewer.codes.remove(index);
-        let trial = layout.write(&fewer);
+        let trial = layout.write_packed(&fewer);
         let reached = Verified::new(&trial, source).distortion(u32::MAX, observer)?.psnr;
         if reached >= target {
             (fitted, file, psnr) = (fewer, trial, reached);
@@ -148,7 +147,9 @@ fn least_prefix(
     target: f64,
     observer: &mut Observer<'_>,
 ) -> Result<u32, EncodeError> {
-    let mut reaches = |count| Ok(verified.distortion(count, observer)?.psnr >= target);
+    let mut reaches = |count| -> Result<bool, EncodeError> {
+        Ok(verified.distortion(count, observer)?.psnr >= target)
+    };
     let (mut short, mut enough) = (0, verified.gaussians());
     // Nearly monotone, and whatever this ends on was seen to be enough.
     while enough - short > 1 {

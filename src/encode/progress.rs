@@ -3,7 +3,7 @@
 use core::fmt;
 use core::ops::ControlFlow;
 
-use super::EncodeError;
+use super::error::EncodeError;
 
 /// How far the encoder is.
 #[derive(Clone, Copy, Debug)]

@@ -4,14 +4,14 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::source::Source;
-use crate::render::TILE_HEIGHT;
+use crate::render::tile_grid::TILE_HEIGHT;
 
 /// Pixels per row of a tile of the training pass: twice as wide as the decoder's, since each splat of
 /// a tile has sums to be gathered afterwards.
 pub(crate) const TILE_WIDTH: usize = 16;
 
 /// One channel of a tile, row by row.
-pub(crate) type Plane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
+pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
 /// One channel of the source in a tile, row by row, [`FULL_SCALE`] being a full sample: half as large
 /// as floats and as exact.
 pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];

@@ -1,6 +1,6 @@
 //! The picture to encode.
 
-use super::error::EncodeError;
+use super::error::SourceError;
 use crate::color::{ColorModel, SampleDepth};
 use crate::container::MAX_SIDE;
 
@@ -10,12 +10,12 @@ pub struct Source<'a> {
     width: u32,
     height: u32,
     color: ColorModel,
-    samples: Samples<'a>,
+    samples: SourceSamples<'a>,
 }
 
-/// Samples of either depth.
+/// SourceSamples of either depth.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Samples<'a> {
+pub(crate) enum SourceSamples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
@@ -30,9 +30,9 @@ impl<'a> Source<'a> {
         height: u32,
         color: ColorModel,
         samples: &'a [u8],
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self, SourceError> {
         check(width, height, color, samples.len())?;
-        Ok(Self { width, height, color, samples: Samples::Eight(samples) })
+        Ok(Self { width, height, color, samples: SourceSamples::Eight(samples) })
     }
 
     /// A picture of 16-bit samples in the machine's byte order.
@@ -44,9 +44,9 @@ impl<'a> Source<'a> {
         height: u32,
         color: ColorModel,
         samples: &'a [u16],
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self, SourceError> {
         check(width, height, color, samples.len())?;
-        Ok(Self { width, height, color, samples: Samples::Sixteen(samples) })
+        Ok(Self { width, height, color, samples: SourceSamples::Sixteen(samples) })
     }
 
     /// Width in pixels.
@@ -71,36 +71,32 @@ impl<'a> Source<'a> {
     #[must_use]
     pub fn depth(&self) -> SampleDepth {
         match self.samples {
-            Samples::Eight(_) => SampleDepth::Eight,
-            Samples::Sixteen(_) => SampleDepth::Sixteen,
+            SourceSamples::Eight(_) => SampleDepth::Eight,
+            SourceSamples::Sixteen(_) => SampleDepth::Sixteen,
         }
     }
 
     /// All samples.
-    pub(crate) fn samples(&self) -> Samples<'a> {
+    pub(crate) fn samples(&self) -> SourceSamples<'a> {
         self.samples
     }
 
     /// The sample at an index of the interleaved order, with 16 bits.
     pub(crate) fn wide_sample(&self, index: usize) -> u16 {
         match self.samples {
-            Samples::Eight(samples) => u16::from(samples[index]) * 257,
-            Samples::Sixteen(samples) => samples[index],
+            SourceSamples::Eight(samples) => u16::from(samples[index]) * 257,
+            SourceSamples::Sixteen(samples) => samples[index],
         }
     }
 }
 
-fn check(width: u32, height: u32, color: ColorModel, samples: usize) -> Result<(), EncodeError> {
+fn check(width: u32, height: u32, color: ColorModel, samples: usize) -> Result<(), SourceError> {
     if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-        return Err(EncodeError::Source(format!(
-            "{width}x{height} pixels; each side must be 1 to {MAX_SIDE}"
-        )));
+        return Err(SourceError::Size { width, height });
     }
     let wanted = u64::from(width) * u64::from(height) * color.channels() as u64;
     if samples as u64 != wanted {
-        return Err(EncodeError::Source(format!(
-            "{samples} samples; {width}x{height} {color:?} needs {wanted}"
-        )));
+        return Err(SourceError::SampleCount { found: samples, wanted, width, height, color });
     }
     Ok(())
 }

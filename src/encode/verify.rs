@@ -2,23 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::EncodeError;
+use super::error::EncodeError;
 use super::progress::Observer;
-use super::source::{Samples, Source};
-use crate::decoder::StreamDecoder;
+use super::source::{Source, SourceSamples};
+use super::strips::strips;
+use crate::decode::StreamDecoder;
 use crate::limits::Limits;
-use crate::render::{Region, RenderOptions, Sample};
-
-/// Pixels that are rendered and compared at a time, about: floats of a large picture are many, and
-/// the observer does not wait.
-const STRIP_PIXELS: u32 = 1 << 20;
-
-/// A picture in strips of whole rows, which are rendered and compared one by one.
-pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
-    let rows = (STRIP_PIXELS / width).max(1);
-    let region = move |y| Region { x: 0, y, width, height: rows.min(height - y) };
-    (0..height).step_by(rows as usize).map(region)
-}
+use crate::render::{RenderOptions, Sample};
 
 /// A file, decoded again.
 #[derive(Debug)]
@@ -38,7 +28,7 @@ pub(crate) struct Distortion {
 
 impl<'a> Verified<'a> {
     pub(crate) fn new(file: &[u8], source: &'a Source<'a>) -> Self {
-        let mut stream = StreamDecoder::with_limits(Limits::none());
+        let mut stream = StreamDecoder::new().with_limits(Limits::none());
         stream.feed(file).expect("the decoder reads what the encoder writes");
         assert!(stream.is_complete(), "the encoder writes whole files");
         Self { stream, source }
@@ -56,8 +46,8 @@ impl<'a> Verified<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Distortion, EncodeError> {
         match self.source.samples() {
-            Samples::Eight(samples) => self.distortion_from(samples, count, observer),
-            Samples::Sixteen(samples) => self.distortion_from(samples, count, observer),
+            SourceSamples::Eight(samples) => self.distortion_from(samples, count, observer),
+            SourceSamples::Sixteen(samples) => self.distortion_from(samples, count, observer),
         }
     }
 
@@ -75,7 +65,7 @@ impl<'a> Verified<'a> {
         let (mut rounded, mut exact) = (0.0, 0.0);
         for region in strips(width, height) {
             observer.poll()?;
-            let options = RenderOptions::new().region(region).prefix(count);
+            let options = RenderOptions::new().with_region(region).with_prefix(count);
             let pixels = region.pixels() as usize;
             planes.resize(pixels * channels, 0.0);
             let picture = self.stream.picture().expect("the header was read");

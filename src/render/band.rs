@@ -8,19 +8,18 @@ use core::ops::Range;
 #[cfg(feature = "std")]
 use fearless_simd::dispatch;
 
-use super::footprint::LANES;
-use super::groups::{Group, Groups, MOST_TOGETHER};
-use super::kernel::Kernel;
 use super::splat::{Block, Splat, fill};
-use super::tile::{Backend, TILE_PIXELS, TILE_WIDTH};
 #[cfg(feature = "std")]
-use super::tiling::truncated_at_once;
-use super::tiling::{Columns, Extent, Grid, truncated};
+use super::tile_grid::truncated_at_once;
+use super::tile_grid::{Columns, Extent, TILE_PIXELS, TILE_WIDTH, TileGrid, truncated};
+use super::tile_lists::{MOST_TOGETHER, TileEntry, TileLists};
 use super::view::View;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
+use crate::kernel::Kernel;
 use crate::limits::Limits;
-use crate::threads;
+use crate::simd::{Backend, LANES};
+use crate::threads::{self, Threads};
 
 /// Rows of tiles in a band.
 pub(crate) const BAND_ROWS: usize = 4;
@@ -39,7 +38,7 @@ const LEAST_APART: usize = 512;
 /// Which Gaussians may show in which band.
 #[derive(Debug)]
 pub(crate) struct Bands {
-    grid: Grid<TILE_WIDTH>,
+    grid: TileGrid<TILE_WIDTH>,
     /// In file order, of some Gaussians each: one for each thread.
     parts: Vec<Part>,
 }
@@ -59,19 +58,19 @@ impl Bands {
         backend: Backend,
         limits: &Limits,
         held: u64,
-        parallel: bool,
+        threads: Threads,
     ) -> Result<Self, DecodeError> {
         let gaussians = scene.gaussians;
-        let grid = Grid::new(scene.view.region);
-        let threads = threads::count(parallel);
-        let apart = gaussians.len().div_ceil(threads).max(LEAST_APART).next_multiple_of(LANES);
+        let grid = TileGrid::new(scene.view.region);
+        let count = threads.count();
+        let apart = gaussians.len().div_ceil(count).max(LEAST_APART).next_multiple_of(LANES);
         let parts = gaussians.chunks(apart).map(|gaussians| Scene { gaussians, ..*scene });
         let bands = grid.rows.div_ceil(BAND_ROWS);
         let by_band = (bands as u64 + 1) * (size_of::<usize>() + size_of::<Load>()) as u64;
         let by_gaussian = gaussians.len() as u64 * size_of::<Range<u32>>() as u64;
         let held = held + by_band * parts.len() as u64 + by_gaussian;
         limits.check_memory(held)?;
-        let reaches = threads::map(parallel, parts, |scene| {
+        let reaches = threads::map(threads, parts, |scene| {
             Reaches::new(&scene, &grid, bands, backend, limits)
         });
         let reaches = reaches.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -85,12 +84,12 @@ impl Bands {
             members += loads.iter().map(|load| load.members).sum::<u64>();
             most = most.max(loads.iter().map(|load| load.memory(grid.columns)).sum());
         }
-        let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<Group>();
+        let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<TileEntry>();
         let per_thread = most + columns as u64;
         let memory = members * size_of::<u32>() as u64;
-        limits.check_memory(held + memory + per_thread * threads.min(bands) as u64)?;
+        limits.check_memory(held + memory + per_thread * count.min(bands) as u64)?;
         let firsts = (0..).step_by(apart);
-        let parts = threads::map(parallel, reaches.into_iter().zip(firsts), |(reaches, first)| {
+        let parts = threads::map(threads, reaches.into_iter().zip(firsts), |(reaches, first)| {
             Part::new(&reaches, first)
         });
         Ok(Self { grid, parts })
@@ -134,7 +133,7 @@ struct Reaches {
 impl Reaches {
     fn new(
         Scene { gaussians, view, kernel }: &Scene<'_>,
-        grid: &Grid<TILE_WIDTH>,
+        grid: &TileGrid<TILE_WIDTH>,
         bands: usize,
         backend: Backend,
         limits: &Limits,
@@ -210,7 +209,7 @@ impl Load {
         let blocks = self.members.div_ceil(LANES as u64);
         let groups = self.entries + blocks * (columns as u64).min(MOST_TOGETHER.into());
         blocks * (size_of::<Block>() + BAND_ROWS * size_of::<Columns>()) as u64
-            + groups * size_of::<Group>() as u64
+            + groups * size_of::<TileEntry>() as u64
     }
 }
 
@@ -220,7 +219,7 @@ pub(crate) struct Band {
     blocks: Vec<Block>,
     /// For every row of tiles, those that each splat touches.
     columns: [Vec<Columns>; BAND_ROWS],
-    groups: Groups,
+    groups: TileLists,
 }
 
 impl Band {
@@ -275,7 +274,7 @@ impl Band {
         backend: Backend,
         columns: usize,
         row: usize,
-    ) -> (&Groups, &[Block]) {
+    ) -> (&TileLists, &[Block]) {
         self.groups.sort(backend, columns, &self.columns[row]);
         (&self.groups, &self.blocks)
     }

@@ -1,19 +1,15 @@
 //! Where splats may show: sixteen at a time, in plain loops over lanes that become vector code.
 
-#[cfg(feature = "encode")]
-use super::splat::Splat;
 use super::view::View;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
-
-/// Splats whose footprints are found at the same time.
-pub(super) const LANES: usize = 16;
+use crate::simd::LANES;
 
 /// Centres and Cholesky factors, one lane for each of several ellipses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ellipses {
     pub(super) center: [[f32; LANES]; 2],
-    cholesky: [[f32; LANES]; 3],
+    pub(super) cholesky: [[f32; LANES]; 3],
 }
 
 impl Ellipses {
@@ -29,21 +25,6 @@ impl Ellipses {
         let ([x, y], [a, b, c]) = (&mut self.center, &mut self.cholesky);
         (x[lane], y[lane]) = (cx * sx, cy * sy);
         (a[lane], b[lane], c[lane]) = (l11 * sx, l21 * sy, l22 * sy);
-    }
-
-    /// Those of at most so many splats.
-    #[cfg(feature = "encode")]
-    #[inline(always)]
-    pub(super) fn of(splats: &[Splat]) -> Self {
-        let mut all = Self::NOWHERE;
-        let ([x, y], [i11, w, i22]) = (&mut all.center, &mut all.cholesky);
-        for (lane, splat) in splats.iter().enumerate() {
-            (x[lane], y[lane]) = (splat.x, splat.y);
-            (i11[lane], w[lane], i22[lane]) = (splat.i11, splat.w, splat.i22);
-        }
-        // The inverse of the inverse.
-        all.cholesky = all.inverse_cholesky(1.0);
-        all
     }
 
     /// Widens them by the filter of a view, if it has one. Returns by what that changes amplitudes:

@@ -2,40 +2,31 @@
 
 mod band;
 mod footprint;
-mod groups;
-mod kernel;
 mod output;
-mod splat;
+#[cfg(feature = "std")]
+pub(crate) mod simd_kernel;
+pub(crate) mod splat;
 mod tile;
-mod tiling;
-mod view;
+pub(crate) mod tile_grid;
+mod tile_lists;
+pub(crate) mod view;
 
-use alloc::format;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-pub use kernel::Kernel;
-#[cfg(feature = "std")]
-pub(crate) use view::View;
-pub use view::{Region, RenderOptions};
-
-#[cfg(feature = "encode")]
-pub(crate) use kernel::simd as kernel_simd;
 pub(crate) use output::Sample;
-#[cfg(feature = "encode")]
-pub(crate) use splat::Splat;
-#[cfg(feature = "encode")]
-pub(crate) use tiling::Grid;
+pub use view::RenderOptions;
 
 use band::{BAND_ROWS, Band, Bands, Scene};
-use output::Place;
-pub(crate) use tile::{Backend, TILE_HEIGHT, TILE_WIDTH};
-use tile::{PAIR_WIDTH, Plane, Tile};
+use output::Destination;
+use tile::{PairPlane, Tile};
+use tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
 
 use crate::container::Header;
-use crate::error::{DecodeError, LimitKind};
+use crate::error::{DecodeError, LimitKind, RequestError};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
+use crate::simd::Backend;
 use crate::threads;
 
 /// Rows of pixels in a band.
@@ -97,7 +88,7 @@ impl<'a> Picture<'a> {
     /// Renders interleaved 8-bit samples, rows from the top, without padding.
     ///
     /// # Errors
-    /// When `out` is not [`RenderOptions::output_len`] long, when the options do not fit the
+    /// When `out` is not [`Picture::output_len`] long, when the options do not fit the
     /// picture, or when a limit would be exceeded. `out` is untouched then.
     pub fn render_u8(&self, options: &RenderOptions, out: &mut [u8]) -> Result<(), DecodeError> {
         self.render(options, out)
@@ -137,7 +128,7 @@ impl<'a> Picture<'a> {
             strips.push((band, strip.collect::<Vec<_>>()));
         }
         job.sort(&mut strips);
-        threads::for_each(options.parallel, strips, |memory: &mut Band, (band, mut strip)| {
+        threads::for_each(options.threads, strips, |memory: &mut Band, (band, mut strip)| {
             job.band(memory, band, |planes, x, y| {
                 output::write_planes(planes, (x, y), job.sources, &mut strip, width);
             });
@@ -150,10 +141,10 @@ impl<'a> Picture<'a> {
         let stride = job.scene.view.region.width as usize * job.sources.len();
         let mut strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
         job.sort(&mut strips);
-        threads::for_each(options.parallel, strips, |memory: &mut Band, (band, strip)| {
+        threads::for_each(options.threads, strips, |memory: &mut Band, (band, strip)| {
             job.band(memory, band, |planes, x, y| {
-                let mut place = Place { x, rows: &mut strip[y * stride..], stride };
-                output::write_interleaved(job.backend, planes, job.sources, &mut place);
+                let mut destination = Destination { x, rows: &mut strip[y * stride..], stride };
+                output::write_interleaved(job.backend, planes, job.sources, &mut destination);
             });
         });
         Ok(())
@@ -163,9 +154,7 @@ impl<'a> Picture<'a> {
     fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job<'a>, DecodeError> {
         let wanted = self.output_len(options)?;
         if wanted != out {
-            return Err(DecodeError::Request(format!(
-                "the output buffer holds {out} samples, {wanted} are needed"
-            )));
+            return Err(RequestError::BufferLength { found: out, wanted }.into());
         }
         let view = options.view(self.header, self.limits)?;
         let color = options.output_color(self.header)?;
@@ -174,7 +163,7 @@ impl<'a> Picture<'a> {
         let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP;
         let (held, kernel) = (self.held + strips, self.header.kernel);
         let (scene, backend) = (Scene { gaussians, view, kernel }, options.backend);
-        let bands = Bands::new(&scene, backend, self.limits, held, options.parallel)?;
+        let bands = Bands::new(&scene, backend, self.limits, held, options.threads)?;
         Ok(Job {
             scene,
             bands,
@@ -205,7 +194,7 @@ impl Job<'_> {
 
     /// Renders one band in the memory of an earlier one, and hands each pair of tiles over with its
     /// first column in the region and its first row in the band.
-    fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[Plane], usize, usize)) {
+    fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[PairPlane], usize, usize)) {
         memory.fill(&self.bands, band, &self.scene, self.backend);
         match self.channels {
             1 => self.band_of::<1>(memory, band, write),
@@ -219,7 +208,7 @@ impl Job<'_> {
         &self,
         memory: &mut Band,
         band: usize,
-        mut write: impl FnMut(&[Plane], usize, usize),
+        mut write: impl FnMut(&[PairPlane], usize, usize),
     ) {
         let base: [f32; CHANNELS] = core::array::from_fn(|channel| self.base[channel]);
         let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];

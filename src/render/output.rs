@@ -3,8 +3,10 @@
 #[cfg(feature = "std")]
 use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u8x16, u8x64};
 
-use super::tile::{Backend, PAIR_WIDTH, Plane, TILE_HEIGHT};
+use super::tile::PairPlane;
+use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT};
 use crate::color::ColorModel;
+use crate::simd::Backend;
 
 /// An integer sample type.
 pub(crate) trait Sample: Copy + Send {
@@ -119,7 +121,7 @@ pub(super) fn sources(stored: ColorModel, output: ColorModel) -> &'static [Optio
 }
 
 /// Where two tiles go among interleaved samples.
-pub(super) struct Place<'a, T> {
+pub(super) struct Destination<'a, T> {
     /// Their first column.
     pub(super) x: usize,
     /// From their first row on.
@@ -131,30 +133,30 @@ pub(super) struct Place<'a, T> {
 /// Copies two tiles to interleaved samples.
 pub(super) fn write_interleaved<T: Sample>(
     backend: Backend,
-    planes: &[Plane],
+    planes: &[PairPlane],
     sources: &[Option<usize>],
-    place: &mut Place<'_, T>,
+    destination: &mut Destination<'_, T>,
 ) {
     match *sources {
-        [a] => write_channels(backend, planes, [a], place),
-        [a, b] => write_channels(backend, planes, [a, b], place),
-        [a, b, c] => write_channels(backend, planes, [a, b, c], place),
-        [a, b, c, d] => write_channels(backend, planes, [a, b, c, d], place),
+        [a] => write_channels(backend, planes, [a], destination),
+        [a, b] => write_channels(backend, planes, [a, b], destination),
+        [a, b, c] => write_channels(backend, planes, [a, b, c], destination),
+        [a, b, c, d] => write_channels(backend, planes, [a, b, c, d], destination),
         _ => unreachable!("a picture has one to four channels"),
     }
 }
 
 fn write_channels<T: Sample, const CHANNELS: usize>(
     backend: Backend,
-    planes: &[Plane],
+    planes: &[PairPlane],
     sources: [Option<usize>; CHANNELS],
-    place: &mut Place<'_, T>,
+    destination: &mut Destination<'_, T>,
 ) {
     match backend {
-        Backend::Reference => write_rows(place, |row| pixels(planes, sources, row)),
+        Backend::Reference => write_rows(destination, |row| pixels(planes, sources, row)),
         #[cfg(feature = "std")]
         Backend::Simd(level) => dispatch!(level, simd => write_rows(
-            place,
+            destination,
             #[inline(always)]
             |row| pixels_at_once(simd, planes, sources, row),
         )),
@@ -163,7 +165,7 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
 
 #[inline(always)]
 fn write_rows<T: Sample, const CHANNELS: usize>(
-    Place { x, rows, stride }: &mut Place<'_, T>,
+    Destination { x, rows, stride }: &mut Destination<'_, T>,
     pixels: impl Fn(usize) -> [[T; CHANNELS]; PAIR_WIDTH],
 ) {
     let (x, stride) = (*x, *stride);
@@ -183,7 +185,7 @@ fn write_rows<T: Sample, const CHANNELS: usize>(
 
 /// The pixels of a row of two tiles.
 fn pixels<T: Sample, const CHANNELS: usize>(
-    planes: &[Plane],
+    planes: &[PairPlane],
     sources: [Option<usize>; CHANNELS],
     row: usize,
 ) -> [[T; CHANNELS]; PAIR_WIDTH] {
@@ -198,7 +200,7 @@ fn pixels<T: Sample, const CHANNELS: usize>(
 #[inline(always)]
 fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
     simd: S,
-    planes: &[Plane],
+    planes: &[PairPlane],
     sources: [Option<usize>; CHANNELS],
     row: usize,
 ) -> [[T; CHANNELS]; PAIR_WIDTH] {
@@ -215,7 +217,7 @@ fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
 
 /// Copies two tiles to planes; (x, y) is their first pixel, `width` the length of a row.
 pub(super) fn write_planes(
-    planes: &[Plane],
+    planes: &[PairPlane],
     (x, y): (usize, usize),
     sources: &[Option<usize>],
     strips: &mut [&mut [f32]],

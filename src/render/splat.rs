@@ -1,10 +1,11 @@
 //! A Gaussian as the inner loop wants it, and where on the output it may be visible.
 
-use super::footprint::{Ellipses, LANES};
+use super::footprint::Ellipses;
 use super::view::View;
 use crate::gaussian::Gaussian;
 #[cfg(any(feature = "encode", all(test, feature = "std")))]
 use crate::gaussian::inverse_cholesky;
+use crate::simd::LANES;
 
 /// One Gaussian in output pixels: at a distance of (dx, dy) from its centre (x, y) lies the point
 /// (u, v) = (i11 dx, w dx + i22 dy) of its kernel (spec, sections 9.2 and 9.3).
@@ -48,6 +49,21 @@ pub(super) fn fill<'a>(
         };
     }
     ellipses
+}
+
+/// The outlines of at most so many splats.
+#[cfg(feature = "encode")]
+#[inline(always)]
+pub(super) fn ellipses_of(splats: &[Splat]) -> Ellipses {
+    let mut all = Ellipses::NOWHERE;
+    let ([x, y], [i11, w, i22]) = (&mut all.center, &mut all.cholesky);
+    for (lane, splat) in splats.iter().enumerate() {
+        (x[lane], y[lane]) = (splat.x, splat.y);
+        (i11[lane], w[lane], i22[lane]) = (splat.i11, splat.w, splat.i22);
+    }
+    // The inverse of the inverse.
+    all.cholesky = all.inverse_cholesky(1.0);
+    all
 }
 
 impl Splat {

@@ -1,66 +1,24 @@
 //! One tile of the output: splats added to pixels that stay in registers (spec, section 9.4).
 
 #[cfg(feature = "std")]
-use fearless_simd::{Level, Simd, dispatch, f32x8, f32x16, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x8, f32x16, prelude::*};
 
-use super::groups::Members;
-use super::kernel::Kernel;
 #[cfg(feature = "std")]
-use super::kernel::simd::{Exponential, Quartic, Weight};
+use super::simd_kernel::{Exponential, Quartic, Weight};
 use super::splat::Block;
 #[cfg(feature = "std")]
 use super::splat::Splat;
-
-/// Pixels per row of a tile. Wider ones would be evaluated in vain more often, by a quarter of the
-/// work.
-pub(crate) const TILE_WIDTH: usize = 8;
-/// Pixels per row of two tiles, which become samples together.
-pub(crate) const PAIR_WIDTH: usize = 2 * TILE_WIDTH;
-/// Rows of a tile.
-pub(crate) const TILE_HEIGHT: usize = 8;
-/// Pixels of a tile.
-pub(crate) const TILE_PIXELS: usize = TILE_WIDTH * TILE_HEIGHT;
+use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
+use super::tile_lists::TileSplats;
+use crate::kernel::Kernel;
+use crate::simd::Backend;
 
 /// Rows that share a vector.
 #[cfg(feature = "std")]
 const TOGETHER: usize = 2;
 
 /// One channel of two tiles side by side, row by row.
-pub(crate) type Plane = [[f32; PAIR_WIDTH]; TILE_HEIGHT];
-
-/// Which code adds splats to tiles. All give the same bits.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Backend {
-    /// Plain loops: the oracle, and all there is without `std`.
-    Reference,
-    /// Vector code at one of the levels that this machine has.
-    #[cfg(feature = "std")]
-    Simd(Level),
-}
-
-impl Backend {
-    pub(crate) fn reference() -> Self {
-        Self::Reference
-    }
-
-    /// The best that this machine has.
-    pub(crate) fn fastest() -> Self {
-        #[cfg(feature = "std")]
-        return Self::Simd(Level::new());
-        #[cfg(not(feature = "std"))]
-        return Self::Reference;
-    }
-
-    /// Runs plain loops, compiled for this code's machines.
-    #[inline]
-    pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
-        match self {
-            Self::Reference => work(),
-            #[cfg(feature = "std")]
-            Self::Simd(level) => dispatch!(level, _ => work()),
-        }
-    }
-}
+pub(crate) type PairPlane = [[f32; PAIR_WIDTH]; TILE_HEIGHT];
 
 /// What a tile shows.
 #[derive(Clone, Copy, Debug)]
@@ -70,13 +28,13 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
     pub(crate) base: [f32; CHANNELS],
     pub(crate) blocks: &'a [Block],
     /// Those of the splats that are added, in order.
-    pub(crate) members: Members<'a>,
+    pub(crate) members: TileSplats<'a>,
     pub(crate) kernel: Kernel,
 }
 
 impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
     /// Renders it as the first or the second of its pair.
-    pub(crate) fn render(&self, backend: Backend, half: usize, planes: &mut [Plane; CHANNELS]) {
+    pub(crate) fn render(&self, backend: Backend, half: usize, planes: &mut [PairPlane; CHANNELS]) {
         let left = half * TILE_WIDTH;
         match (backend, self.kernel) {
             (Backend::Reference, _) => self.render_plainly(left, planes),
@@ -92,7 +50,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         }
     }
 
-    fn render_plainly(&self, left: usize, planes: &mut [Plane; CHANNELS]) {
+    fn render_plainly(&self, left: usize, planes: &mut [PairPlane; CHANNELS]) {
         for (plane, base) in planes.iter_mut().zip(self.base) {
             plane.iter_mut().for_each(|row| row[left..][..TILE_WIDTH].fill(base));
         }
@@ -118,7 +76,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         simd: S,
         kernel: K,
         left: usize,
-        planes: &mut [Plane; CHANNELS],
+        planes: &mut [PairPlane; CHANNELS],
     ) {
         // Exact, like every sum of them here.
         const CENTERS: [f32; 8] = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5];
@@ -194,14 +152,16 @@ fn add<S: Simd, K: Weight, const CHANNELS: usize, const SPLATS: usize>(
 mod tests {
     use core::cell::RefCell;
 
+    use fearless_simd::Level;
     use proptest::prelude::*;
     use proptest::test_runner::TestRunner;
 
     use super::*;
     use crate::gaussian::Gaussian;
-    use crate::render::footprint::LANES;
-    use crate::render::groups::Group;
     use crate::render::splat::Splat;
+    use crate::render::tile_grid::TILE_PIXELS;
+    use crate::render::tile_lists::TileEntry;
+    use crate::simd::LANES;
     use crate::testing::{config, simd_levels};
 
     /// How many values at a level have other bits than the reference's, and of how many.
@@ -218,9 +178,9 @@ mod tests {
                 block
             })
             .collect();
-        let groups: Vec<Group> =
-            (0..=blocks.len() as u32).map(|block| Group { block, members: 0xffff }).collect();
-        let members = Members::new(&groups);
+        let groups: Vec<TileEntry> =
+            (0..=blocks.len() as u32).map(|block| TileEntry { block, members: 0xffff }).collect();
+        let members = TileSplats::new(&groups);
         let render = |backend: Backend| {
             let base = [0.5; CHANNELS];
             let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];

@@ -1,36 +1,13 @@
 //! What to render: output size, region, number of Gaussians (spec, section 9.1).
 
-use alloc::format;
-
-use super::kernel::Kernel;
-use super::tile::Backend;
 use crate::color::ColorModel;
 use crate::container::Header;
-use crate::error::DecodeError;
+use crate::error::{DecodeError, MAX_OUTPUT_SIDE, RequestError};
+use crate::kernel::Kernel;
 use crate::limits::Limits;
-
-/// Largest width and height of an output. Up to here every pixel centre is exact in `f32`.
-const MAX_OUTPUT_SIDE: u32 = 1 << 23;
-
-/// A rectangle of output pixels: from (x, y), which is included, `width` to the right and
-/// `height` down.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Region {
-    /// Left edge in pixels.
-    pub x: u32,
-    /// Top edge in pixels.
-    pub y: u32,
-    /// Width in pixels, at least 1.
-    pub width: u32,
-    /// Height in pixels, at least 1.
-    pub height: u32,
-}
-
-impl Region {
-    pub(crate) fn pixels(self) -> u64 {
-        u64::from(self.width) * u64::from(self.height)
-    }
-}
+use crate::region::Region;
+use crate::simd::Backend;
+use crate::threads::Threads;
 
 /// How to render a [`Picture`](crate::Picture). The default is the whole picture at its stored
 /// size with all Gaussians, in the file's own colour model.
@@ -41,7 +18,7 @@ pub struct RenderOptions {
     region: Option<Region>,
     color: Option<ColorModel>,
     pub(crate) prefix: Option<u32>,
-    pub(crate) parallel: bool,
+    pub(crate) threads: Threads,
     pub(super) backend: Backend,
 }
 
@@ -52,7 +29,7 @@ impl Default for RenderOptions {
             region: None,
             color: None,
             prefix: None,
-            parallel: true,
+            threads: Threads::Pool,
             backend: Backend::fastest(),
         }
     }
@@ -67,51 +44,51 @@ impl RenderOptions {
     /// Renders the whole picture `width` by `height` pixels large. The continuous model is
     /// evaluated there; nothing is resampled. Where that is smaller than the stored size, each
     /// Gaussian is first widened by the pixels' own footprint, so that nothing aliases. Each side
-    /// is at most 2^23; [`RenderOptions::region`] keeps a close-up affordable.
-    pub fn size(mut self, width: u32, height: u32) -> Self {
+    /// is at most 2^23; [`RenderOptions::with_region`] keeps a close-up affordable.
+    pub fn with_size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self
     }
 
     /// Renders only this region of the output, in pixels of the output size. The result equals
     /// that part of the full output, bit for bit.
-    pub fn region(mut self, region: Region) -> Self {
+    pub fn with_region(mut self, region: Region) -> Self {
         self.region = Some(region);
         self
     }
 
     /// Renders only the first `count` Gaussians of the file, or as many as there are.
-    pub fn prefix(mut self, count: u32) -> Self {
+    pub fn with_prefix(mut self, count: u32) -> Self {
         self.prefix = Some(count);
         self
     }
 
     /// Writes the samples in another colour model, one that has all channels of the stored one:
     /// gray becomes three equal channels, missing alpha becomes opaque.
-    pub fn color(mut self, color: ColorModel) -> Self {
+    pub fn with_color(mut self, color: ColorModel) -> Self {
         self.color = Some(color);
         self
     }
 
-    /// Whether to use the threads of the current `rayon` pool (default: yes), for rendering and in
-    /// a [`Decoder`](crate::Decoder) for layers of [`Coding::Set`](crate::Coding::Set) too.
-    /// Without the feature `rayon` there is one thread in any case. The result is the same bit for
-    /// bit.
-    pub fn parallel(mut self, parallel: bool) -> Self {
-        self.parallel = parallel;
+    /// The threads that render, and in a [`Decoder`](crate::Decoder) also decode entropy-coded
+    /// layers. Default [`Threads::Pool`].
+    pub fn with_threads(mut self, threads: Threads) -> Self {
+        self.threads = threads;
         self
     }
 
-    /// Whether to use the plain reference code in place of the fast code (default: no). The
-    /// result is the same bit for bit; this is how to find out.
-    pub fn reference(mut self, reference: bool) -> Self {
+    /// Whether to use the plain reference code in place of the fast code (default: no). The result is
+    /// the same bit for bit; this is how to find out.
+    ///
+    /// For study: outside of what the crate promises to keep.
+    pub fn with_reference(mut self, reference: bool) -> Self {
         self.backend = if reference { Backend::reference() } else { Backend::fastest() };
         self
     }
 
     /// Uses the code of one level of vector instructions.
     #[cfg(all(fuzzing, feature = "std"))]
-    pub fn simd_level(mut self, level: fearless_simd::Level) -> Self {
+    pub fn with_simd_level(mut self, level: fearless_simd::Level) -> Self {
         self.backend = Backend::Simd(level);
         self
     }
@@ -136,18 +113,9 @@ impl RenderOptions {
         let loses_alpha = from.has_alpha() && !to.has_alpha();
         let loses_color = from.channels() >= 3 && to.channels() < 3;
         if loses_alpha || loses_color {
-            return Err(DecodeError::Request(format!("{from:?} cannot be written as {to:?}")));
+            return Err(RequestError::ColorModel { from, to }.into());
         }
         Ok(color)
-    }
-
-    /// The number of samples that will be written: width x height x channels. `None` when that
-    /// does not fit a `usize`.
-    #[must_use]
-    pub fn output_len(&self, header: &Header) -> Option<usize> {
-        let (width, height) = self.output_size(header);
-        let channels = self.color.unwrap_or(header.color).channels();
-        usize::try_from(width).ok()?.checked_mul(height as usize)?.checked_mul(channels)
     }
 
     /// Checks the request against the picture and the limits.
@@ -155,19 +123,14 @@ impl RenderOptions {
         let (width, height) = self.size.unwrap_or((header.width, header.height));
         let sides = 1..=MAX_OUTPUT_SIDE;
         if !sides.contains(&width) || !sides.contains(&height) {
-            return Err(DecodeError::Request(format!(
-                "an output of {width}x{height} pixels; each side must be 1 to {MAX_OUTPUT_SIDE}"
-            )));
+            return Err(RequestError::OutputSize { width, height }.into());
         }
         let region = self.region.unwrap_or(Region { x: 0, y: 0, width, height });
         let inside = |at: u32, length: u32, whole: u32| {
             length > 0 && at.checked_add(length).is_some_and(|end| end <= whole)
         };
         if !inside(region.x, region.width, width) || !inside(region.y, region.height, height) {
-            let Region { x, y, width: w, height: h } = region;
-            return Err(DecodeError::Request(format!(
-                "the region {w}x{h} at ({x}, {y}) is empty or not inside the {width}x{height} output"
-            )));
+            return Err(RequestError::Region { region, width, height }.into());
         }
         limits.check_size(region.width, region.height)?;
         Ok(View::new((header.width, header.height), (width, height), region, header.kernel))

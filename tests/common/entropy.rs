@@ -1,217 +1,370 @@
-//! The entropy coder of coding 1 (section 7.3), written from `spec/gip.md` alone.
+//! Layers of the entropy coding (sections 7.4 and 7.5), written from `spec/gip.md` alone: a writer that turns
+//! codes into symbols and bits, and a reader that gives the codes and their values.
 
-/// The shares of sixteen symbols, and how many symbols were read with them.
-#[derive(Clone, Debug)]
-struct Model {
-    /// start(0) to start(16).
-    starts: [i32; 17],
-    read: u32,
+use super::exp::exp;
+use super::rans::{Decoder, Encoder, Flaw, Op};
+
+/// The steps of `QNTZ` (section 5.3): position, size, ratio, slant, then the colour axes.
+pub(crate) type Steps = [f32];
+
+/// One Gaussian as it is coded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Code {
+    pub(crate) class: u32,
+    /// As many as channels.
+    pub(crate) axes: Vec<i32>,
+    /// How much the size is above what its cell lets expect.
+    pub(crate) size: i32,
+    pub(crate) ratio: i32,
+    pub(crate) slant: i32,
+    /// The centre in the units of the grid.
+    pub(crate) place: [u32; 2],
 }
 
-impl Model {
-    fn learn(&mut self, symbol: u32) {
-        let rate = match self.read {
-            0..32 => 5,
-            32..96 => 6,
-            _ => 7,
+/// The grid of section 7.4.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grid {
+    /// In pixels.
+    pub(crate) root: u32,
+    pub(crate) roots: [u32; 2],
+}
+
+impl Grid {
+    /// For the width and the height of a picture.
+    pub(crate) fn new(sides: [u32; 2]) -> Self {
+        let longer = sides[0].max(sides[1]);
+        let root = longer.div_ceil(16).max(8).next_power_of_two();
+        Self { root, roots: sides.map(|side| side.div_ceil(root) + 2) }
+    }
+
+    /// A point of the picture in units.
+    pub(crate) fn units(&self, point: [f32; 2]) -> [u32; 2] {
+        point.map(|pixels| ((pixels + self.root as f32) * 128.0) as u32)
+    }
+
+    fn whole(&self) -> Cell {
+        Cell { corner: [0, 0], sides: self.roots.map(|roots| roots * self.root) }
+    }
+}
+
+/// A rectangle of the grid, in pixels.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    corner: [u32; 2],
+    sides: [u32; 2],
+}
+
+impl Cell {
+    fn is_split(&self, grid: &Grid, count: u32) -> bool {
+        let large = self.sides.iter().any(|&side| side > grid.root);
+        (count > 1 || large) && self.sides != [1, 1]
+    }
+
+    /// The left or upper part, and the other.
+    fn parts(&self, grid: &Grid) -> [Self; 2] {
+        let axis = usize::from(self.sides[1] > self.sides[0]);
+        let side = self.sides[axis];
+        let half =
+            if side > grid.root { (side / grid.root).div_ceil(2) * grid.root } else { side / 2 };
+        let (mut first, mut second) = (*self, *self);
+        first.sides[axis] = half;
+        second.corner[axis] += half;
+        second.sides[axis] -= half;
+        [first, second]
+    }
+
+    fn holds(&self, place: [u32; 2]) -> bool {
+        let inside = |axis: usize| {
+            let start = self.corner[axis] * 128;
+            (start..start + self.sides[axis] * 128).contains(&place[axis])
         };
-        self.read += 1;
-        for (s, start) in (0..16).zip(&mut self.starts).skip(1) {
-            let target = s + if s > symbol as i32 { (1 << 15) - 16 } else { 0 };
-            *start += (target - *start) >> rate;
+        inside(0) && inside(1)
+    }
+
+    fn level(&self) -> u32 {
+        (self.sides[0].ilog2()) + (self.sides[1].ilog2())
+    }
+}
+
+/// The numbers of a share among the Gaussians of a cell: the first and the last.
+fn share(symbol: u32, count: u32) -> [u64; 2] {
+    let edge = |s: u32| (u64::from(s) * (u64::from(count) + 1)).div_ceil(16);
+    [edge(symbol), edge(symbol + 1) - 1]
+}
+
+/// How many bits tell the numbers of a share apart.
+fn share_bits([low, high]: [u64; 2]) -> u32 {
+    (high - low + 1).next_power_of_two().ilog2()
+}
+
+/// The context of a colour axis after the first.
+fn axis_context(axis: usize, class: u32, before: i32) -> u32 {
+    let m = match before.unsigned_abs() {
+        0 => 0,
+        1 => 1,
+        2..4 => 2,
+        4..8 => 3,
+        _ => 4,
+    };
+    9 + 40 * (axis as u32 - 1) + 5 * class + m
+}
+
+fn slant_context(class: u32, ratio: i32) -> u32 {
+    let q = if class <= 2 { ratio << (2 - class) } else { ratio >> (class - 2) };
+    let j = (q.div_euclid(3) + 3).clamp(0, 6);
+    135 + 7 * class.min(2) + j as u32
+}
+
+fn fine(class: u32) -> f32 {
+    1.0 / (1 << class) as f32
+}
+
+/// How large a Gaussian is expected to be in a cell.
+fn expected_size(steps: &Steps, class: u32, level: u32) -> i32 {
+    ((0.1 + 0.19 * level as f32) / (steps[1] * fine(class))) as i32
+}
+
+/// Section 7.5, without what depends on the place.
+struct Shape {
+    size: f32,
+    cholesky: [f32; 3],
+}
+
+impl Shape {
+    /// With the whole size of `code`.
+    fn new(steps: &Steps, code: &Code, size: i32) -> Self {
+        let fine = fine(code.class);
+        let e = |x: f32| exp(x.clamp(-20.0, 20.0));
+        let s = e(size as f32 * (steps[1] * fine));
+        let t = e(code.ratio as f32 * (steps[2] * fine));
+        let (l11, l22) = (s * t, s / t);
+        let l21 = code.slant as f32 * (steps[3] * fine) * l22;
+        Self { size: s, cholesky: [l11, l21, l22] }
+    }
+
+    /// How many bits a place in this cell has along each axis.
+    fn place_bits(&self, steps: &Steps, class: u32, cell: &Cell) -> [u32; 2] {
+        [0, 1].map(|axis| {
+            let l = self.cholesky[2 * axis];
+            let side = ((steps[0] * fine(class)) * l) * core::f32::consts::SQRT_2;
+            let exponent = (side.to_bits() >> 23) as i32 - 127;
+            let f = (-exponent).min(6);
+            (f + cell.sides[axis].ilog2() as i32).max(0) as u32
+        })
+    }
+}
+
+/// The units between the middles of the parts of a cell, of which there are 2^bits.
+fn part(cell: &Cell, axis: usize, bits: u32) -> u32 {
+    (cell.sides[axis] * 128) >> bits
+}
+
+/// The symbols and bits of a layer; brings `layer` into the order of the tree and its places to
+/// where a decoder finds them.
+pub(crate) fn write(sides: [u32; 2], steps: &Steps, layer: &mut Vec<Code>) -> Vec<Op> {
+    let grid = Grid::new(sides);
+    let (mut encoder, mut done) = (Encoder::default(), Vec::new());
+    write_cell(&mut encoder, &grid, steps, grid.whole(), core::mem::take(layer), &mut done);
+    *layer = done;
+    encoder.ops
+}
+
+fn write_cell(
+    encoder: &mut Encoder,
+    grid: &Grid,
+    steps: &Steps,
+    cell: Cell,
+    codes: Vec<Code>,
+    done: &mut Vec<Code>,
+) {
+    let count = codes.len() as u32;
+    if cell.is_split(grid, count) {
+        let parts = cell.parts(grid);
+        let (first, second): (Vec<Code>, Vec<Code>) =
+            codes.into_iter().partition(|code| parts[0].holds(code.place));
+        write_count(encoder, count, first.len() as u32);
+        for (part, codes) in parts.into_iter().zip([first, second]) {
+            if !codes.is_empty() {
+                write_cell(encoder, grid, steps, part, codes, done);
+            }
         }
+        return;
     }
-
-    /// start(symbol) and how much there is to start(symbol + 1).
-    fn share(&self, symbol: u32) -> (u32, u32) {
-        let symbol = symbol as usize;
-        let (start, end) = (self.starts[symbol], self.starts[symbol + 1]);
-        (start as u32, (end - start) as u32)
-    }
-}
-
-/// One model for each context.
-#[derive(Clone, Debug)]
-struct Models(Vec<Model>);
-
-impl Models {
-    /// As the table of the specification says.
-    fn new() -> Self {
-        let table = include_str!("../../spec/coding1-models.tsv");
-        let model = |line: &str| {
-            let mut starts = [1 << 15; 17];
-            let numbers = line.split('\t').skip(1).map(|n| n.parse().expect("a number"));
-            starts.iter_mut().zip(numbers).for_each(|(start, number)| *start = number);
-            Model { starts, read: 0 }
-        };
-        Self(table.lines().map(model).collect())
+    for mut code in codes {
+        assert!(cell.holds(code.place), "{code:?} is outside the grid");
+        write_code(encoder, steps, &cell, &mut code);
+        done.push(code);
     }
 }
 
-/// What is coded, in the order in which it is read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Op {
-    Symbol {
-        context: u32,
-        symbol: u32,
-    },
-    /// At most 16 plain bits.
-    Bits {
-        count: u32,
-        value: u32,
-    },
-}
-
-/// The bytes of a layer from which a decoder reads `ops`.
-pub(crate) fn encode(ops: &[Op]) -> Vec<u8> {
-    let mut models = Models::new();
-    // The models learn forwards, but the last is coded first.
-    let shares = ops.iter().map(|&op| match op {
-        Op::Symbol { context, symbol } => {
-            let model = &mut models.0[context as usize];
-            let (start, size) = model.share(symbol);
-            model.learn(symbol);
-            (u64::from(start), u64::from(size), 1 << 15)
-        }
-        Op::Bits { count, value } => (u64::from(value), 1, 1 << count),
-    });
-    let shares: Vec<(u64, u64, u64)> = shares.collect();
-    let (mut state, mut words) = (1_u64 << 16, Vec::new());
-    // What the decoder does, undone.
-    for &(start, size, total) in shares.iter().rev() {
-        // States from here on would not fit into 32 bits.
-        let room = (size << 32) / total;
-        if state >= room {
-            words.push(state as u16);
-            state >>= 16;
-        }
-        state = state / size * total + state % size + start;
+fn write_count(encoder: &mut Encoder, count: u32, first: u32) {
+    if count < 16 {
+        encoder.symbol(157 + count, first);
+        return;
     }
-    let mut bytes = (state as u32).to_le_bytes().to_vec();
-    bytes.extend(words.iter().rev().flat_map(|word| word.to_le_bytes()));
-    bytes
+    let number = u64::from(first);
+    let symbol = (0..16).find(|&s| number <= share(s, count)[1]).expect("at most `count`");
+    let share = share(symbol, count);
+    encoder.symbol(173 + count.ilog2(), symbol);
+    encoder.bits(share_bits(share), (number - share[0]) as u32);
 }
 
-/// The state and the words of a layer, while it is read.
-pub(crate) struct Decoder<'a> {
-    models: Models,
-    state: u32,
-    words: &'a [u8],
+fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code) {
+    let class = code.class;
+    encoder.symbol(0, class);
+    let shift = class.saturating_sub(3);
+    let first = code.axes[0];
+    let h = first.unsigned_abs() >> shift;
+    encoder.symbol(1 + class, h.min(15));
+    if h >= 15 {
+        encoder.excess(h as i32 - 15);
+    }
+    encoder.bits(shift, first.unsigned_abs() & ((1 << shift) - 1));
+    if first != 0 {
+        encoder.bits(1, u32::from(first < 0));
+    }
+    for axis in 1..code.axes.len() {
+        let context = axis_context(axis, class, code.axes[axis - 1]);
+        let value = code.axes[axis];
+        encoder.signed(context, shift, if first < 0 { -value } else { value });
+    }
+    let (r, shift) = (class.min(2), class.saturating_sub(2));
+    encoder.signed(129 + r, shift, code.size);
+    encoder.signed(132 + r, shift, code.ratio);
+    encoder.signed(slant_context(class, code.ratio), shift, code.slant);
+
+    let size = code.size.wrapping_add(expected_size(steps, class, cell.level()));
+    let bits = Shape::new(steps, code, size).place_bits(steps, class, cell);
+    for (axis, bits) in bits.into_iter().enumerate() {
+        let part = part(cell, axis, bits);
+        let corner = cell.corner[axis] * 128;
+        let p = (code.place[axis] - corner) / part;
+        encoder.bits(bits, p);
+        code.place[axis] = corner + p * part + part / 2;
+    }
+}
+
+/// What a reader finds in a layer.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Layer {
     pub(crate) ops: Vec<Op>,
     /// The state before each of them, and after the last.
     pub(crate) states: Vec<u32>,
+    pub(crate) codes: Vec<Code>,
+    /// x, y, l11, l21, l22 and the amplitudes of each Gaussian.
+    pub(crate) values: Vec<Vec<f32>>,
 }
 
-/// What is wrong with a layer.
-pub(crate) type Flaw = &'static str;
-
-impl<'a> Decoder<'a> {
-    pub(crate) fn new(bytes: &'a [u8]) -> Result<Self, Flaw> {
-        let (state, words) = bytes.split_first_chunk().ok_or("no state")?;
-        let state = u32::from_le_bytes(*state);
-        if state < 1 << 16 {
-            return Err("the state begins below 2^16");
-        }
-        Ok(Self { models: Models::new(), state, words, ops: Vec::new(), states: vec![state] })
+/// Reads the payload of a `GAUS`, as if the header left room for any number of Gaussians.
+pub(crate) fn read(sides: [u32; 2], steps: &Steps, payload: &[u8]) -> Result<Layer, Flaw> {
+    let (count, bytes) = payload.split_first_chunk().ok_or("no count")?;
+    let count = u32::from_le_bytes(*count);
+    if count == 0 {
+        return Err("no Gaussians");
     }
-
-    /// After every symbol and every number of bits.
-    fn refill(&mut self) -> Result<(), Flaw> {
-        if self.state < 1 << 16 {
-            let (word, rest) = self.words.split_first_chunk().ok_or("no word left")?;
-            self.state = self.state << 16 | u32::from(u16::from_le_bytes(*word));
-            self.words = rest;
-        }
-        self.states.push(self.state);
-        Ok(())
+    if u64::from(count) > 4 * bytes.len() as u64 {
+        return Err("more than four Gaussians for each byte");
     }
+    let mut decoder = Decoder::new(bytes)?;
+    let grid = Grid::new(sides);
+    let mut layer = Layer::default();
+    read_cell(&mut decoder, &grid, steps, grid.whole(), count, &mut layer)?;
+    decoder.end()?;
+    (layer.ops, layer.states) = (decoder.ops, decoder.states);
+    Ok(layer)
+}
 
-    pub(crate) fn symbol(&mut self, context: u32) -> Result<u32, Flaw> {
-        let model = &mut self.models.0[context as usize];
-        let share = self.state % (1 << 15);
-        let symbol = (0..16).find(|&s| share < model.starts[s + 1] as u32);
-        let symbol = symbol.expect("the shares end with 2^15") as u32;
-        let (start, size) = model.share(symbol);
-        self.state = size * (self.state >> 15) + share - start;
-        model.learn(symbol);
-        self.ops.push(Op::Symbol { context, symbol });
-        self.refill()?;
-        Ok(symbol)
-    }
-
-    pub(crate) fn bits(&mut self, count: u32) -> Result<u32, Flaw> {
-        if count > 16 {
-            let low = self.bits(16)?;
-            return Ok(low | self.bits(count - 16)? << 16);
-        }
-        let value = self.state % (1 << count);
-        self.state >>= count;
-        self.ops.push(Op::Bits { count, value });
-        self.refill()?;
-        Ok(value)
-    }
-
-    pub(crate) fn excess(&mut self) -> Result<i32, Flaw> {
-        let n = self.symbol(156)?;
-        let b = self.bits(n)?;
-        Ok((1 << n) + b as i32 - 1)
-    }
-
-    pub(crate) fn signed(&mut self, context: u32, shift: u32) -> Result<i32, Flaw> {
-        let h = match self.symbol(context)? {
-            15 => {
-                let negative = self.bits(1)? == 1;
-                let h = 8 + self.excess()?;
-                if negative { -h } else { h }
+fn read_cell(
+    decoder: &mut Decoder<'_>,
+    grid: &Grid,
+    steps: &Steps,
+    cell: Cell,
+    count: u32,
+    layer: &mut Layer,
+) -> Result<(), Flaw> {
+    if cell.is_split(grid, count) {
+        let first = read_count(decoder, count)?;
+        for (part, count) in cell.parts(grid).into_iter().zip([first, count - first]) {
+            if count > 0 {
+                read_cell(decoder, grid, steps, part, count, layer)?;
             }
-            symbol => symbol as i32 - 7,
-        };
-        Ok(h.wrapping_mul(1 << shift).wrapping_add(self.bits(shift)? as i32))
-    }
-
-    pub(crate) fn end(&self) -> Result<(), Flaw> {
-        match (self.state, self.words) {
-            (0x1_0000, []) => Ok(()),
-            (0x1_0000, _) => Err("words left"),
-            _ => Err("another state at the end"),
         }
+        return Ok(());
     }
+    for _ in 0..count {
+        let (code, values) = read_code(decoder, grid, steps, &cell)?;
+        layer.codes.push(code);
+        layer.values.push(values);
+    }
+    Ok(())
 }
 
-/// The writer's half of the numbers that are made of symbols and bits.
-#[derive(Debug, Default)]
-pub(crate) struct Encoder {
-    pub(crate) ops: Vec<Op>,
+fn read_count(decoder: &mut Decoder<'_>, count: u32) -> Result<u32, Flaw> {
+    if count < 16 {
+        let first = decoder.symbol(157 + count)?;
+        return if first <= count { Ok(first) } else { Err("a part with more than the whole") };
+    }
+    let share = share(decoder.symbol(173 + count.ilog2())?, count);
+    let number = share[0] + u64::from(decoder.bits(share_bits(share))?);
+    if number <= share[1] { Ok(number as u32) } else { Err("a count beyond its share") }
 }
 
-impl Encoder {
-    pub(crate) fn symbol(&mut self, context: u32, symbol: u32) {
-        self.ops.push(Op::Symbol { context, symbol });
+fn read_code(
+    decoder: &mut Decoder<'_>,
+    grid: &Grid,
+    steps: &Steps,
+    cell: &Cell,
+) -> Result<(Code, Vec<f32>), Flaw> {
+    let class = decoder.symbol(0)?;
+    if class > 7 {
+        return Err("a class over 7");
     }
+    let shift = class.saturating_sub(3);
+    let mut first = decoder.symbol(1 + class)? as i32;
+    if first == 15 {
+        first += decoder.excess()?;
+    }
+    first = first.wrapping_mul(1 << shift).wrapping_add(decoder.bits(shift)? as i32);
+    let negative = first != 0 && decoder.bits(1)? == 1;
+    let signed = |value: i32| if negative { value.wrapping_neg() } else { value };
+    let mut axes = vec![signed(first)];
+    for axis in 1..steps.len() - 4 {
+        let context = axis_context(axis, class, axes[axis - 1]);
+        axes.push(signed(decoder.signed(context, shift)?));
+    }
+    let (r, shift) = (class.min(2), class.saturating_sub(2));
+    let size = decoder.signed(129 + r, shift)?;
+    let ratio = decoder.signed(132 + r, shift)?;
+    let slant = decoder.signed(slant_context(class, ratio), shift)?;
+    let mut code = Code { class, axes, size, ratio, slant, place: [0; 2] };
 
-    pub(crate) fn bits(&mut self, count: u32, value: u32) {
-        let low = count.min(16);
-        self.ops.push(Op::Bits { count: low, value: value & ((1 << low) - 1) });
-        if count > 16 {
-            self.bits(count - 16, value >> 16);
-        }
+    let whole_size = size.wrapping_add(expected_size(steps, class, cell.level()));
+    let shape = Shape::new(steps, &code, whole_size);
+    let bits = shape.place_bits(steps, class, cell);
+    for (axis, bits) in bits.into_iter().enumerate() {
+        let part = part(cell, axis, bits);
+        code.place[axis] = cell.corner[axis] * 128 + decoder.bits(bits)? * part + part / 2;
     }
+    let values = values(grid, steps, &code, &shape);
+    Ok((code, values))
+}
 
-    pub(crate) fn excess(&mut self, number: i32) {
-        let n = (number + 1).ilog2();
-        self.symbol(156, n);
-        self.bits(n, (number + 1 - (1 << n)) as u32);
+/// Section 7.5.
+fn values(grid: &Grid, steps: &Steps, code: &Code, shape: &Shape) -> Vec<f32> {
+    let root = (grid.root * 128) as i32;
+    let center = code.place.map(|units| (units as i32 - root) as f32 / 128.0);
+    let mut axes = [0.0; 4];
+    for ((axis, &code), &step) in axes.iter_mut().zip(&code.axes).zip(&steps[4..]) {
+        *axis = code as f32 * (step / shape.size);
     }
-
-    pub(crate) fn signed(&mut self, context: u32, shift: u32, number: i32) {
-        let h = number >> shift;
-        if (-7..=7).contains(&h) {
-            self.symbol(context, (h + 7) as u32);
-        } else {
-            self.symbol(context, 15);
-            self.bits(1, u32::from(h < 0));
-            self.excess(h.abs() - 8);
-        }
-        self.bits(shift, number as u32 & ((1 << shift) - 1));
+    let channels = code.axes.len();
+    if channels > 2 {
+        let [a, b, c, d] = [0.577_350_26, 0.707_106_77, 0.408_248_3, -0.816_496_6];
+        let [u, v, w, alpha] = axes;
+        let red = a * u + b * v + c * w;
+        let green = a * u + 0.0 * v + d * w;
+        let blue = a * u - b * v + c * w;
+        axes = [red, green, blue, alpha];
     }
+    [&center[..], &shape.cholesky, &axes[..channels]].concat()
 }

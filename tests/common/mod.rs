@@ -3,13 +3,13 @@
 
 #![allow(dead_code, reason = "every test binary uses a part of this")]
 
-pub(crate) mod coding1;
 pub(crate) mod entropy;
 mod exp;
 pub(crate) mod memory;
 pub(crate) mod oracle;
+pub(crate) mod rans;
 
-use coding1::Code;
+use entropy::Code;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
 
 /// Section 4.1.
@@ -43,7 +43,7 @@ pub(crate) struct Ghdr {
     pub(crate) gaussians: u32,
     pub(crate) layers: u16,
     pub(crate) kernel: u8,
-    pub(crate) chart: u8,
+    pub(crate) parameterization: u8,
     pub(crate) cutoff: f32,
     pub(crate) transform: u8,
     pub(crate) reserved: [u8; 3],
@@ -51,7 +51,7 @@ pub(crate) struct Ghdr {
 }
 
 impl Default for Ghdr {
-    /// Gray, 8 bits, 16x16, no Gaussians, quartic kernel, Cholesky chart, black.
+    /// Gray, 8 bits, 16x16, no Gaussians, quartic kernel, Cholesky parameterization, black.
     fn default() -> Self {
         Self {
             version: 1,
@@ -63,7 +63,7 @@ impl Default for Ghdr {
             gaussians: 0,
             layers: 0,
             kernel: QUARTIC,
-            chart: CHOLESKY,
+            parameterization: CHOLESKY,
             cutoff: 4.0,
             transform: 0,
             reserved: [0; 3],
@@ -89,7 +89,7 @@ impl Ghdr {
         bytes.extend(self.height.to_le_bytes());
         bytes.extend(self.gaussians.to_le_bytes());
         bytes.extend(self.layers.to_le_bytes());
-        bytes.extend([self.kernel, self.chart]);
+        bytes.extend([self.kernel, self.parameterization]);
         bytes.extend(self.cutoff.to_le_bytes());
         bytes.push(self.transform);
         bytes.extend(self.reserved);
@@ -169,36 +169,36 @@ pub(crate) struct File {
     pub(crate) extra: Vec<([u8; 4], Vec<u8>)>,
     /// Codes of each layer.
     pub(crate) layers: Vec<Vec<u32>>,
-    /// What a file of coding 1 has in place of entries and layers.
-    pub(crate) sets: Option<Sets>,
+    /// What an entropy-coded file has in place of entries and layers.
+    pub(crate) entropy_coded: Option<EntropyCoded>,
 }
 
-/// The content of a file of coding 1.
+/// The content of an entropy-coded file.
 #[derive(Clone, Debug)]
-pub(crate) struct Sets {
+pub(crate) struct EntropyCoded {
     pub(crate) steps: Vec<f32>,
     pub(crate) layers: Vec<Vec<Code>>,
 }
 
-/// The payload of `QNTZ` of coding 1.
+/// The payload of `QNTZ` of the entropy coding.
 pub(crate) fn steps(steps: &[f32]) -> Vec<u8> {
     steps.iter().flat_map(|step| step.to_le_bytes()).collect()
 }
 
-impl Sets {
+impl EntropyCoded {
     /// The payloads of `GAUS`.
     fn payloads(&self, header: &Ghdr) -> Vec<Vec<u8>> {
         let payload = |layer: &Vec<Code>| {
-            let ops = coding1::write(header.sides(), &self.steps, &mut layer.clone());
+            let ops = entropy::write(header.sides(), &self.steps, &mut layer.clone());
             let count = (layer.len() as u32).to_le_bytes();
-            [&count[..], &entropy::encode(&ops)].concat()
+            [&count[..], &rans::encode(&ops)].concat()
         };
         self.layers.iter().map(payload).collect()
     }
 
     fn components(&self, header: &Ghdr) -> Vec<Vec<f32>> {
         let values = |payload: Vec<u8>| {
-            let layer = coding1::read(header.sides(), &self.steps, &payload);
+            let layer = entropy::read(header.sides(), &self.steps, &payload);
             layer.expect("what was just written").values
         };
         self.payloads(header).into_iter().flat_map(values).collect()
@@ -218,21 +218,21 @@ impl File {
         header.layers = layers.len() as u16;
         let codes: usize = layers.iter().map(Vec::len).sum();
         header.gaussians = (codes / entries.len()) as u32;
-        Self { header, entries, extra: Vec::new(), layers, sets: None }
+        Self { header, entries, extra: Vec::new(), layers, entropy_coded: None }
     }
 
-    /// A file of coding 1 with these layers; the header's coding and counts are set to match.
-    pub(crate) fn of_sets(header: Ghdr, steps: Vec<f32>, layers: Vec<Vec<Code>>) -> Self {
+    /// An entropy-coded file with these layers; the header's coding and counts are set to match.
+    pub(crate) fn of_entropy_coded(header: Ghdr, steps: Vec<f32>, layers: Vec<Vec<Code>>) -> Self {
         let count: usize = layers.iter().map(Vec::len).sum();
         let header = Ghdr {
             coding: 1,
-            chart: CHOLESKY,
+            parameterization: CHOLESKY,
             gaussians: count as u32,
             layers: layers.len() as u16,
             ..header
         };
-        let sets = Some(Sets { steps, layers });
-        Self { header, entries: Vec::new(), extra: Vec::new(), layers: Vec::new(), sets }
+        let entropy_coded = Some(EntropyCoded { steps, layers });
+        Self { header, entries: Vec::new(), extra: Vec::new(), layers: Vec::new(), entropy_coded }
     }
 
     pub(crate) fn with(mut self, kind: &[u8; 4], payload: &[u8]) -> Self {
@@ -240,12 +240,12 @@ impl File {
         self
     }
 
-    /// What `bNDS` says of a file of coding 1 with the quartic kernel (section 5.6).
+    /// What `bNDS` says of an entropy-coded file with the quartic kernel (section 5.6).
     pub(crate) fn bounds(&self) -> Vec<u8> {
         let decoder = decode_valid(&self.bytes());
         let mut rest = decoder.gaussians();
         let mut all = Vec::new();
-        for layer in &self.sets.as_ref().expect("coding 1").layers {
+        for layer in &self.entropy_coded.as_ref().expect("entropy-coded").layers {
             let (gaussians, later) = rest.split_at(layer.len());
             rest = later;
             let mut bounds = [255, 255, 0, 0];
@@ -265,12 +265,14 @@ impl File {
 
     /// The chunks in order.
     pub(crate) fn chunks(&self) -> Vec<Vec<u8>> {
-        let (quantizers, layers) = match &self.sets {
+        let (quantizers, layers) = match &self.entropy_coded {
             None => {
                 let layers = self.layers.iter().map(|codes| gaus(&self.entries, codes));
                 (qntz(&self.entries), layers.collect())
             }
-            Some(sets) => (steps(&sets.steps), sets.payloads(&self.header)),
+            Some(entropy_coded) => {
+                (steps(&entropy_coded.steps), entropy_coded.payloads(&self.header))
+            }
         };
         let mut chunks = vec![chunk(b"GHDR", &self.header.payload()), chunk(b"QNTZ", &quantizers)];
         chunks.extend(self.extra.iter().map(|(kind, payload)| chunk(kind, payload)));
@@ -281,8 +283,8 @@ impl File {
 
     /// The components of every Gaussian (section 8.1).
     pub(crate) fn components(&self) -> Vec<Vec<f32>> {
-        if let Some(sets) = &self.sets {
-            return sets.components(&self.header);
+        if let Some(entropy_coded) = &self.entropy_coded {
+            return entropy_coded.components(&self.header);
         }
         let values = |codes: &[u32]| {
             self.entries.iter().zip(codes).map(|(e, &code)| oracle::value(e, code)).collect()
@@ -305,7 +307,7 @@ pub(crate) fn decode_pieces<'a>(
     pieces: impl IntoIterator<Item = &'a [u8]>,
     limits: Limits,
 ) -> (StreamDecoder, Result<(), DecodeError>) {
-    let mut decoder = StreamDecoder::with_limits(limits);
+    let mut decoder = StreamDecoder::new().with_limits(limits);
     for piece in pieces {
         if let Err(error) = decoder.feed(piece) {
             return (decoder, Err(error));

@@ -51,8 +51,8 @@ pub(crate) fn value(entry: &Entry, code: u32) -> f32 {
 }
 
 /// Sections 8.2 to 8.4.
-pub(crate) fn cholesky(chart: u8, [a, b, c]: [f32; 3]) -> [f32; 3] {
-    match chart {
+pub(crate) fn cholesky(parameterization: u8, [a, b, c]: [f32; 3]) -> [f32; 3] {
+    match parameterization {
         COVARIANCE => {
             let l11 = a.sqrt();
             let l21 = b / l11;
@@ -93,7 +93,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
         .collect();
     for values in file.components().into_iter().take(request.prefix) {
         let center = [values[0], values[1]];
-        let stored = cholesky(header.chart, [values[2], values[3], values[4]]);
+        let stored = cholesky(header.parameterization, [values[2], values[3], values[4]]);
         if !is_drawable(center, stored, &values[5..]) {
             continue;
         }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use image_gip::training::Training;
-use image_gip::{Chart, Encoder, Precision, Target};
+use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
 use super::methods::{self, CHARTS};
 use super::positions;
@@ -142,7 +142,8 @@ impl Ablation<'_> {
         let mut compared: Vec<NamedFigures> = Vec::new();
         for growths in GROWTHS {
             for interval in PRUNING {
-                let mut training = methods::paper(self.iterations, Chart::Covariance, true, true);
+                let mut training =
+                    methods::paper(self.iterations, Parameterization::Covariance, true, true);
                 training.densification.prune_interval = interval;
                 training.densification.steps = growths;
                 let variant = format!("pruned every {interval} and grown {growths} times");
@@ -272,7 +273,7 @@ impl Ablation<'_> {
             let key = [variant, &rounds, &count, &picture.name];
             rows.push(self.store.get(&self.bench.product, key, || {
                 let encoder = encoder.clone().with_target(Target::Gaussians(gaussians));
-                let measured = gip::encode(encoder, picture, None)?;
+                let measured = gip::encode(encoder, picture, Threads::Pool)?;
                 let (report, ms_ssim) = (&measured.report, measured.distortion.ms_ssim);
                 Ok([picture.rate(measured.bytes), report.psnr_float, ms_ssim])
             })?);

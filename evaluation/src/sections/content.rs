@@ -1,7 +1,7 @@
 //! How many Gaussians and bytes the encoder spends on simple and on difficult pictures.
 
 use anyhow::Result;
-use image_gip::{ColorModel, Source, Target};
+use image_gip::{ColorModel, Source, Target, Threads};
 
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
@@ -71,8 +71,11 @@ fn kinds_of_content(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
             for picture in pictures {
                 let key = [picture.name.as_str(), &name, &gip::EFFORT.to_string()];
                 all.push(store.get(&bench.product, key, || {
-                    let measured =
-                        gip::encode(gip::encoder(gip::EFFORT).with_target(target), picture, None)?;
+                    let measured = gip::encode(
+                        gip::encoder(gip::EFFORT).with_target(target),
+                        picture,
+                        Threads::Pool,
+                    )?;
                     let report = measured.report;
                     let psnr = measured.distortion.psnr;
                     Ok([report.gaussians.into(), measured.bytes, psnr, report.seconds])

@@ -6,7 +6,9 @@ use std::time::Instant;
 use std::{array, thread};
 
 use anyhow::{Context, Result};
-use image_gip::{Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target, metrics};
+use image_gip::{
+    Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target, Threads, metrics,
+};
 
 use super::rate::RateStore;
 use super::speed::nearest;
@@ -127,7 +129,7 @@ impl LazyFile<'_> {
     fn get(&mut self) -> Result<&gip::MeasuredFile> {
         if self.file.is_none() {
             let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(self.rate));
-            self.file = Some(gip::encode(encoder, self.picture, None)?);
+            self.file = Some(gip::encode(encoder, self.picture, Threads::Pool)?);
         }
         self.file.as_ref().context("it was just made")
     }
@@ -199,7 +201,7 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
         let measured = file.get()?;
         let file = &measured.file;
         let mut out = vec![0; picture.rgb.len()];
-        let one = RenderOptions::new().parallel(false);
+        let one = RenderOptions::new().with_threads(Threads::One);
         let (rendered, held) = memory::peak(|| render(file, &one, &mut out));
         rendered?;
         let whole_turn = |options: &RenderOptions| {
@@ -213,12 +215,12 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
                 one_file_each(file, &one, picture.rgb.len())
             }],
         )?;
-        let nothing = one.clone().prefix(0);
+        let nothing = one.clone().with_prefix(0);
         let mut stream = StreamDecoder::new();
         stream.feed(file)?;
         let picture_of = || stream.picture().expect("the file is whole");
         let (width, height) = (picture.width / THUMBNAIL, picture.height / THUMBNAIL);
-        let small = one.clone().size(width, height);
+        let small = one.clone().with_size(width, height);
         let (_, [_, faster]) = interleaved(
             TURNS,
             [&mut || whole_turn(&one), &mut || {
@@ -230,7 +232,7 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
         thumbnail(file, &small, &mut out)?;
         let thumbnail_psnr = metrics::psnr(&of_all, &out[..of_all.len()], 255.0);
         let tenth = &file[..file.len() / 10];
-        let preview = one.clone().size(picture.width / PREVIEW, picture.height / PREVIEW);
+        let preview = one.clone().with_size(picture.width / PREVIEW, picture.height / PREVIEW);
         Ok([
             measured.bytes,
             measured.distortion.psnr,
@@ -293,7 +295,7 @@ fn thumbnail(file: &[u8], options: &RenderOptions, samples: &mut [u8]) -> Result
     decoder.set_options(options.clone());
     let (width, height) = options.output_size(decoder.header());
     decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
-    let picture = decoder.picture();
+    let picture = decoder.picture()?;
     let length = picture.output_len(options)?;
     Ok(picture.render_u8(options, &mut samples[..length])?)
 }
@@ -392,7 +394,7 @@ fn theirs(
     store.get(&timing_version(&product, &versions), [other.id, setting, &picture.name], || {
         let trip = worker.round_trip(other.id, setting, picture, Some(1), [1, 1])?;
         let (ours, mut out) = (file.get()?, vec![0; picture.rgb.len()]);
-        let one = RenderOptions::new().parallel(false);
+        let one = RenderOptions::new().with_threads(Threads::One);
         let ([_, theirs], [_, share]) = interleaved(
             TURNS,
             [
@@ -537,10 +539,10 @@ fn region(bench: &Bench) -> Result<String> {
     let values = store.get(&bench.product, key.map(String::as_str), || {
         let wide = picture.mirrored(width, height);
         let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(rate));
-        let file = gip::encode(encoder, &wide, None)?.file;
+        let file = gip::encode(encoder, &wide, Threads::Pool)?.file;
         let (x, y) = ((width - REGION) / 2, (height - REGION) / 2);
-        let all = RenderOptions::new().parallel(false);
-        let part = all.clone().region(Region { x, y, width: REGION, height: REGION });
+        let all = RenderOptions::new().with_threads(Threads::One);
+        let part = all.clone().with_region(Region { x, y, width: REGION, height: REGION });
         let mut out = vec![0; wide.rgb.len()];
         let mut stream = StreamDecoder::new();
         stream.feed(&file)?;

@@ -59,7 +59,7 @@ impl FloatFile {
         header.extend([self.size.0, self.size.1, count].map(u32::to_le_bytes).concat());
         // One layer, or none.
         header.extend(u16::from(count > 0).to_le_bytes());
-        // Chart 1: Cholesky.
+        // Parameterization 1: Cholesky.
         header.extend([kernel_code, 1]);
         header.extend(self.kernel.cutoff().to_le_bytes());
         header.extend([0; 4]);

@@ -1,7 +1,7 @@
 //! How time and memory grow with pixels and with Gaussians.
 
 use anyhow::Result;
-use image_gip::Target;
+use image_gip::{Target, Threads};
 
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
@@ -75,7 +75,7 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
             let height = (1e6 * megapixels / width).round();
             let large = picture.mirrored(width as u32, height as u32);
             let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
-            let measured = gip::encode(encoder, &large, None)?;
+            let measured = gip::encode(encoder, &large, Threads::Pool)?;
             let file = &measured.file;
             Ok([
                 measured.distortion.psnr,
@@ -83,8 +83,8 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
                 measured.report.evaluations as f64,
                 measured.report.seconds,
                 measured.memory,
-                gip::decode_seconds(file, false)?,
-                gip::decode_seconds(file, true)?,
+                gip::decode_seconds(file, Threads::One)?,
+                gip::decode_seconds(file, Threads::Pool)?,
                 gip::decode_memory(file)?,
             ])
         })?;

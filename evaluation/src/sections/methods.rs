@@ -1,20 +1,20 @@
 //! The published methods, from the parts of this crate's training.
 
-use image_gip::Chart;
-use image_gip::training::{Filter, Schedule, Training};
+use image_gip::Parameterization;
+use image_gip::training::{GaussianFilter, LearningRateSchedule, Training};
 
 /// Iterations of the paper.
 pub(crate) const PAPER_ITERATIONS: u32 = 50_000;
 /// The interval at which the paper halves its learning rates, as a share of all iterations.
 const HALVING: f64 = 0.4;
 /// The filter of GaussianImage: what it adds to every variance, in square pixels.
-const GAUSSIAN_IMAGE_FILTER: Filter = Filter::Constant(0.5);
+const GAUSSIAN_IMAGE_FILTER: GaussianFilter = GaussianFilter::Constant(0.5);
 
 /// The parameterizations, as tables call them.
-pub(crate) const CHARTS: [(&str, Chart); 3] = [
-    ("direct covariance", Chart::Covariance),
-    ("Cholesky", Chart::Cholesky),
-    ("rotation and scale", Chart::RotationScale),
+pub(crate) const CHARTS: [(&str, Parameterization); 3] = [
+    ("direct covariance", Parameterization::Covariance),
+    ("Cholesky", Parameterization::Cholesky),
+    ("rotation and scale", Parameterization::RotationScale),
 ];
 
 /// How the published methods were run, for the text of sections.
@@ -30,12 +30,12 @@ pub(crate) fn description(iterations: u32) -> String {
 
 /// GaussianImage++ with fewer iterations, with or without its two components: distortion-driven
 /// densification (D3) and the context-aware filter (CAF).
-pub(crate) fn paper(iterations: u32, chart: Chart, d3: bool, caf: bool) -> Training {
+pub(crate) fn paper(iterations: u32, chart: Parameterization, d3: bool, caf: bool) -> Training {
     let mut training = Training::paper();
     training.iterations = iterations;
     training.parameterization = chart;
     let interval = (f64::from(iterations) * HALVING).round() as u32;
-    training.optimizer.schedule = Schedule::Halving(interval.max(1));
+    training.optimizer.schedule = LearningRateSchedule::Halving(interval.max(1));
     if !d3 {
         training.densification.initial = 1.0;
     }

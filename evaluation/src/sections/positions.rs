@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use half::f16;
-use image_gip::{Precision, Target};
+use image_gip::{Precision, Target, Threads};
 
 use super::float_file::FloatFile;
 use super::methods;
@@ -143,7 +143,7 @@ fn stored(
         let training = methods::ours(iterations, [bits, SHAPE, COLOR]);
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::Gaussians(count));
         let encoder = encoder.with_training(training).with_precision(Precision::Packed);
-        gip::encode(encoder, picture, None)
+        gip::encode(encoder, picture, Threads::Pool)
     };
     let paper;
     let measured = match format {

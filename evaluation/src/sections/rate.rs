@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use image_gip::Target;
+use image_gip::{Target, Threads};
 
 use crate::baselines::{BASELINES, Baseline, DESCRIPTION, Worker};
 use crate::bench::Bench;
@@ -55,7 +55,7 @@ impl RateStore {
     ) -> Result<Point> {
         self.point(version, [gip::NAME, setting, &picture.name], || {
             let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
-            let measured = gip::encode(encoder, picture, None)?;
+            let measured = gip::encode(encoder, picture, Threads::Pool)?;
             let distortion = measured.distortion;
             Ok([measured.bytes, picture.rate(measured.bytes), distortion.psnr, distortion.ms_ssim])
         })

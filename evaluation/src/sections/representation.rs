@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use image_gip::training::Training;
-use image_gip::{Chart, Precision, Target};
+use image_gip::{Parameterization, Precision, Target, Threads};
 
 use super::{methods, two_level};
 use crate::bench::Bench;
@@ -58,16 +58,19 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let iterations = bench.iterations;
     let pictures = bench.sample(if bench.quick { QUICK_PICTURES } else { usize::MAX });
     let counts: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
-    let full = methods::paper(iterations, Chart::Covariance, true, true);
+    let full = methods::paper(iterations, Parameterization::Covariance, true, true);
     let without = |chart| methods::paper(iterations, chart, false, false);
     let all = [
         (gip::NAME, Method::Own(gip::EFFORT)),
         ("gip, more effort", Method::Own(BEST_EFFORT)),
         ("GaussianImage++", Method::Published(full)),
-        ("the same without D3 and CAF", Method::Published(without(Chart::Covariance))),
-        ("GaussianImage (Cholesky)", Method::Published(without(Chart::Cholesky))),
-        ("GaussianImage (rotation and scale)", Method::Published(without(Chart::RotationScale))),
-        ("two levels, like LIG", Method::TwoLevels(without(Chart::Covariance))),
+        ("the same without D3 and CAF", Method::Published(without(Parameterization::Covariance))),
+        ("GaussianImage (Cholesky)", Method::Published(without(Parameterization::Cholesky))),
+        (
+            "GaussianImage (rotation and scale)",
+            Method::Published(without(Parameterization::RotationScale)),
+        ),
+        ("two levels, like LIG", Method::TwoLevels(without(Parameterization::Covariance))),
     ];
     let mut text = format!(
         "Compared with: GaussianImage; GaussianImage++, with and without its two components; and a \
@@ -142,7 +145,7 @@ fn fit(method: &Method, count: u32, picture: &TestPicture) -> Result<[f64; 6]> {
     if let Some(training) = training {
         encoder = encoder.with_training(training.clone());
     }
-    let measured = gip::encode(encoder, picture, None)?;
+    let measured = gip::encode(encoder, picture, Threads::Pool)?;
     let report = &measured.report;
     Ok([
         report.psnr_float,

@@ -1,7 +1,7 @@
 //! Encoding and decoding time against PSNR, of our codec and the baselines.
 
 use anyhow::Result;
-use image_gip::Target;
+use image_gip::{Target, Threads};
 
 use super::growth;
 use super::rate::RateStore;
@@ -109,7 +109,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
             store.get(&product, key, || {
                 let encoder = gip::encoder(effort).with_target(Target::BitsPerPixel(RATE));
                 let measured = gip::encode(encoder, picture, threads)?;
-                let decode = gip::decode_seconds(&measured.file, threads != Some(1))?;
+                let decode = gip::decode_seconds(&measured.file, threads)?;
                 let times = [measured.report.seconds, decode];
                 Ok(values(picture, measured.bytes, measured.distortion.psnr, times))
             })
@@ -128,6 +128,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
             let (setting, picture) = (settings[index], &pictures[index]);
             let key = [baseline.id, setting, thread_label(threads), &picture.name];
             store.get(&timing_version(&product, &versions), key, || {
+                let threads = (threads == Threads::One).then_some(1);
                 let trip =
                     worker.round_trip(baseline.id, setting, picture, threads, [REPEATS; 2])?;
                 let times = [trip.encode_seconds, trip.decode_seconds];
@@ -155,8 +156,8 @@ pub(super) fn nearest<'a>(
     Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
 }
 
-fn thread_label(threads: Option<usize>) -> &'static str {
-    if threads == Some(1) { "one" } else { "all" }
+fn thread_label(threads: Threads) -> &'static str {
+    if threads == Threads::One { "one" } else { "all" }
 }
 
 fn values(picture: &TestPicture, bytes: f64, psnr: f64, [encode, decode]: [f64; 2]) -> [f64; 5] {
@@ -167,10 +168,10 @@ fn row(
     codec: &'static str,
     setting: &str,
     pictures: &[TestPicture],
-    mut get: impl FnMut(usize, Option<usize>) -> Result<[f64; 5]>,
+    mut get: impl FnMut(usize, Threads) -> Result<[f64; 5]>,
 ) -> Result<CodecRow> {
     let mut means = Vec::new();
-    for threads in [Some(1), None] {
+    for threads in [Threads::One, Threads::Pool] {
         let mut sums = [0.0; 5];
         for index in 0..pictures.len() {
             for (sum, value) in sums.iter_mut().zip(get(index, threads)?) {

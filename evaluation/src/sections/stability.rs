@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result, ensure};
 use image_gip::{
-    ColorModel, Kernel, Picture, RenderOptions, SampleDepth, Source, StreamDecoder, Target,
+    ColorModel, Kernel, Picture, RenderOptions, SampleDepth, Source, StreamDecoder, Target, Threads,
 };
 
 use super::float_file::{COMPONENTS, FloatFile};
@@ -96,8 +96,8 @@ fn decoder(bench: &Bench) -> Result<String> {
                     let picture = decoder.picture().context("the file has no picture")?;
                     ensure!(decoder.is_complete(), "the file is not complete");
                     let all = planes(&picture, &RenderOptions::new())?;
-                    let one = planes(&picture, &RenderOptions::new().parallel(false))?;
-                    let scalar = planes(&picture, &RenderOptions::new().reference(true))?;
+                    let one = planes(&picture, &RenderOptions::new().with_threads(Threads::One))?;
+                    let scalar = planes(&picture, &RenderOptions::new().with_reference(true))?;
                     Ok([
                         gaussians.len() as f64,
                         difference(&all, &f64_renderer::render(&picture)),
@@ -271,7 +271,7 @@ fn fit(hard: &HardPicture) -> Result<[f64; 6]> {
     }?;
     let encoder = gip::encoder(EFFORT).with_target(Target::Gaussians(GAUSSIANS));
     let encoded = encoder.clone().encode(&source)?;
-    let alone = encoder.with_threads(Some(1)).encode(&source)?;
+    let alone = encoder.with_threads(Threads::One).encode(&source)?;
     let mut decoder = StreamDecoder::new();
     decoder.feed(&encoded.bytes)?;
     let picture = decoder.picture().context("the file has no picture")?;

@@ -118,7 +118,7 @@ fn residual(picture: &TestPicture, planes: &[f32]) -> Vec<u16> {
 
 #[cfg(test)]
 mod tests {
-    use image_gip::Chart;
+    use image_gip::Parameterization;
 
     use super::*;
     use crate::sections::methods;
@@ -133,7 +133,7 @@ mod tests {
         });
         let picture =
             TestPicture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
-        let training = methods::paper(300, Chart::Covariance, false, false);
+        let training = methods::paper(300, Parameterization::Covariance, false, false);
         let both = fit(&picture, 60, &training).expect("a small picture");
         assert!((13..=60).contains(&both.gaussians), "{}", both.gaussians);
         let psnr = gip::psnr_float(&both.file, &picture).expect("it decodes");

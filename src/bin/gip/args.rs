@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
 use image_gip::{Precision, Region, Target};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 /// Pictures as a few thousand 2D Gaussians: encodes, decodes, inspects and compares .gip files.
 #[derive(Debug, Parser)]
@@ -62,13 +63,16 @@ pub(crate) struct Encode {
           value_parser = clap::value_parser!(u8).range(1..=9))]
     pub(crate) effort: u8,
     /// How the Gaussians are stored.
-    #[arg(long, value_enum, default_value_t = PrecisionArg::Coded)]
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
     pub(crate) precision: PrecisionArg,
+    /// Write OUTPUT whatever its name; without this it must end in .gip.
+    #[arg(long)]
+    pub(crate) force: bool,
     /// Seed of everything random; the same picture, options and seed give the same file.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub(crate) seed: u64,
     #[command(flatten)]
-    pub(crate) threads: Threads,
+    pub(crate) threads: ThreadCount,
     /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.
     ///
     /// Fields: width, height, gaussians, bytes, bpp (bits per pixel of the whole file), psnr (dB,
@@ -115,12 +119,12 @@ impl TargetArgs {
 /// How the Gaussians are stored.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PrecisionArg {
-    /// 32-bit floats: the fit exactly as it is, several times as large
+    /// 32-bit floats: the fitted values themselves, several times as large
     F32,
-    /// Quantized with training, and bit-packed
+    /// Quantization-aware training, codes of fixed bit depths
     Packed,
-    /// Entropy coded: smallest.
-    Coded,
+    /// Rate-distortion optimised codes, entropy coded: smallest
+    Entropy,
 }
 
 impl From<PrecisionArg> for Precision {
@@ -128,18 +132,25 @@ impl From<PrecisionArg> for Precision {
         match arg {
             PrecisionArg::F32 => Self::Float,
             PrecisionArg::Packed => Self::Packed,
-            PrecisionArg::Coded => Self::Coded,
+            PrecisionArg::Entropy => Self::Entropy,
         }
     }
 }
 
 #[derive(Debug, clap::Args)]
-pub(crate) struct Threads {
+pub(crate) struct ThreadCount {
     /// Number of threads, from 1 to 1024; the result does not depend on it [default: one per
     /// core].
     #[arg(long = "threads", value_name = "T",
           value_parser = clap::value_parser!(u16).range(1..=1024))]
-    pub(crate) count: Option<u16>,
+    count: Option<u16>,
+}
+
+impl ThreadCount {
+    /// The pool in which the work is done.
+    pub(crate) fn pool(&self) -> Result<ThreadPool, ThreadPoolBuildError> {
+        ThreadPoolBuilder::new().num_threads(self.count.map_or(0, usize::from)).build()
+    }
 }
 
 /// Turns a .gip file into a picture.
@@ -179,7 +190,7 @@ pub(crate) struct Decode {
     #[arg(long)]
     pub(crate) allow_partial: bool,
     #[command(flatten)]
-    pub(crate) threads: Threads,
+    pub(crate) threads: ThreadCount,
 }
 
 /// Shows what a .gip file holds.

@@ -9,7 +9,7 @@ use image::{DynamicImage, ImageEncoder};
 use image_gip::{ColorModel, SampleDepth};
 
 use crate::files;
-use crate::picture::{Picture, Samples};
+use crate::picture::{SampleSlice, StillImage};
 
 /// Quality of the JPEGs that are written: high, because the picture has been coded once already.
 const JPEG_QUALITY: u8 = 95;
@@ -115,7 +115,7 @@ impl Codec {
     }
 
     /// Encodes a picture whose colour model and depth are as [`Codec::choose`] chose them.
-    pub(crate) fn encode(self, picture: &Picture) -> Result<Vec<u8>> {
+    pub(crate) fn encode(self, picture: &StillImage) -> Result<Vec<u8>> {
         let mut out = Cursor::new(Vec::new());
         match self {
             Self::Bmp => write(bmp::BmpEncoder::new(&mut out), picture),
@@ -136,7 +136,7 @@ impl Codec {
     }
 
     /// Netpbm, which `image` does not write with 16 bits in all its variants.
-    fn netpbm(self, picture: &Picture) -> Vec<u8> {
+    fn netpbm(self, picture: &StillImage) -> Vec<u8> {
         let (width, height) = (picture.image.width(), picture.image.height());
         let (color, full) = (picture.color(), (1_u32 << picture.depth().bits()) - 1);
         let header = if self == Self::Pam {
@@ -157,14 +157,16 @@ impl Codec {
         };
         let mut out = header.into_bytes();
         match picture.samples() {
-            Samples::Eight(samples) => out.extend_from_slice(samples),
-            Samples::Sixteen(samples) => out.extend(samples.iter().flat_map(|s| s.to_be_bytes())),
+            SampleSlice::Eight(samples) => out.extend_from_slice(samples),
+            SampleSlice::Sixteen(samples) => {
+                out.extend(samples.iter().flat_map(|s| s.to_be_bytes()));
+            }
         }
         out
     }
 }
 
-fn write(mut encoder: impl ImageEncoder, picture: &Picture) -> Result<()> {
+fn write(mut encoder: impl ImageEncoder, picture: &StillImage) -> Result<()> {
     // Encoders that cannot take a kind of metadata refuse it here; it is left out then.
     if let Some(profile) = &picture.metadata.icc_profile {
         let _ = encoder.set_icc_profile(profile.clone());

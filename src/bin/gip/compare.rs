@@ -9,14 +9,14 @@ use serde::Serialize;
 use crate::args;
 use crate::encode::json_psnr;
 use crate::files;
-use crate::picture::{Picture, Samples, widest};
+use crate::picture::{SampleSlice, StillImage, widest};
 
 pub(crate) fn run(args: &args::Compare) -> Result<()> {
     if files::is_standard_stream(&args.a) && files::is_standard_stream(&args.b) {
         bail!("only one of the two pictures can come from standard input");
     }
-    let (mut a, mut b) = (Picture::read(&args.a)?, Picture::read(&args.b)?);
-    let size = |picture: &Picture| (picture.image.width(), picture.image.height());
+    let (mut a, mut b) = (StillImage::read(&args.a)?, StillImage::read(&args.b)?);
+    let size = |picture: &StillImage| (picture.image.width(), picture.image.height());
     if size(&a) != size(&b) {
         let ((w, h), (v, g)) = (size(&a), size(&b));
         bail!("the sizes differ: {w}x{h} and {v}x{g}");
@@ -29,8 +29,8 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
     a.convert(color, depth);
     b.convert(color, depth);
     let comparison = match (a.samples(), b.samples()) {
-        (Samples::Eight(x), Samples::Eight(y)) => Comparison::new(&a, depth, x, y),
-        (Samples::Sixteen(x), Samples::Sixteen(y)) => Comparison::new(&a, depth, x, y),
+        (SampleSlice::Eight(x), SampleSlice::Eight(y)) => Comparison::new(&a, depth, x, y),
+        (SampleSlice::Sixteen(x), SampleSlice::Sixteen(y)) => Comparison::new(&a, depth, x, y),
         _ => bail!("the depths differ"),
     };
     let text = if args.json { serde_json::to_string(&comparison)? } else { comparison.to_string() };
@@ -50,7 +50,12 @@ struct Comparison {
 }
 
 impl Comparison {
-    fn new<T: Copy + Into<f64>>(picture: &Picture, depth: SampleDepth, a: &[T], b: &[T]) -> Self {
+    fn new<T: Copy + Into<f64>>(
+        picture: &StillImage,
+        depth: SampleDepth,
+        a: &[T],
+        b: &[T],
+    ) -> Self {
         let full_scale = f64::from((1_u32 << depth.bits()) - 1);
         let (width, height) = (picture.image.width(), picture.image.height());
         let channels = picture.color().channels();

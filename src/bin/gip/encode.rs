@@ -3,36 +3,38 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use image_gip::{Encoded, Encoder, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::args;
 use crate::files::{self, Output};
-use crate::picture::{Picture, Samples};
+use crate::picture::{SampleSlice, StillImage};
 
 /// What JSON says for an infinite PSNR, which JSON cannot.
 const INFINITE_PSNR: f64 = 999.0;
 
 pub(crate) fn run(args: &args::Encode) -> Result<()> {
     let output = Output::new(&args.output)?;
-    let mut picture = Picture::read(&args.input)?;
+    if !args.force {
+        check_name(&output)?;
+    }
+    let mut picture = StillImage::read(&args.input)?;
     picture.drop_opaque_alpha();
 
     let (width, height) = (picture.image.width(), picture.image.height());
     let source = match picture.samples() {
-        Samples::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
-        Samples::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
+        SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
+        SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
     }?;
     let encoder = Encoder::new()
         .with_target(args.target.target())
         .with_effort(args.effort)
         .with_precision(args.precision.into())
         .with_seed(args.seed)
-        .with_threads(args.threads.count.map(usize::from))
         .with_metadata(picture.metadata.clone());
-    let encoded = encode(&encoder, &source)?;
+    let encoded = args.threads.pool()?.install(|| encode(&encoder, &source))?;
     output.write(&encoded.bytes)?;
 
     let report = Report::new(&source, &encoded);
@@ -42,6 +44,19 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
         report.to_line(&args.output, encoded.report.psnr)
     };
     files::print(&text, Some(&args.output))
+}
+
+/// Refuses a name that says that the file is something else: programs believe it.
+fn check_name(output: &Output) -> Result<()> {
+    let Output::Regular { path, .. } = output else { return Ok(()) };
+    let extension = path.extension().unwrap_or_default();
+    if !extension.eq_ignore_ascii_case("gip") {
+        bail!(
+            "{}: this writes .gip files only; give it a name that ends in .gip, or say --force",
+            path.display()
+        );
+    }
+    Ok(())
 }
 
 /// Encodes with a progress bar, which shows itself on a terminal only.
@@ -60,7 +75,7 @@ fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct Report<'a> {
+struct Report {
     width: u32,
     height: u32,
     gaussians: u32,
@@ -72,11 +87,11 @@ struct Report<'a> {
     evaluations: u64,
     seconds: f64,
     peak_memory: u64,
-    shortfall: Option<&'a str>,
+    shortfall: Option<String>,
 }
 
-impl<'a> Report<'a> {
-    fn new(source: &Source<'_>, encoded: &'a Encoded) -> Self {
+impl Report {
+    fn new(source: &Source<'_>, encoded: &Encoded) -> Self {
         let (width, height) = (source.width(), source.height());
         let bytes = encoded.bytes.len();
         Self {
@@ -91,7 +106,7 @@ impl<'a> Report<'a> {
             evaluations: encoded.report.evaluations,
             seconds: encoded.report.seconds,
             peak_memory: encoded.report.peak_memory,
-            shortfall: encoded.report.shortfall.as_deref(),
+            shortfall: encoded.report.shortfall.map(|shortfall| shortfall.to_string()),
         }
     }
 
@@ -103,7 +118,7 @@ impl<'a> Report<'a> {
              {psnr:.2} dB, {seconds:.1} s",
             files::output_name(output)
         );
-        if let Some(shortfall) = self.shortfall {
+        if let Some(shortfall) = &self.shortfall {
             line.push_str("\nnote: ");
             line.push_str(shortfall);
         }

@@ -3,7 +3,9 @@
 use core::fmt::{self, Display};
 
 use anyhow::{Context, Result, anyhow};
-use image_gip::{Chart, ChunkType, Coding, ColorModel, Header, Kernel, Quantizer, StreamDecoder};
+use image_gip::{
+    ChunkType, Coding, ColorModel, Header, Kernel, Parameterization, Quantizer, StreamDecoder,
+};
 use serde::Serialize;
 
 use crate::args;
@@ -13,7 +15,7 @@ use crate::files;
 pub(crate) fn run(args: &args::Info) -> Result<()> {
     let context = || files::input_name(&args.file);
     let bytes = files::read(&args.file)?;
-    let mut stream = StreamDecoder::new().with_account();
+    let mut stream = StreamDecoder::new().with_statistics();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
     let info = Info::new(header, &stream, bytes.len());
@@ -37,14 +39,14 @@ struct Info {
     layers: u16,
     kernel: &'static str,
     cutoff: f32,
-    chart: &'static str,
+    parameterization: &'static str,
     base_color: Vec<u16>,
     chunks: Vec<Chunk>,
     bits_per_gaussian: BitsPerGaussian,
-    /// With coding "fixed".
+    /// With coding "packed".
     components: Vec<Component>,
-    /// With coding "set": position, size, ratio, slant, then one for each colour axis.
-    steps: Vec<f32>,
+    /// With coding "entropy".
+    lattice_steps: Option<LatticeSteps>,
     metadata: Metadata,
 }
 
@@ -77,6 +79,23 @@ struct Component {
     bits: u8,
     scale: Option<f32>,
     offset: Option<f32>,
+}
+
+/// What a unit of each code stands for.
+#[derive(Debug, Serialize)]
+struct LatticeSteps {
+    position: f32,
+    size: f32,
+    ratio: f32,
+    slant: f32,
+    color: Vec<f32>,
+}
+
+impl From<image_gip::LatticeSteps> for LatticeSteps {
+    fn from(steps: image_gip::LatticeSteps) -> Self {
+        let image_gip::LatticeSteps { position, size, ratio, slant, color, .. } = steps;
+        Self { position, size, ratio, slant, color }
+    }
 }
 
 /// Bytes of each kind of metadata.
@@ -117,8 +136,8 @@ impl Info {
             bpp: bits_per_pixel(bytes, header.width, header.height),
             version: header.version,
             coding: match header.coding {
-                Coding::Fixed => "fixed",
-                Coding::Set => "set",
+                Coding::Packed => "packed",
+                Coding::Entropy => "entropy",
                 _ => "unknown",
             },
             width: header.width,
@@ -140,10 +159,10 @@ impl Info {
                 _ => "unknown",
             },
             cutoff: header.kernel.cutoff(),
-            chart: match header.chart {
-                Chart::Covariance => "covariance",
-                Chart::Cholesky => "cholesky",
-                Chart::RotationScale => "rotation-scale",
+            parameterization: match header.parameterization {
+                Parameterization::Covariance => "covariance",
+                Parameterization::Cholesky => "cholesky",
+                Parameterization::RotationScale => "rotation-scale",
                 _ => "unknown",
             },
             base_color: header.base_color[..channels].to_vec(),
@@ -153,7 +172,7 @@ impl Info {
                 .collect(),
             bits_per_gaussian,
             components,
-            steps: stream.steps(),
+            lattice_steps: stream.lattice_steps().map(LatticeSteps::from),
             metadata: Metadata {
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
@@ -170,10 +189,10 @@ impl Info {
 
 /// The stored components in file order.
 fn components(header: &Header, quantizers: &[Quantizer]) -> Vec<Component> {
-    let shape = match header.chart {
-        Chart::Covariance => ["xx", "xy", "yy"],
-        Chart::Cholesky => ["l11", "l21", "l22"],
-        Chart::RotationScale => ["s1", "s2", "angle"],
+    let shape = match header.parameterization {
+        Parameterization::Covariance => ["xx", "xy", "yy"],
+        Parameterization::Cholesky => ["l11", "l21", "l22"],
+        Parameterization::RotationScale => ["s1", "s2", "angle"],
         _ => ["1", "2", "3"],
     };
     let color: &[_] = match header.color {
@@ -216,7 +235,7 @@ impl Display for Info {
         row("version", &self.version)?;
         row("Gaussians", &format_args!("{} in {} layers", self.gaussians, self.layers))?;
         row("kernel", &format_args!("{kernel}, cut-off {cutoff}"))?;
-        row("chart", &self.chart)?;
+        row("parameterization", &self.parameterization)?;
         row("base colour", &format_args!("{:?} / 65535", self.base_color))?;
         row("coding", &self.coding)?;
         let BitsPerGaussian { total, position, precision, shape, color, .. } = bits;
@@ -230,8 +249,14 @@ impl Display for Info {
         if let Some(coded) = bits.coded {
             row("  as coded", &format_args!("{coded:.2} with all framing"))?;
         }
-        if !self.steps.is_empty() {
-            row("  steps", &format_args!("{:?}", self.steps))?;
+        if let Some(LatticeSteps { position, size, ratio, slant, color }) = &self.lattice_steps {
+            row(
+                "  steps",
+                &format_args!(
+                    "position {position}, size {size}, ratio {ratio}, slant {slant}, colour \
+                     {color:?}"
+                ),
+            )?;
         }
         for component in &self.components {
             let Component { attribute, name, kind, bits, scale, offset } = component;

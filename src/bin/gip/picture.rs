@@ -18,7 +18,7 @@ const MAX_SIDE: u32 = 1 << 20;
 
 /// A picture, upright, and what came with it.
 #[derive(Debug)]
-pub(crate) struct Picture {
+pub(crate) struct StillImage {
     /// Gray or RGB with or without alpha, 8 or 16 bits: one of eight of the variants.
     pub(crate) image: DynamicImage,
     pub(crate) metadata: Metadata,
@@ -26,12 +26,12 @@ pub(crate) struct Picture {
 
 /// The samples of a picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Samples<'a> {
+pub(crate) enum SampleSlice<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
 
-impl Picture {
+impl StillImage {
     /// Reads a picture of any format that `image` reads, .gip included.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let name = || files::input_name(path);
@@ -96,19 +96,19 @@ impl Picture {
     /// Bits per sample.
     pub(crate) fn depth(&self) -> SampleDepth {
         match self.samples() {
-            Samples::Eight(_) => SampleDepth::Eight,
-            Samples::Sixteen(_) => SampleDepth::Sixteen,
+            SampleSlice::Eight(_) => SampleDepth::Eight,
+            SampleSlice::Sixteen(_) => SampleDepth::Sixteen,
         }
     }
 
     /// The interleaved samples.
-    pub(crate) fn samples(&self) -> Samples<'_> {
+    pub(crate) fn samples(&self) -> SampleSlice<'_> {
         match &self.image {
-            DynamicImage::ImageLuma16(image) => Samples::Sixteen(image),
-            DynamicImage::ImageLumaA16(image) => Samples::Sixteen(image),
-            DynamicImage::ImageRgb16(image) => Samples::Sixteen(image),
-            DynamicImage::ImageRgba16(image) => Samples::Sixteen(image),
-            image => Samples::Eight(image.as_bytes()),
+            DynamicImage::ImageLuma16(image) => SampleSlice::Sixteen(image),
+            DynamicImage::ImageLumaA16(image) => SampleSlice::Sixteen(image),
+            DynamicImage::ImageRgb16(image) => SampleSlice::Sixteen(image),
+            DynamicImage::ImageRgba16(image) => SampleSlice::Sixteen(image),
+            image => SampleSlice::Eight(image.as_bytes()),
         }
     }
 
@@ -121,8 +121,8 @@ impl Picture {
         };
         let channels = self.color().channels();
         let opaque = match self.samples() {
-            Samples::Eight(samples) => is_opaque(samples, channels, &u8::MAX),
-            Samples::Sixteen(samples) => is_opaque(samples, channels, &u16::MAX),
+            SampleSlice::Eight(samples) => is_opaque(samples, channels, &u8::MAX),
+            SampleSlice::Sixteen(samples) => is_opaque(samples, channels, &u16::MAX),
         };
         if opaque {
             self.convert(color, self.depth());

@@ -1,0 +1,133 @@
+//! Layers of packed codes (spec, section 7.2).
+
+use super::bits::BitReader;
+use super::quantizer::Quantizer;
+use crate::chunk::ChunkType;
+use crate::error::DecodeError;
+use crate::gaussian::MAX_COMPONENTS;
+#[cfg(feature = "encode")]
+use alloc::vec::Vec;
+
+/// Bytes of payload before the packed codes: the number of Gaussians in the layer.
+pub(crate) const LAYER_PREFIX: u64 = 4;
+
+/// Bytes that the codes of `count` Gaussians take.
+pub(crate) fn packed_length(quantizers: &[Quantizer], count: u32) -> u64 {
+    let bits = quantizers.iter().map(|quantizer| u64::from(quantizer.bits())).sum::<u64>();
+    (bits * u64::from(count)).div_ceil(8)
+}
+
+/// Unpacks one layer as its bytes arrive.
+#[derive(Debug)]
+pub(crate) struct LayerReader {
+    bits: BitReader,
+    /// The number of Gaussians in this layer, once its four bytes have arrived.
+    count: Option<u32>,
+    done: u32,
+    /// The components of the Gaussian that is arriving.
+    values: [f32; MAX_COMPONENTS],
+    filled: usize,
+    /// Bytes of payload that the chunk declares.
+    length: u32,
+}
+
+impl LayerReader {
+    pub(crate) fn new(length: u32) -> Self {
+        Self {
+            bits: BitReader::default(),
+            count: None,
+            done: 0,
+            values: [0.0; MAX_COMPONENTS],
+            filled: 0,
+            length,
+        }
+    }
+
+    /// Reads the layer's number of Gaussians if it has not been read: at most `allowed`, and
+    /// just as many as the chunk has bytes for. `None` while bytes are missing.
+    pub(crate) fn count(
+        &mut self,
+        input: &mut &[u8],
+        quantizers: &[Quantizer],
+        allowed: u32,
+    ) -> Result<Option<u32>, DecodeError> {
+        if self.count.is_none() {
+            let Some(count) = self.bits.take(32, input) else { return Ok(None) };
+            if count == 0 {
+                return Err(malformed("no Gaussians"));
+            }
+            if count > allowed {
+                return Err(malformed("more Gaussians than the header declares"));
+            }
+            if u64::from(self.length) != LAYER_PREFIX + packed_length(quantizers, count) {
+                return Err(malformed("the length does not match the number of Gaussians"));
+            }
+            self.count = Some(count);
+        }
+        Ok(self.count)
+    }
+
+    /// The components of the next Gaussian: two of position, three of shape, one per channel.
+    /// `None` while bytes are missing and after the last Gaussian.
+    pub(crate) fn next(
+        &mut self,
+        input: &mut &[u8],
+        quantizers: &[Quantizer],
+    ) -> Result<Option<&[f32; MAX_COMPONENTS]>, DecodeError> {
+        if self.count.is_none_or(|count| self.done == count) {
+            return Ok(None);
+        }
+        while self.filled < quantizers.len() {
+            let quantizer = &quantizers[self.filled];
+            let Some(code) = self.bits.take(quantizer.bits().into(), input) else {
+                return Ok(None);
+            };
+            let value = quantizer.value(code);
+            if !value.is_finite() {
+                return Err(malformed("an attribute that is not finite"));
+            }
+            self.values[self.filled] = value;
+            self.filled += 1;
+        }
+        self.filled = 0;
+        self.done += 1;
+        Ok(Some(&self.values))
+    }
+
+    /// Checks that the layer was complete and its padding zero.
+    pub(crate) fn finish(&self) -> Result<(), DecodeError> {
+        if self.count != Some(self.done) {
+            return Err(malformed("too short for its number of Gaussians"));
+        }
+        if !self.bits.is_padding() {
+            return Err(malformed("a padding bit is not zero"));
+        }
+        Ok(())
+    }
+}
+
+fn malformed(reason: &'static str) -> DecodeError {
+    DecodeError::malformed(ChunkType::GAUS, reason)
+}
+
+/// Gaussians as a packed file stores them.
+#[cfg(feature = "encode")]
+#[derive(Clone, Debug)]
+pub(crate) struct PackedCodes {
+    pub(crate) quantizers: Vec<Quantizer>,
+    /// Of every component of each Gaussian, in file order.
+    pub(crate) codes: Vec<[u32; MAX_COMPONENTS]>,
+}
+
+/// Packs the codes of one layer, with its number of Gaussians in front.
+#[cfg(feature = "encode")]
+pub(crate) fn write_layer(codes: &[[u32; MAX_COMPONENTS]], quantizers: &[Quantizer]) -> Vec<u8> {
+    let mut writer = super::bits::BitWriter::default();
+    writer.put(codes.len() as u32, 32);
+    for gaussian in codes {
+        for (&code, quantizer) in gaussian.iter().zip(quantizers) {
+            writer.put(code, quantizer.bits().into());
+        }
+    }
+    writer.finish()
+}

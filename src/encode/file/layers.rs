@@ -1,0 +1,137 @@
+//! The layers of a file, as `layers::plan` has them.
+
+use rayon::prelude::*;
+
+use crate::chunk::FRAMING;
+use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
+use crate::coding::packed::{self, Quantizer};
+use crate::container::Header;
+use crate::gaussian::MAX_COMPONENTS;
+use crate::layers::bounds::LayerBounds;
+use crate::layers::plan;
+
+/// The payloads of the layers of a packed file, from codes in its order.
+pub(super) fn write_packed_layers(
+    codes: &[[u32; MAX_COMPONENTS]],
+    quantizers: &[Quantizer],
+) -> Vec<Vec<u8>> {
+    let mut rest = codes;
+    let layer = |count| {
+        let (layer, later) = rest.split_at(count);
+        rest = later;
+        packed::write_layer(layer, quantizers)
+    };
+    plan::packed_layers(codes.len()).into_iter().map(layer).collect()
+}
+
+/// The bytes that the layers of `count` Gaussians add to a packed file.
+pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
+    let layer = |count| {
+        FRAMING as u64 + packed::LAYER_PREFIX + packed::packed_length(quantizers, count as u32)
+    };
+    plan::packed_layers(count).into_iter().map(layer).sum()
+}
+
+/// The layers of an entropy-coded file; sorts and rounds the codes as the file has them.
+pub(crate) fn write_entropy_layers(
+    coder: &LayerCoder<'_>,
+    codes: &mut [Code],
+) -> Vec<EncodedLayer> {
+    entropy_layers(coder, codes).into_par_iter().map(|codes| coder.write(codes)).collect()
+}
+
+/// Where each layer of an entropy-coded file shows, as its file says it; `None` where it does not.
+pub(super) fn bounds(
+    coder: &LayerCoder<'_>,
+    codes: &[Code],
+    layers: &[EncodedLayer],
+    header: &Header,
+) -> Option<Vec<u8>> {
+    if !plan::has_bounds(layers.len()) {
+        return None;
+    }
+    let mut rest = codes;
+    let mut bounds = Vec::new();
+    for layer in layers {
+        let (codes, later) = rest.split_at(layer.levels.len());
+        rest = later;
+        let gaussians = codes.iter().map(|code| {
+            let shape = coder.lattice.shape(code);
+            coder.lattice.gaussian(code, &shape, &coder.grid, header.color)
+        });
+        bounds.extend(LayerBounds::of(gaussians, header).to_entry());
+    }
+    Some(bounds)
+}
+
+/// Cuts codes into the layers of an entropy-coded file: the strongest ones first, the others by where
+/// they are.
+fn entropy_layers<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
+    let count = codes.len();
+    let most = plan::most_in_entropy_layer(count);
+    codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    let mut layers = Vec::new();
+    let mut rest = codes;
+    for first in plan::first_entropy_layers(count) {
+        let (part, later) = rest.split_at_mut(first);
+        cut(coder, part, most, &mut layers);
+        rest = later;
+    }
+    cut(coder, rest, most, &mut layers);
+    layers
+}
+
+/// Cuts codes into layers of at most so many, by where they are.
+fn cut<'a>(
+    coder: &LayerCoder<'_>,
+    mut rest: &'a mut [Code],
+    most: usize,
+    layers: &mut Vec<&'a mut [Code]>,
+) {
+    while rest.len() > most {
+        coder.cut(rest, most);
+        let (layer, later) = rest.split_at_mut(most);
+        layers.push(layer);
+        rest = later;
+    }
+    if !rest.is_empty() {
+        layers.push(rest);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coding::entropy::CenterGrid;
+    use crate::color::ColorModel;
+    use crate::encode::rate_model;
+
+    #[test]
+    fn about_half_of_the_gaussians_are_in_the_largest_layer_but_not_too_many() {
+        let lattice = rate_model::lattice(0.0, ColorModel::Rgb);
+        let coder = LayerCoder { lattice: &lattice, grid: CenterGrid::new(640, 480), channels: 3 };
+        for (count, largest, number) in [
+            (0, 0, 0),
+            (249, 249, 1),
+            (2047, 1700, 3),
+            (6000, 3120, 4),
+            (32_000, 16_384, 4),
+            (70_000, 320, 220),
+        ] {
+            let mut random = fastrand::Rng::with_seed(count as u64);
+            let mut code = || Code {
+                color: [random.i32(-9..9), 0, 0, 0],
+                center: [random.u32(0..80_000), random.u32(0..60_000)],
+                ..Code::default()
+            };
+            let mut codes: Vec<Code> = (0..count).map(|_| code()).collect();
+            let layers = entropy_layers(&coder, &mut codes);
+            let sizes: Vec<usize> = layers.iter().map(|layer| layer.len()).collect();
+            assert_eq!(sizes.iter().sum::<usize>(), count);
+            assert_eq!(sizes.len(), number, "{sizes:?}");
+            assert_eq!(sizes.iter().max().copied().unwrap_or(0), largest, "{sizes:?}");
+            let thumbnail = sizes.iter().take(2).sum::<usize>();
+            assert!(count > plan::MOST_WHOLE || thumbnail >= count / 6, "{sizes:?}");
+        }
+    }
+}

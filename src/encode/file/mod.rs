@@ -1,0 +1,220 @@
+//! Codes to layers to bytes (spec, sections 4 to 7).
+
+mod layers;
+
+pub(crate) use layers::{packed_layers_length, write_entropy_layers};
+
+use super::error::OptionError;
+use super::source::Source;
+use crate::chunk::ChunkType;
+use crate::coding::entropy::{LatticeCodes, LayerCoder};
+use crate::coding::packed::{PackedCodes, Quantizer};
+use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
+use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::kernel::Kernel;
+
+/// All of a file but its Gaussians.
+#[derive(Debug)]
+pub(crate) struct FileLayout<'a> {
+    header: Header,
+    metadata: &'a Metadata,
+}
+
+impl<'a> FileLayout<'a> {
+    /// `mean` is the mean of each channel.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        mean: [f32; 4],
+        kernel: Kernel,
+        parameterization: Parameterization,
+        metadata: &'a Metadata,
+    ) -> Self {
+        let header = Header {
+            version: VERSION,
+            coding: Coding::Packed,
+            width: source.width(),
+            height: source.height(),
+            color: source.color(),
+            depth: source.depth(),
+            gaussians: 0,
+            layers: 0,
+            kernel,
+            parameterization,
+            base_color: mean.map(|value| (value * 65535.0).round() as u16),
+        };
+        Self { header, metadata }
+    }
+
+    /// The header, but for the numbers of Gaussians and layers.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The colour that Gaussians are added to, as the decoder has it.
+    pub(crate) fn base(&self) -> [f32; 4] {
+        self.header.base()
+    }
+
+    /// The file of packed Gaussians.
+    pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
+        let PackedCodes { quantizers, codes } = self.ordered(packed);
+        let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
+        let layers = layers::write_packed_layers(&codes, &quantizers);
+        let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
+        self.write(&header, &quantization, None, &layers)
+    }
+
+    /// The file of entropy-coded Gaussians.
+    pub(crate) fn write_entropy(&self, coded: &LatticeCodes) -> Vec<u8> {
+        let header = Header {
+            coding: Coding::Entropy,
+            parameterization: Parameterization::Cholesky,
+            gaussians: coded.codes.len() as u32,
+            ..self.header.clone()
+        };
+        let coder = LayerCoder::new(&coded.lattice, &header);
+        let mut codes = coded.codes.clone();
+        let layers = write_entropy_layers(&coder, &mut codes);
+        let bounds = layers::bounds(&coder, &codes, &layers, &header);
+        let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
+        self.write(&header, &coded.lattice.to_payload(), bounds, &payloads)
+    }
+
+    /// The chunks of a file, whatever its coding.
+    fn write(
+        &self,
+        header: &Header,
+        quantization: &[u8],
+        bounds: Option<Vec<u8>>,
+        layers: &[Vec<u8>],
+    ) -> Vec<u8> {
+        let header = Header { layers: layers.len() as u16, ..header.clone() };
+        let mut file = ChunkWriter::new();
+        file.chunk(ChunkType::GHDR, &header.to_payload());
+        file.chunk(ChunkType::QNTZ, quantization);
+        for (kind, payload) in self.metadata.chunks() {
+            file.chunk(kind, &payload);
+        }
+        if let Some(bounds) = bounds {
+            file.chunk(ChunkType::BNDS, &bounds);
+        }
+        for layer in layers {
+            file.chunk(ChunkType::GAUS, layer);
+        }
+        file.finish()
+    }
+
+    /// Refuses a size that is less than a file takes without any Gaussian.
+    pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), OptionError> {
+        if bytes < least {
+            return Err(OptionError::Size { bytes, least });
+        }
+        Ok(())
+    }
+
+    /// The bytes of a packed file without any Gaussian.
+    pub(crate) fn least_length(&self, quantizers: &[Quantizer]) -> u64 {
+        let empty = PackedCodes { quantizers: quantizers.to_vec(), codes: Vec::new() };
+        self.write_packed(&empty).len() as u64
+    }
+
+    /// The Gaussian that adds most to the picture first, so that every prefix of the file is a
+    /// picture.
+    pub(crate) fn ordered(&self, fitted: &PackedCodes) -> PackedCodes {
+        let mut order: Vec<_> = fitted
+            .codes
+            .iter()
+            .map(|codes| {
+                let mut values = [0.0; MAX_COMPONENTS];
+                for ((value, &code), quantizer) in
+                    values.iter_mut().zip(codes).zip(&fitted.quantizers)
+                {
+                    *value = quantizer.value(code);
+                }
+                let values = &values[..fitted.quantizers.len()];
+                let gaussian = Gaussian::from_components(values, self.header.parameterization);
+                (gaussian.importance(), codes)
+            })
+            .collect();
+        order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let codes = order.into_iter().map(|(_, codes)| *codes).collect();
+        PackedCodes { quantizers: fitted.quantizers.clone(), codes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::decode::Decoder;
+    use crate::encode::rate_model;
+
+    use crate::coding::entropy::{CenterGrid, Code};
+    use crate::region::Region;
+    use crate::render::RenderOptions;
+
+    const SIDES: [u32; 2] = [900, 700];
+
+    /// A file of so many Gaussians, some of them beside the picture.
+    fn file(count: usize) -> Vec<u8> {
+        let [width, height] = SIDES;
+        let samples = vec![9; (width * height) as usize];
+        let source =
+            Source::new_u8(width, height, ColorModel::Gray, &samples).expect("sizes agree");
+        let metadata = Metadata::default();
+        let layout = FileLayout::new(
+            &source,
+            [0.0; 4],
+            Kernel::Quartic,
+            Parameterization::Cholesky,
+            &metadata,
+        );
+        let grid = CenterGrid::new(width, height);
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut code = || Code {
+            class: 2,
+            color: [random.i32(-20..=20), 0, 0, 0],
+            size: random.i32(-6..=6),
+            ratio: random.i32(-3..=3),
+            slant: random.i32(-3..=3),
+            center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
+        };
+        let codes = (0..count).map(|_| code()).collect();
+        layout.write_entropy(&LatticeCodes {
+            lattice: rate_model::lattice(0.0, ColorModel::Gray),
+            codes,
+        })
+    }
+
+    /// The samples of a region, and how many Gaussians are kept decoded.
+    fn decoded(file: &[u8], options: &RenderOptions, all: bool) -> (Vec<u8>, usize) {
+        let mut decoder = Decoder::new(file).expect("it begins well");
+        if all {
+            decoder.read_to_end().expect("it is sound");
+        }
+        decoder.set_options(options.clone());
+        let mut samples = vec![0; decoder.output_len().expect("it fits")];
+        decoder.decode_into(&mut samples).expect("it is sound");
+        (samples, decoder.stream().gaussians().len())
+    }
+
+    #[test]
+    fn a_region_of_a_large_picture_is_that_part_of_it() {
+        let file = file(33_000);
+        for (scale, x, y) in [(1, 0, 0), (1, 430, 330), (1, 860, 660), (3, 2000, 800)] {
+            let region = Region { x, y, width: 40, height: 40 };
+            let options = RenderOptions::new().with_size(SIDES[0] * scale, SIDES[1] * scale);
+            let options = options.with_region(region);
+            let (expected, gaussians) = decoded(&file, &options, true);
+            assert_eq!(gaussians, 33_000);
+            // Those that were decoded for the region alone are not kept.
+            assert_eq!(decoded(&file, &options, false), (expected, 0), "{region:?}");
+        }
+    }
+
+    #[test]
+    fn few_layers_say_nothing_of_where_they_show() {
+        let options = RenderOptions::new().with_region(Region { x: 0, y: 0, width: 9, height: 9 });
+        assert_eq!(decoded(&file(3000), &options, false).1, 3000);
+    }
+}

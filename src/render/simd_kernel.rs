@@ -1,0 +1,83 @@
+//! The weights of [`Kernel`](crate::kernel::Kernel), sixteen at a time and bit for bit.
+
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+
+#[cfg(feature = "encode")]
+use crate::kernel::QUARTIC_CUTOFF;
+use crate::math::{EXP2_POLYNOMIAL, LOG2_E, ROUND_MAGIC};
+
+/// A kernel whose parameters are known when the inner loop is compiled.
+pub(crate) trait Weight: Copy {
+    /// What all points with the same u have in common.
+    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S>;
+
+    /// The weights of points, from what their columns have in common.
+    fn weight<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S>;
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Exponential {
+    pub(crate) cutoff: f32,
+}
+
+#[derive(Clone, Copy)]
+pub(crate) struct Quartic;
+
+impl Weight for Quartic {
+    #[inline(always)]
+    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S> {
+        f32x16::splat(simd, 1.0) - u * u
+    }
+
+    #[inline(always)]
+    fn weight<S: Simd>(self, _: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S> {
+        let t = (column - v * v).max(0.0);
+        t * t
+    }
+}
+
+impl Quartic {
+    /// The root of the weights at squared Mahalanobis distances: 1 - q / 4, and 0 beyond the cut-off.
+    #[cfg(feature = "encode")]
+    #[inline(always)]
+    pub(crate) fn root<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
+        (f32x16::splat(simd, 1.0) - q * (1.0 / QUARTIC_CUTOFF)).max(0.0)
+    }
+}
+
+impl Weight for Exponential {
+    #[inline(always)]
+    fn column<S: Simd>(self, _: S, u: f32x16<S>) -> f32x16<S> {
+        u * u
+    }
+
+    #[inline(always)]
+    fn weight<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S> {
+        self.at(simd, column + v * v)
+    }
+}
+
+impl Exponential {
+    /// The weights at squared Mahalanobis distances.
+    #[inline(always)]
+    pub(crate) fn at<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
+        let zero = f32x16::splat(simd, 0.0);
+        q.simd_le(self.cutoff).select(exp(simd, q * -0.5), zero)
+    }
+}
+
+/// [`math::exp`](crate::math::exp), sixteen at a time.
+#[inline(always)]
+pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+    let y = (x * LOG2_E).max(-126.0).min(126.0);
+    let shifted = y + ROUND_MAGIC;
+    let f = y - (shifted - ROUND_MAGIC);
+    let mut p = f32x16::splat(simd, EXP2_POLYNOMIAL[0]);
+    for &coefficient in &EXP2_POLYNOMIAL[1..] {
+        p = p * f + coefficient;
+    }
+    // The low bits of `shifted` are the rounded y itself.
+    let exponent: u32x16<S> = shifted.bitcast();
+    let power = (exponent - (ROUND_MAGIC.to_bits() - 127)) << 23;
+    p * power.bitcast::<f32x16<S>>()
+}

@@ -1,0 +1,515 @@
+//! The test vectors of the entropy coding.
+
+use super::common::entropy::{self, Code, Grid};
+use super::common::rans::{self, Op};
+use super::common::{
+    COVARIANCE, EXPONENTIAL, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks,
+    steps,
+};
+use super::{Rendering, Vector, header};
+
+/// The steps of position, size, ratio, slant, and of every colour axis.
+fn usual_steps(color: u8) -> Vec<f32> {
+    let mut steps = vec![1.25, 0.66, 0.9, 1.9];
+    steps.resize(5 + usize::from(color), 0.1);
+    steps
+}
+
+const LEAST_STEP: f32 = 1.0 / 1_048_576.0;
+const MOST_STEP: f32 = 1024.0;
+
+/// A Gaussian of class 2 at a point of the picture, as large as its cell lets expect, not slanted.
+fn at(header: &Ghdr, point: [f32; 2], first: i32) -> Code {
+    let mut axes = vec![0; header.channels()];
+    axes[0] = first;
+    Code { class: 2, axes, place: Grid::new(header.sides()).units(point), ..Code::default() }
+}
+
+/// Random Gaussians with small codes in the picture.
+fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
+    let mut random = Random(seed);
+    let grid = Grid::new(header.sides());
+    let sides = [header.width as f32, header.height as f32];
+    let one = |_| {
+        let class = 1 + (random.next() % 5) as u32;
+        let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
+        let (color, shape) = (6 << class.saturating_sub(3), 1 << class.saturating_sub(1));
+        let axes = (0..header.channels()).map(|_| within(color)).collect();
+        let [size, ratio, slant] = [within(shape), within(shape), within(shape)];
+        let place = grid.units(sides.map(|side| random.range(0.0, side)));
+        Code { class, axes, size, ratio, slant, place }
+    };
+    (0..count).map(one).collect()
+}
+
+fn scattered(seed: u64, header: Ghdr, count: usize) -> File {
+    let codes = scatter(seed, &header, count);
+    File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
+}
+
+/// Equal Gaussians without colour: 216 of them take 54 bytes behind their number, and so do 217.
+fn dense(count: usize) -> File {
+    let header = header(GRAY, 24, 16);
+    let mut steps = usual_steps(GRAY);
+    steps[0] = MOST_STEP;
+    let code = Code { class: 1, ..at(&header, [4.0, 8.0], 0) };
+    File::of_entropy_coded(header, steps, vec![vec![code; count]])
+}
+
+pub(super) fn valid() -> Vec<Vector> {
+    let gray = header(GRAY, 24, 16);
+    let sharp = |color| {
+        let header = header(color, 24, 16);
+        Ghdr { depth: 16, kernel: EXPONENTIAL, cutoff: 11.082_527, ..header }
+    };
+    let usual = |header: Ghdr, codes| {
+        File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
+    };
+    let layers = {
+        let header = header(RGB, 40, 24);
+        let layers = [5, 1, 40, 2].into_iter().zip(170..);
+        let layers = layers.map(|(count, seed)| scatter(seed, &header, count)).collect();
+        File::of_entropy_coded(header, usual_steps(RGB), layers)
+    };
+    let bounded = layers.clone().with(b"bNDS", &layers.bounds());
+    let classes = {
+        let header = header(RGBA, 32, 16);
+        let of_class = |class: u32| {
+            // Just over, and as much below, what a symbol of this class can say.
+            let (color, shape) = (1 << class.saturating_sub(3), 1 << class.saturating_sub(2));
+            let base = at(&header, [4.0 * class as f32 + 1.5, 9.2], 5 * color + class as i32);
+            let axes = vec![base.axes[0], 2 * color + 1, -3 * color - 1, 4 * color];
+            let more = Code { class, axes, size: shape + 1, ..base };
+            let less = Code {
+                axes: more.axes.iter().map(|axis| -axis / 2).collect(),
+                size: -shape - 1,
+                ratio: 2 * shape - 1,
+                slant: 1 - 2 * shape,
+                place: [more.place[0] + 100, more.place[1] - 700],
+                ..more
+            };
+            [more, less]
+        };
+        usual(header, (0..8).flat_map(of_class).collect())
+    };
+    let excess = {
+        let header = header(RGB, 24, 16);
+        let code = |n: u32, class: u32, axes: [i32; 3], [size, ratio, slant]: [i32; 3]| Code {
+            axes: axes.to_vec(),
+            class,
+            size,
+            ratio,
+            slant,
+            ..at(&header, [1.5 + 3.0 * n as f32, 8.0 - n as f32], 0)
+        };
+        let codes = vec![
+            code(0, 2, [14, 7, -7], [0, -7, 7]),
+            code(1, 2, [15, 8, -8], [1, -8, 8]),
+            code(2, 2, [-16, 9, -9], [-1, -9, 9]),
+            code(3, 5, [17, 40, -41], [-20, 70, 71]),
+            code(4, 5, [-900, 300, 500], [30, 0, -700]),
+            code(5, 2, [65_549, 65_542, -65_542], [0, 0, 65_542]),
+            code(6, 7, [-1_048_799, -1_048_687, 1_048_672], [7, -2_097_344, 2_097_375]),
+        ];
+        usual(header, codes)
+    };
+    let crowd = {
+        let point = [9.3, 7.7];
+        let mut codes: Vec<Code> = (-4..5).map(|first| at(&gray, point, first)).collect();
+        // The class of each differs, and so does the cell of its position.
+        codes.iter_mut().zip(0..).for_each(|(code, class)| code.class = class % 8);
+        codes.push(at(&gray, [9.3, 8.2], 3));
+        usual(gray, codes)
+    };
+    let many = {
+        let header = header(GRAY, 64, 48);
+        let mut random = Random(182);
+        let codes = (0..400).map(|_| {
+            // Half of them in an eighth of the picture.
+            let left = random.next() & 1 == 1;
+            let x = if left { random.range(0.0, 8.0) } else { random.range(8.0, 64.0) };
+            let first = (random.next() % 3) as i32 - 1;
+            Code { class: 1, ..at(&header, [x, random.range(0.0, 48.0)], first) }
+        });
+        usual(header, codes.collect())
+    };
+    let outside = {
+        let points =
+            [[-7.9, 4.0], [-0.5, -0.5], [31.9, 23.9], [12.0, -3.0], [12.0, 18.0], [26.0, 8.0]];
+        usual(gray, points.map(|point| Code { size: 3, ..at(&gray, point, 9) }).to_vec())
+    };
+    let clamped = {
+        let code = |x: f32, [size, ratio, slant]: [i32; 3]| Code {
+            size,
+            ratio,
+            slant,
+            ..at(&gray, [x, 8.0], 9)
+        };
+        let codes = vec![
+            code(3.0, [400, 0, 0]),
+            code(6.0, [-400, 0, 0]),
+            code(9.0, [0, 300, 0]),
+            code(12.0, [0, -300, 5]),
+            code(15.0, [400, 300, -5]),
+            code(18.0, [-400, 300, 65_542]),
+            code(21.0, [0, 0, 1]),
+        ];
+        usual(gray, codes)
+    };
+    let not_drawn = {
+        let sound = |x: f32| at(&gray, [x, 8.0], 9);
+        let codes = vec![
+            Code { size: 150, ..sound(2.0) },
+            Code { size: -150, ..sound(5.0) },
+            Code { size: 60, ratio: -40, ..sound(8.0) },
+            Code { size: -36, ratio: 40, ..sound(11.0) },
+            Code { size: 80, slant: 65_542, ..sound(14.0) },
+            Code { size: -30, axes: vec![65_549], class: 0, ..sound(17.0) },
+            sound(20.0),
+        ];
+        usual(gray, codes)
+    };
+    let least = {
+        let sides = header(RGB, 24, 16);
+        let large = |x: f32, class: u32, axes: [i32; 3], size: i32| Code {
+            class,
+            axes: axes.to_vec(),
+            size,
+            ratio: 65_000 << class.saturating_sub(2),
+            slant: -30_000 << class.saturating_sub(2),
+            ..at(&sides, [x, 8.0], 0)
+        };
+        let codes = vec![
+            large(3.0, 0, [65_000, -60_000, 50_000], 65_000),
+            large(10.0, 3, [65_000, 0, 1], -65_000),
+            large(18.0, 7, [1_000_000, -900_000, -1_000_000], 2_000_000),
+        ];
+        File::of_entropy_coded(sides, vec![LEAST_STEP; 7], vec![codes])
+    };
+    let most = {
+        let sides = header(RGB, 24, 16);
+        let one = |x: f32, class: u32, ratio: i32| Code {
+            class,
+            axes: vec![1, 0, -1],
+            ratio,
+            ..at(&sides, [x, 8.0], 0)
+        };
+        let mut codes = vec![one(3.0, 0, 0), one(10.0, 4, 0), one(18.0, 7, 0), one(21.0, 7, 1)];
+        codes[2].axes = vec![0, 1, 0];
+        File::of_entropy_coded(sides, vec![MOST_STEP; 7], vec![codes])
+    };
+    let pixel = Ghdr { width: 1, height: 1, ..gray };
+    let long = Ghdr { width: 2000, height: 3, ..gray };
+    let high = Ghdr { width: 1, height: 300, color: RGB, ..gray };
+    let gray_alpha = header(GRAY_ALPHA, 17, 9);
+    vec![
+        Vector::valid("entropy-gray8", "entropy coding: gray, 8 bits", scattered(160, gray, 20))
+            .also(&[
+                Rendering::Size(48, 32),
+                Rendering::Size(7, 5),
+                Rendering::Region(3, 5, 17, 9),
+                Rendering::Color(image_gip::ColorModel::Rgba),
+            ]),
+        Vector::valid(
+            "entropy-gray16",
+            "entropy coding: gray, 16 bits, exponential kernel",
+            scattered(161, sharp(GRAY), 20),
+        ),
+        Vector::valid(
+            "entropy-gray-alpha8",
+            "entropy coding: the axes are gray and alpha",
+            scattered(162, gray_alpha, 15),
+        ),
+        Vector::valid(
+            "entropy-gray-alpha16",
+            "entropy coding: gray and alpha, 16 bits",
+            scattered(163, sharp(GRAY_ALPHA), 15),
+        ),
+        Vector::valid(
+            "entropy-rgb8",
+            "entropy coding: three axes give red, green, blue",
+            scattered(164, header(RGB, 40, 24), 30),
+        )
+        .also(&[Rendering::Size(20, 12)]),
+        Vector::valid(
+            "entropy-rgb16",
+            "entropy coding: RGB, 16 bits",
+            scattered(165, sharp(RGB), 20),
+        ),
+        Vector::valid(
+            "entropy-rgba8",
+            "entropy coding: the fourth axis is alpha",
+            scattered(166, header(RGBA, 19, 23), 20),
+        ),
+        Vector::valid(
+            "entropy-rgba16",
+            "entropy coding: RGBA, 16 bits",
+            scattered(167, sharp(RGBA), 20),
+        ),
+        Vector::valid(
+            "entropy-one",
+            "entropy coding: one Gaussian",
+            usual(gray, vec![at(&gray, [9.0, 7.0], 7)]),
+        ),
+        Vector::valid(
+            "entropy-layers",
+            "entropy coding: four layers; models begin anew in each",
+            layers,
+        )
+        .also(&[Rendering::Prefix(5), Rendering::Prefix(6), Rendering::Prefix(20)]),
+        Vector::valid("entropy-bounds", "entropy coding: where each of four layers shows", bounded)
+            .also(&[
+                Rendering::Region(1, 2, 3, 4),
+                Rendering::Region(30, 17, 10, 7),
+                Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
+            ]),
+        Vector::valid(
+            "entropy-classes",
+            "entropy coding: all classes, with plain bits under codes",
+            classes,
+        ),
+        Vector::valid(
+            "entropy-excess",
+            "entropy coding: codes around the last that have a symbol, and up to the largest there are",
+            excess,
+        ),
+        Vector::valid(
+            "entropy-crowd",
+            "entropy coding: nine Gaussians in one pixel, which is not split",
+            crowd,
+        ),
+        Vector::valid(
+            "entropy-many",
+            "entropy coding: counts of 16 and more, and of 256 and more; models learn at every rate",
+            many,
+        ),
+        Vector::valid(
+            "entropy-dense",
+            "entropy coding: just four Gaussians for each byte",
+            dense(216),
+        ),
+        Vector::valid(
+            "entropy-outside",
+            "entropy coding: centres in the roots around the picture",
+            outside,
+        ),
+        Vector::valid(
+            "entropy-one-pixel",
+            "entropy coding: a picture of one pixel",
+            usual(pixel, vec![at(&pixel, [0.4, 0.6], 5), at(&pixel, [3.0, -3.0], 9)]),
+        )
+        .also(&[Rendering::Size(16, 16)]),
+        Vector::valid(
+            "entropy-long",
+            "entropy coding: 2000 x 3 pixels, 18 x 3 roots of 128 pixels",
+            scattered(168, long, 12),
+        ),
+        Vector::valid(
+            "entropy-high",
+            "entropy coding: 1 x 300 pixels, an odd number of roots",
+            scattered(169, high, 12),
+        ),
+        Vector::valid(
+            "entropy-clamped",
+            "entropy coding: logarithms confined to -20 to 20 decide how long a place is; one is drawn",
+            clamped,
+        ),
+        Vector::valid(
+            "entropy-not-drawn",
+            "entropy coding: six Gaussians out of bounds, and one that is drawn",
+            not_drawn,
+        ),
+        Vector::valid("entropy-steps-least", "entropy coding: all steps are 2^-20", least),
+        Vector::valid("entropy-steps-most", "entropy coding: all steps are 2^10", most),
+    ]
+}
+
+pub(super) fn invalid() -> Vec<Vector> {
+    let gray = Ghdr { color: GRAY, ..Ghdr::default() };
+    let second = {
+        let mut codes: Vec<Code> = (0..39).map(|n| at(&gray, [n as f32 * 0.4, 3.3], 2)).collect();
+        codes.push(at(&gray, [4.0, 12.0], 5));
+        codes
+    };
+    let first = vec![at(&gray, [8.0, 8.0], 9), at(&gray, [3.0, 12.0], -9)];
+    let file = File::of_entropy_coded(gray, usual_steps(GRAY), vec![first, second.clone()]);
+    let chunks = file.chunks();
+    let usual_steps = usual_steps(GRAY);
+    // GHDR, QNTZ, two layers, GEND; the second is damaged.
+    let replaced = |at: usize, chunk: Vec<u8>| {
+        let mut chunks = chunks.clone();
+        chunks[at] = chunk;
+        of_chunks(&chunks)
+    };
+    // A layer that the oracle refuses as well, and says why.
+    let refused = |name, shows, payload: &[u8], flaw: &str| {
+        let found = entropy::read(gray.sides(), &usual_steps, payload);
+        assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
+        Vector::invalid(name, shows, replaced(3, chunk(b"GAUS", payload)))
+    };
+    let with_step = |at: usize, step: f32| {
+        let mut changed = usual_steps.clone();
+        changed[at] = step;
+        replaced(1, chunk(b"QNTZ", &steps(&changed)))
+    };
+    let with_header = |change: &dyn Fn(&mut Ghdr)| {
+        let mut header = file.header;
+        change(&mut header);
+        replaced(0, chunk(b"GHDR", &header.payload()))
+    };
+    let payload = chunks[3][8..chunks[3].len() - 4].to_vec();
+    let changed = |change: &dyn Fn(&mut Vec<u8>)| {
+        let mut payload = payload.clone();
+        change(&mut payload);
+        payload
+    };
+    // The second layer of other symbols.
+    let with_ops = |change: &dyn Fn(&mut Vec<Op>)| {
+        let mut ops = entropy::write(gray.sides(), &usual_steps, &mut second.clone());
+        change(&mut ops);
+        let count = (second.len() as u32).to_le_bytes();
+        [&count[..], &rans::encode(&ops)].concat()
+    };
+    let with_symbol = |found: &dyn Fn(u32) -> bool, wrong: u32| {
+        with_ops(&|ops| {
+            let symbols = ops.iter_mut().filter_map(|op| match op {
+                Op::Symbol { context, symbol } if found(*context) => Some(symbol),
+                _ => None,
+            });
+            *symbols.last().expect("such a symbol") = wrong;
+        })
+    };
+    let next = |step: f32, change: i32| f32::from_bits(step.to_bits().wrapping_add_signed(change));
+    let start = 8 + chunks[..3].iter().map(Vec::len).sum::<usize>();
+    let invalid = Vector::invalid;
+    vec![
+        invalid("xentropy-parameterization", "entropy coding with another parameterization", {
+            with_header(&|h| h.parameterization = COVARIANCE)
+        }),
+        invalid("xentropy-length-quantizers", "entropy coding: a step too few", {
+            replaced(1, chunk(b"QNTZ", &steps(&usual_steps[1..])))
+        }),
+        invalid("xentropy-step-nan", "entropy coding: a step of NaN", {
+            with_step(0, f32::from_bits(0x7FC0_0000))
+        }),
+        invalid("xentropy-step-zero", "entropy coding: a step of zero", with_step(1, 0.0)),
+        invalid("xentropy-step-negative", "entropy coding: a negative step", with_step(2, -0.5)),
+        invalid("xentropy-step-under", "entropy coding: a step just under 2^-20", {
+            with_step(3, next(LEAST_STEP, -1))
+        }),
+        invalid("xentropy-step-over", "entropy coding: a step just over 2^10", {
+            with_step(4, next(MOST_STEP, 1))
+        }),
+        invalid("xentropy-count-more", "entropy coding: a Gaussian more than declared", {
+            with_header(&|h| h.gaussians -= 1)
+        }),
+        invalid("xentropy-count-fewer", "entropy coding: a Gaussian less than declared", {
+            with_header(&|h| h.gaussians += 1)
+        }),
+        refused(
+            "xentropy-empty",
+            "entropy coding: a layer of no Gaussians",
+            &changed(&|payload| payload[0] = 0),
+            "no Gaussians",
+        ),
+        invalid("xentropy-dense", "entropy coding: more than four Gaussians for each byte", {
+            dense(217).bytes()
+        }),
+        refused(
+            "xentropy-class-8",
+            "entropy coding: class 8",
+            &with_symbol(&|context| context == 0, 8),
+            "a class over 7",
+        ),
+        refused(
+            "xentropy-class-15",
+            "entropy coding: class 15",
+            &with_symbol(&|context| context == 0, 15),
+            "a class over 7",
+        ),
+        refused(
+            "xentropy-few",
+            "entropy coding: a part of one Gaussian holds two",
+            &with_symbol(&|context| context == 158, 2),
+            "a part with more than the whole",
+        ),
+        refused(
+            "xentropy-share",
+            "entropy coding: a number beyond the share that was read",
+            // The first symbol and bits tell how many of 40 are in the left half. Of 41 numbers
+            // the first share has 0, 1 and 2.
+            &with_ops(&|ops| {
+                ops[0] = Op::Symbol { context: 178, symbol: 0 };
+                ops[1] = Op::Bits { count: 2, value: 3 };
+            }),
+            "a count beyond its share",
+        ),
+        refused(
+            "xentropy-short",
+            "entropy coding: too short for a number of Gaussians",
+            &payload[..3],
+            "no count",
+        ),
+        refused(
+            "xentropy-short-state",
+            "entropy coding: too short for a state",
+            &[&[1, 0, 0, 0], &payload[4..6]].concat(),
+            "no state",
+        ),
+        refused(
+            "xentropy-state",
+            "entropy coding: a state that begins below 2^16",
+            &changed(&|payload| payload[6..8].fill(0)),
+            "the state begins below 2^16",
+        ),
+        refused(
+            "xentropy-words-fewer",
+            "entropy coding: a word is missing",
+            &changed(&|payload| payload.truncate(payload.len() - 2)),
+            "no word left",
+        ),
+        refused(
+            "xentropy-words-more",
+            "entropy coding: a word is left",
+            &changed(&|payload| payload.extend([0, 0])),
+            "words left",
+        ),
+        refused(
+            "xentropy-byte-more",
+            "entropy coding: half a word is left",
+            &changed(&|payload| payload.push(0)),
+            "words left",
+        ),
+        refused(
+            "xentropy-end-state",
+            "entropy coding: another state at the end",
+            &with_ops(&|ops| ops.push(Op::Bits { count: 1, value: 1 })),
+            "another state at the end",
+        ),
+        invalid(
+            "xentropy-bounds-fewer",
+            "entropy coding: it is said of one layer only where it shows, and there are two",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255]).bytes(),
+        ),
+        invalid(
+            "xentropy-bounds-reversed",
+            "entropy coding: a layer shows in rows that end before they begin",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255, 7, 9, 7, 8]).bytes(),
+        ),
+        invalid(
+            "xentropy-bounds-twice",
+            "entropy coding: it is said twice where layers show",
+            file.clone().with(b"bNDS", &[0, 0, 255, 255].repeat(2)).with(b"bNDS", &[0; 8]).bytes(),
+        ),
+        invalid("xentropy-crc", "entropy coding: a wrong CRC, found when the layer is complete", {
+            let mut bytes = file.bytes();
+            bytes[start + 20] ^= 4;
+            bytes
+        }),
+        invalid(
+            "xentropy-truncated",
+            "entropy coding: ends within the second layer, of which nothing is kept",
+            file.bytes()[..start + 40].to_vec(),
+        ),
+    ]
+}
