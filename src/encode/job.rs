@@ -6,7 +6,7 @@ use super::source::Source;
 use crate::container::Metadata;
 
 /// What is to be encoded, and how.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
     pub(crate) source: &'a Source<'a>,
     pub(crate) target: Target,

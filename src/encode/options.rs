@@ -12,12 +12,14 @@ pub enum Target {
     Auto,
     /// At most this many Gaussians, 1 to 2^22; fewer where the picture needs fewer.
     Gaussians(u32),
-    /// A file of at most this many bytes, and at least 99 % of it.
+    /// A file of at most this many bytes, and at least 99 % of it. Where that many bring a picture
+    /// hardly anything, the file is smaller, and the report's shortfall says so.
     Bytes(u64),
-    /// A file of at most this many bits per pixel, and at least 99 % of it.
+    /// A file of at most this many bits per pixel, and at least 99 % of it; see [`Target::Bytes`].
     BitsPerPixel(f64),
     /// A PSNR of the decoded file at the source's depth, in dB, from 1 to 120: at least this much
-    /// and at most 0.05 dB more.
+    /// and at most 0.05 dB more. A PSNR that is out of reach ends with what the effort reaches, after up
+    /// to one Gaussian per pixel and three times the effort's iterations; the report's shortfall says so.
     Psnr(f64),
     /// A quality from 0 to 100. Every picture gets Gaussians until each lowers the squared error
     /// by the same amount, so simple pictures get few; 10 more is about 1.6 times the Gaussians.

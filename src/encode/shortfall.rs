@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE, Target};
 
-/// Why a file does not meet its target within 1 % of size or 0.05 dB.
+/// Why a file does not meet its target within 1 % of size or 0.05 dB. The text says it in words.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shortfall {
@@ -17,6 +17,13 @@ pub enum Shortfall {
     PsnrAbove {
         /// PSNR of the file in dB.
         psnr: f64,
+        /// Gaussians in the file.
+        gaussians: u32,
+    },
+    /// A file of the target's size shows no better picture at this effort than this smaller one.
+    SizeUseless {
+        /// Bytes of the file.
+        bytes: usize,
         /// Gaussians in the file.
         gaussians: u32,
     },
@@ -60,6 +67,10 @@ impl fmt::Display for Shortfall {
             Self::PsnrAbove { psnr, gaussians } => {
                 write!(f, "with {gaussians} Gaussians the picture already has {psnr:.2} dB")
             }
+            Self::SizeUseless { bytes, gaussians } => write!(
+                f,
+                "more than {gaussians} Gaussians, {bytes} bytes, do not improve the picture at this effort"
+            ),
             Self::SizeBelow { bytes, gaussians } => write!(
                 f,
                 "{gaussians} Gaussians, {bytes} bytes, are what the picture needs or the size holds"

@@ -37,8 +37,8 @@ const REBIN_INTERVAL: u32 = 8;
 /// Gaussians that one thread prepares in one go.
 const CHUNK: usize = 512;
 
-/// What a fit took.
-#[derive(Clone, Copy, Debug)]
+/// What fits took.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Work {
     pub(crate) iterations: u32,
     pub(crate) evaluations: u64,
@@ -84,6 +84,7 @@ impl<'a> Fit<'a> {
         precision: Precision,
         base: [f32; 4],
         seed: u64,
+        work: Work,
     ) -> Self {
         Self {
             raster,
@@ -103,7 +104,7 @@ impl<'a> Fit<'a> {
             binned_for: 0,
             splats: Vec::new(),
             error: 0.0,
-            work: Work { iterations: 0, evaluations: 0, peak_memory: 0 },
+            work,
             rng: fastrand::Rng::with_seed(seed),
         }
     }
@@ -116,12 +117,13 @@ impl<'a> Fit<'a> {
         let first = densification.initial * self.wanted(1.0) as f32;
         self.grow((first.ceil() as usize).max(1), observer)?;
         let mut kept = usize::MAX;
+        let total = self.work.iterations + iterations;
         for iteration in 0..*iterations {
             if iteration == plan.quantized_from {
                 self.start_quantization();
             }
             let factor = optimizer.schedule.factor(iteration, *iterations);
-            self.iterate(factor, *iterations, plan.is_settled(iteration), observer)?;
+            self.iterate(factor, total, plan.is_settled(iteration), observer)?;
             let done = iteration + 1;
             if done % densification.prune_interval == 0 {
                 self.prune();

@@ -64,13 +64,20 @@ pub(crate) struct StepSearch {
     pub(crate) at: f64,
     /// By how much what is off changes with the step.
     slope: f64,
+    /// The finest step that is tried.
+    finest: f64,
     /// The nearest steps with which too much, and too little, is off, and by how much.
     bracket: [Option<(f64, f64)>; 2],
 }
 
 impl StepSearch {
-    pub(crate) fn new(at: f64, slope: f64) -> Self {
-        Self { at, slope, bracket: [None; 2] }
+    pub(crate) fn new(at: f64, slope: f64, finest: f64) -> Self {
+        Self { at, slope, finest, bracket: [None; 2] }
+    }
+
+    /// Whether a finer step is needed than the finest, if so much is off with the present one.
+    pub(crate) fn is_exhausted(&self, off: f64) -> bool {
+        self.at <= self.finest && off / self.slope > 0.0
     }
 
     /// Goes on from how much is off with the present step.
@@ -85,6 +92,7 @@ impl StepSearch {
             }
             None => self.at - (off / self.slope).clamp(-2.0, 2.0),
         };
+        self.at = self.at.max(self.finest);
     }
 }
 
@@ -120,12 +128,27 @@ mod tests {
         for steepness in [0.05, 0.3, 0.7, 3.0] {
             for sign in [-1.0, 1.0] {
                 let off = |at: f64| sign * steepness * ((at + 3.7) + 0.1 * (at + 3.7).powi(3));
-                let mut search = StepSearch::new(1.0, sign * 0.37);
+                let mut search = StepSearch::new(1.0, sign * 0.37, f64::NEG_INFINITY);
                 for _ in 0..40 {
                     search.tell(off(search.at));
                 }
                 assert!(off(search.at).abs() < 0.01, "{steepness} {sign}: {search:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_search_for_what_no_step_gives_ends_at_the_finest() {
+        // A PSNR that stays out of reach: finer steps bring ever less.
+        let off = |at: f64| 1.0 + at.exp2();
+        let mut search = StepSearch::new(0.0, 0.36, -4.0);
+        let mut told = 0;
+        while !search.is_exhausted(off(search.at)) {
+            search.tell(off(search.at));
+            told += 1;
+        }
+        assert_eq!((search.at, told), (-4.0, 2));
+        // There, what is good enough needs no finer step.
+        assert!(!search.is_exhausted(-0.1));
     }
 }
