@@ -1,5 +1,6 @@
 //! The command line, from outside: files, streams, JSON, exit status.
 
+mod common;
 mod pictures;
 
 use std::fs;
@@ -7,8 +8,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use common::layered;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
+use image_gip::Region;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -364,6 +367,46 @@ fn sizes_and_regions() {
         let error = room.fails(&["decode", "a.gip", "c.png", flag, value]);
         assert!(error.contains(reason), "{error}");
         assert!(!room.path("c.png").exists());
+    }
+}
+
+#[test]
+fn layers_that_do_not_show_are_not_decoded() {
+    let room = Room::new();
+    let decode = |layers: &[usize], flags: &[&str]| {
+        fs::write(room.path("a.gip"), layered::damaged(layers)).expect("writable");
+        room.run(&[&["decode", "a.gip", "b.png"], flags].concat())
+    };
+    for ((width, height), region, count) in layered::regions() {
+        let size = format!("{width}x{height}");
+        let Region { x, y, width: columns, height: rows } = region;
+        let region_flag = format!("{x},{y},{columns},{rows}");
+        let showing = layered::showing((width, height), region);
+        assert_eq!(showing.len(), count);
+        let hidden: Vec<usize> =
+            (0..layered::LAYERS).filter(|layer| !showing.contains(layer)).collect();
+        let mut flags = vec![["--size", &size, "--region", &region_flag]];
+        // Where both axes are scaled alike, by a factor or not at all.
+        let scale = (f64::from(width) / f64::from(layered::SIZE.0)).to_string();
+        if width * layered::SIZE.1 == height * layered::SIZE.0 {
+            flags.push(["--scale", &scale, "--region", &region_flag]);
+        }
+        for flags in flags {
+            let output = decode(&hidden, &flags);
+            assert!(output.status.success(), "{flags:?}: {}", text(&output.stderr));
+            for &layer in &showing[..count.min(2)] {
+                let output = decode(&[layer], &flags);
+                let error = text(&output.stderr);
+                assert_eq!(output.status.code(), Some(1), "{flags:?}, layer {layer}");
+                assert!(error.starts_with("error: a.gip: chunk GAUS: "), "{error}");
+            }
+        }
+    }
+    // The whole picture takes the first layer and the last, and those between them.
+    for layer in [0, 11, layered::LAYERS - 1] {
+        for flags in [&[][..], &["--scale", "0.1"]] {
+            assert_eq!(decode(&[layer], flags).status.code(), Some(1), "{flags:?}, {layer}");
+        }
     }
 }
 
