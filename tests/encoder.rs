@@ -497,6 +497,12 @@ fn what_a_target_does_not_reach_is_told() {
     let small = encoded(&flat, Target::Bytes(5000));
     let bytes = small.bytes.len();
     assert_eq!(small.report.shortfall, Some(Shortfall::SizeBelow { bytes, gaussians: 0 }));
+    // So it is with more than the model can use, and then training ends as early as otherwise.
+    let large = encoded(&noise, Target::BitsPerPixel(1000.0));
+    let report = &large.report;
+    let as_large = Shortfall::SizeBelow { bytes: large.bytes.len(), gaussians: report.gaussians };
+    assert_eq!(report.shortfall, Some(as_large));
+    assert_eq!(report.iterations, 60);
     // A number of Gaussians is a bound, not a target.
     assert_eq!(encoded(&flat, Target::Gaussians(50)).report.shortfall, None);
     assert_eq!(encoded(&noise, Target::Auto).report.shortfall, None);
