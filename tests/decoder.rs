@@ -1,4 +1,5 @@
-//! The push decoder and the `Read` adapter: slicing, prefixes, damage, order of chunks.
+//! The three decoders: the whole file, any reader, and bytes as they arrive. Slicing, prefixes, damage,
+//! order of chunks, limits, requests.
 
 mod common;
 
@@ -317,7 +318,7 @@ impl Read for Awkward<'_> {
 }
 
 #[test]
-fn the_adapter_reads_from_awkward_readers() {
+fn awkward_readers_make_no_difference() {
     let file = sample();
     let bytes = file.bytes();
     let mut expected = vec![0; 24 * 17 * 3];

@@ -109,7 +109,7 @@ fn declared_lengths_take_no_memory() {
 }
 
 #[test]
-fn a_layer_of_coding_1_takes_memory_as_it_arrives() {
+fn an_entropy_coded_layer_takes_memory_as_it_arrives() {
     let _alone = alone();
     let start = header(|h| (h.coding, h.gaussians, h.layers) = (1, 1 << 22, 1));
     let start = [start, chunk(b"QNTZ", &common::steps(&[1.0; 5]))].concat();
@@ -309,7 +309,7 @@ fn hostile_set() -> Vec<Hostile> {
         }
     }
     // Layers that wait for each other.
-    let code = |n: u32| Code { axes: vec![1], place: [n << 7; 2], ..Code::default() };
+    let code = |n: u32| Code { axes: vec![1], center: [n << 7; 2], ..Code::default() };
     let layers = (0..1700).map(|n| vec![code(n)]).collect();
     let layers = File::of_entropy_coded(wide, vec![1.0, 1.0, 1.0, 1.0, 0.1], layers);
     add("layers", layers.bytes(), ["", "", ""]);

@@ -25,8 +25,8 @@ fn sample() -> File {
             let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
             let axes = vec![within(20), within(9), within(9)];
             let [size, ratio, slant] = [within(6), within(3), within(3)];
-            let place = grid.units([x + random.range(0.0, 50.0), y + random.range(0.0, 50.0)]);
-            Code { class: 2, axes, size, ratio, slant, place }
+            let center = grid.units([x + random.range(0.0, 50.0), y + random.range(0.0, 50.0)]);
+            Code { class: 2, axes, size, ratio, slant, center }
         };
         (0..IN_A_LAYER).map(&mut code).collect()
     };
