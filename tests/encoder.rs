@@ -1,6 +1,5 @@
 //! The encoder through its public interface: what it promises about files, targets and hard
 //! pictures.
-#![cfg(feature = "encode")]
 
 use std::ops::ControlFlow;
 
