@@ -5,7 +5,7 @@
 
 use std::error::Error;
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufReader, Write};
 
 use image_gip::{Decoder, SampleDepth};
 
@@ -14,8 +14,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input, output] = arguments.as_slice() else {
         return Err("usage: decode_only INPUT.gip OUTPUT.pam".into());
     };
-    // The library reads its input once, in order, in pieces: there is no need to buffer it.
-    let mut decoder = Decoder::new(File::open(input)?)?;
+    // The library reads its input once, in order, and never beyond the end of the .gip file: in small
+    // pieces, which a buffer joins.
+    let mut decoder = Decoder::new(BufReader::new(File::open(input)?))?;
     let header = decoder.header().clone();
     let count = decoder.output_len()?;
     let samples = match header.depth {

@@ -10,7 +10,7 @@
 
 use std::error::Error;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufReader, BufWriter, Write};
 
 use image_gip::Decoder;
 
@@ -19,11 +19,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input, output] = arguments.as_slice() else {
         return Err("usage: gaussians INPUT.gip OUTPUT.bin".into());
     };
-    let mut decoder = Decoder::new(File::open(input)?)?;
+    let mut decoder = Decoder::new(BufReader::new(File::open(input)?))?;
     decoder.read_to_end()?;
-    let header = decoder.header();
+    let picture = decoder.picture()?;
+    let header = picture.header();
     let mut file = BufWriter::new(File::create(output)?);
-    for gaussian in decoder.stream().gaussians() {
+    for gaussian in picture.gaussians() {
         let [x, y] = gaussian.center;
         let [a, b, c] = gaussian.conic();
         // Gray has one channel, a colour three; what there is of alpha is left out.

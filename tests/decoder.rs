@@ -1,4 +1,5 @@
-//! The push decoder and the `Read` adapter: slicing, prefixes, damage, order of chunks.
+//! The three decoders: the whole file, any reader, and bytes as they arrive. Slicing, prefixes, damage,
+//! order of chunks, limits, requests.
 
 mod common;
 
@@ -6,11 +7,11 @@ use std::io::{self, Read};
 
 use common::{
     CHOLESKY, EXPONENTIAL, Entry, File, GRAY_ALPHA, Ghdr, QUARTIC, RGB, RGBA, Random, bits, cases,
-    chunk, decode, decode_pieces, decode_valid, gaus, of_chunks, oracle, qntz,
+    chunk, decode, decode_pieces, decode_valid, gaus, layered, of_chunks, oracle, qntz,
 };
 use image_gip::{
-    ChunkType, DecodeError, Decoder, Gaussian, Kernel, Limits, Quantizer, RenderOptions,
-    StreamDecoder,
+    ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Quantizer,
+    Region, RenderOptions, RequestError, SampleDepth, Samples, StreamDecoder,
 };
 use proptest::prelude::*;
 
@@ -317,7 +318,7 @@ impl Read for Awkward<'_> {
 }
 
 #[test]
-fn the_adapter_reads_from_awkward_readers() {
+fn awkward_readers_make_no_difference() {
     let file = sample();
     let bytes = file.bytes();
     let mut expected = vec![0; 24 * 17 * 3];
@@ -337,19 +338,21 @@ fn the_adapter_reads_from_awkward_readers() {
 
     let mut sixteen = vec![0; found.len()];
     decoder.decode_into_u16(&mut sixteen).expect("once more");
-    assert!(sixteen.iter().zip(&found).all(|(&a, &b)| a.abs_diff(u16::from(b) * 257) <= 129));
+    let whole = oracle::render(&file, &oracle::Request::whole(&file));
+    assert_eq!(sixteen, oracle::samples(&whole, 16));
 
-    // A failing reader is an error of its own, after which the picture so far is there.
+    // A failing reader is an error of its own, after which the picture so far is there: two layers, and
+    // of the third, which lacks 14 of its 32 bytes, two Gaussians of 63 bits.
     let cut = &bytes[..bytes.len() - 30];
     let mut decoder = Decoder::new(awkward(cut, true)).expect("a valid header");
     let error = decoder.read_to_end().expect_err("the reader fails");
     assert!(matches!(&error, DecodeError::Io(io) if io.to_string().contains("cut")), "{error}");
-    assert!(decoder.picture().expect("every layer is sound").gaussians().len() >= 4);
+    assert_eq!(decoder.picture().expect("every layer is sound").gaussians().len(), 3 + 1 + 2);
     // So is a file that ends early.
     let mut decoder = Decoder::new(awkward(cut, false)).expect("a valid header");
     let error = decoder.read_to_end().expect_err("the file is too short");
     assert!(error.is_unexpected_end(), "{error}");
-    assert!(decoder.picture().expect("every layer is sound").gaussians().len() >= 4);
+    assert_eq!(decoder.picture().expect("every layer is sound").gaussians().len(), 3 + 1 + 2);
     // A file that ends before its first layer has no picture to open.
     let error = Decoder::new(&bytes[..100]).expect_err("the file is too short");
     assert!(error.is_unexpected_end(), "{error}");
@@ -371,6 +374,249 @@ fn layers_are_read_until_there_are_enough_gaussians() {
     let header = whole.header().expect("read");
     let sizes = [(1, 1), (6, 4), (1 << 20, 1 << 20)];
     assert_eq!(sizes.map(|(width, height)| header.gaussians_for(width, height)), [1, 2, 8]);
+}
+
+/// A file of two entropy-coded layers that both are damaged: the first lacks its last word, the second
+/// has a wrong CRC.
+fn damaged_twice() -> Vec<u8> {
+    let mut chunks = layered::chunks();
+    let first = &mut chunks[layered::BEFORE];
+    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
+    *chunks[layered::BEFORE + 1].last_mut().expect("a CRC") ^= 1;
+    of_chunks(&chunks)
+}
+
+/// Files of both codings, with metadata and without, with bounds, without Gaussians.
+fn files() -> Vec<(&'static str, Vec<u8>)> {
+    let header = Ghdr { depth: 16, base: [9, 0, 0, 0], ..Ghdr::default() };
+    let mut described = layered::chunks();
+    described.insert(1, chunk(b"iCCP", &[7; 20_000]));
+    described.insert(2, chunk(b"tEXt", b"Title\0Layers"));
+    described.insert(described.len() - 1, chunk(b"prVt", &[8; 100]));
+    vec![
+        ("packed", sample().bytes()),
+        ("empty", File::of_floats(header, &[]).bytes()),
+        ("floats", File::of_floats(header, &[vec![5.0, 6.0, 3.0, 1.0, 2.0, 0.7]]).bytes()),
+        ("entropy-coded", of_chunks(&layered::chunks())),
+        ("entropy-coded, with metadata", of_chunks(&described)),
+    ]
+}
+
+#[test]
+fn one_call_gives_the_picture_at_its_own_depth() {
+    for (name, bytes) in files() {
+        let stream = decode_valid(&bytes);
+        let (picture, options) = (stream.picture().expect("whole"), RenderOptions::new());
+        let found = image_gip::decode(&bytes).expect(name);
+        assert_eq!(Some(&found.header), stream.header(), "{name}");
+        assert_eq!(&found.metadata, stream.metadata(), "{name}");
+        let length = picture.output_len(&options).expect("it fits");
+        let expected = if picture.header().depth == SampleDepth::Eight {
+            let mut samples = vec![0; length];
+            picture.render_u8(&options, &mut samples).expect("within limits");
+            Samples::Eight(samples)
+        } else {
+            let mut samples = vec![0; length];
+            picture.render_u16(&options, &mut samples).expect("within limits");
+            Samples::Sixteen(samples)
+        };
+        assert_eq!(found.samples, expected, "{name}");
+        // What comes behind the file is not a part of it.
+        let longer = [&bytes[..], b"something else"].concat();
+        assert_eq!(image_gip::decode(&longer).expect(name), found);
+    }
+}
+
+#[test]
+fn one_call_refuses_what_is_not_a_whole_sound_file() {
+    for (name, bytes) in files() {
+        let cuts = (0..80).chain([bytes.len() / 2]).chain(bytes.len() - 40..bytes.len());
+        for length in cuts.filter(|&length| length < bytes.len()) {
+            let error = image_gip::decode(&bytes[..length]).expect_err("a part of a file");
+            assert!(error.is_unexpected_end(), "{name}, {length} bytes: {error}");
+        }
+    }
+    let bytes = damaged_twice();
+    let expected = decode(&bytes).1.expect_err("damaged").to_string();
+    assert!(expected.contains("GAUS") && !expected.contains("CRC"), "{expected}");
+    assert_eq!(image_gip::decode(&bytes).expect_err("damaged").to_string(), expected);
+    // That the file ends early comes behind it, too.
+    let short = layered::damaged(&[0]);
+    let error = image_gip::decode(&short[..short.len() - 5]).expect_err("damaged");
+    assert_eq!(error.to_string(), expected);
+    let large = Ghdr { width: 1 << 17, ..Ghdr::default() };
+    let error = image_gip::decode(&File::of_floats(large, &[]).bytes()).expect_err("too wide");
+    assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Width, .. }), "{error}");
+}
+
+/// A reader that gives as much as is asked for, or up to so many bytes, and counts them.
+struct Counting<'a> {
+    bytes: &'a [u8],
+    most: usize,
+    given: usize,
+}
+
+impl Read for Counting<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let length = buffer.len().min(self.most).min(self.bytes.len() - self.given);
+        buffer[..length].copy_from_slice(&self.bytes[self.given..][..length]);
+        self.given += length;
+        Ok(length)
+    }
+}
+
+#[test]
+fn the_reader_stands_right_behind_the_file() {
+    for (name, bytes) in files() {
+        // The same file once more, which a reader finds only if it begins where the first ends.
+        let twice = [&bytes[..], &bytes, b"end"].concat();
+        for most in [1, 7, usize::MAX] {
+            let reader = Counting { bytes: &twice, most, given: 0 };
+            let mut first = Decoder::new(reader).expect(name);
+            let mut samples = vec![0; first.output_len().expect("it fits")];
+            first.decode_into(&mut samples).expect(name);
+            let reader = first.into_reader();
+            assert_eq!(reader.given, bytes.len(), "{name}, {most} at a time");
+
+            let mut second = Decoder::new(reader).expect(name);
+            second.read_to_end().expect(name);
+            // Neither of these has anything left to read.
+            second.read_to_end().expect(name);
+            let mut again = vec![1; samples.len()];
+            second.decode_into(&mut again).expect(name);
+            assert_eq!(again, samples, "{name}, {most} at a time");
+            let mut reader = second.into_reader();
+            assert_eq!(reader.given, 2 * bytes.len(), "{name}, {most} at a time");
+            let mut rest = Vec::new();
+            reader.read_to_end(&mut rest).expect("it is in memory");
+            assert_eq!(rest, b"end");
+        }
+    }
+    // So it does where a region leaves out layers.
+    let bytes = [&of_chunks(&layered::chunks())[..], b"end"].concat();
+    let mut decoder = Decoder::new(Counting { bytes: &bytes, most: usize::MAX, given: 0 })
+        .expect("it begins well");
+    let region = Region { x: 0, y: 0, width: 9, height: 9 };
+    decoder.set_options(RenderOptions::new().with_region(region));
+    decoder.decode_into(&mut [0; 9 * 9 * 3]).expect("it is sound");
+    assert_eq!(decoder.into_reader().given, bytes.len() - 3);
+}
+
+#[test]
+fn planes_from_a_reader_are_those_of_the_picture() {
+    let region = Region { x: 10, y: 5, width: 12, height: 9 };
+    let views = [
+        RenderOptions::new(),
+        RenderOptions::new().with_size(31, 20),
+        RenderOptions::new().with_region(region),
+        RenderOptions::new().with_size(900, 600).with_region(region).with_color(ColorModel::Rgba),
+        RenderOptions::new().with_prefix(2).with_color(ColorModel::Rgba),
+    ];
+    for bytes in [sample().bytes(), of_chunks(&layered::chunks())] {
+        let stream = decode_valid(&bytes);
+        let picture = stream.picture().expect("whole");
+        for options in &views {
+            let mut expected = vec![0.0; picture.output_len(options).expect("it fits")];
+            picture.render_planes(options, &mut expected).expect("within limits");
+            let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+            decoder.set_options(options.clone());
+            let mut found = vec![f32::NAN; decoder.output_len().expect("it fits")];
+            decoder.decode_into_planes(&mut found).expect("it is sound");
+            assert!(found.iter().map(|v| v.to_bits()).eq(expected.iter().map(|v| v.to_bits())));
+        }
+    }
+}
+
+#[test]
+fn the_length_of_the_output_is_checked_against_picture_and_limits() {
+    let bytes = sample().bytes();
+    let mut limits = Limits::default();
+    (limits.max_width, limits.max_height, limits.max_pixels) = (100, 90, 5000);
+    let mut decoder = Decoder::new_with_limits(&bytes[..], limits).expect("it begins well");
+    let mut length = |options: RenderOptions| {
+        decoder.set_options(options);
+        decoder.output_len()
+    };
+    let sized = |width, height| RenderOptions::new().with_size(width, height);
+    let part = |x, y, width, height| Region { x, y, width, height };
+    assert_eq!(length(RenderOptions::new()).expect("24 x 17 x 3"), 1224);
+    assert_eq!(length(sized(100, 50)).expect("just enough"), 15_000);
+    assert_eq!(length(sized(10, 10).with_color(ColorModel::Rgba)).expect("it fits"), 400);
+    // Where only a region is written, its size counts.
+    let close_up = sized(1 << 20, 1 << 20).with_region(part(9, 9, 7, 2));
+    assert_eq!(length(close_up).expect("it fits"), 42);
+    for (options, expected) in [
+        (sized(101, 1), (LimitKind::Width, 101, 100)),
+        (sized(1, 91), (LimitKind::Height, 91, 90)),
+        (sized(72, 70), (LimitKind::Pixels, 5040, 5000)),
+    ] {
+        match length(options).expect_err("too large") {
+            DecodeError::Limit { kind, wanted, allowed } => {
+                assert_eq!((kind, wanted, allowed), expected);
+            }
+            error => panic!("{error}"),
+        }
+    }
+    let (region, width, height) = (part(20, 0, 5, 1), 24, 17);
+    for (options, expected) in [
+        (sized(0, 9), RequestError::OutputSize { width: 0, height: 9 }),
+        (RenderOptions::new().with_region(region), RequestError::Region { region, width, height }),
+        (
+            RenderOptions::new().with_color(ColorModel::Gray),
+            RequestError::ColorModel { from: ColorModel::Rgb, to: ColorModel::Gray },
+        ),
+    ] {
+        match length(options).expect_err("not of this picture") {
+            DecodeError::Request(error) => assert_eq!(error, expected),
+            error => panic!("{error}"),
+        }
+    }
+
+    // What is allocated by it fits, and nothing else does.
+    decoder.set_options(RenderOptions::new());
+    match decoder.decode_into(&mut [0; 1225]).expect_err("one too many") {
+        DecodeError::Request(error) => {
+            assert_eq!(error, RequestError::BufferLength { found: 1225, wanted: 1224 });
+        }
+        error => panic!("{error}"),
+    }
+    decoder.decode_into(&mut [0; 1224]).expect("a wrong length can be mended");
+}
+
+#[test]
+fn limits_hold_from_the_start_or_from_where_they_are_set() {
+    let bytes = sample().bytes();
+    let narrow = |width| {
+        let mut limits = Limits::default();
+        limits.max_width = width;
+        limits
+    };
+    let is_width = |result: Result<(), DecodeError>| {
+        let error = result.expect_err("24 pixels are too wide");
+        let DecodeError::Limit { kind: LimitKind::Width, wanted, allowed } = error else {
+            panic!("{error}");
+        };
+        assert_eq!((wanted, allowed), (24, 23));
+    };
+    let mut decoder = StreamDecoder::new().with_limits(narrow(23));
+    is_width(decoder.feed(&bytes).map(|_| ()));
+    assert!(decoder.header().is_none());
+    let mut decoder = StreamDecoder::new().with_limits(narrow(24));
+    decoder.feed(&bytes).expect("just wide enough");
+
+    // Set later, they refuse what has been declared already, and hold from there on.
+    is_width(decoder.set_limits(narrow(23)));
+    let picture = decoder.picture().expect("it stays");
+    is_width(picture.output_len(&RenderOptions::new()).map(|_| ()));
+    is_width(picture.render_u8(&RenderOptions::new(), &mut [0; 1224]));
+    decoder.set_limits(narrow(24)).expect("just wide enough");
+    let picture = decoder.picture().expect("it stays");
+    picture.render_u8(&RenderOptions::new(), &mut [0; 1224]).expect("just wide enough");
+
+    is_width(Decoder::new_with_limits(&bytes[..], narrow(23)).map(|_| ()));
+    let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+    is_width(decoder.set_limits(narrow(23)));
+    is_width(decoder.decode_into(&mut [0; 1224]));
 }
 
 /// What to do to a sound field, and what the error then says.

@@ -1,5 +1,5 @@
-//! The entropy coding: the crate and a coder that is written from the specification alone find the same in
-//! whatever bytes.
+//! The entropy coding: the crate and a coder that is written from the specification alone find the same
+//! in whatever bytes.
 
 mod common;
 
@@ -26,7 +26,7 @@ fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
     let grid = Grid::new(header.sides());
     let class = (random.next() % 8) as u32;
     let long = if random.next().is_multiple_of(8) { 15 } else { 5 };
-    let place = grid.roots.map(|roots| {
+    let center = grid.roots.map(|roots| {
         let side = roots * grid.root * 128;
         let start = side / 3;
         start + (random.next() % u64::from((side - start).min(spread))) as u32
@@ -37,7 +37,7 @@ fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
         size: number(random, long),
         ratio: number(random, long),
         slant: number(random, long),
-        place,
+        center,
     }
 }
 

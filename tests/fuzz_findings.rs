@@ -11,7 +11,7 @@ use image_gip::Decoder;
 #[test]
 fn what_is_wrong_with_the_first_layer_is_told_first() {
     let header = Ghdr { color: RGB, ..Ghdr::default() };
-    let code = Code { axes: vec![1, 2, 3], place: [2000, 3000], ..Code::default() };
+    let code = Code { axes: vec![1, 2, 3], center: [2000, 3000], ..Code::default() };
     let file = File::of_entropy_coded(header, vec![0.5; 7], vec![vec![code; 3]; 2]);
     let mut chunks = file.chunks();
     chunks[2] = chunk(b"GAUS", &chunks[2][8..chunks[2].len() - 6]);

@@ -1,6 +1,5 @@
 //! The encoder's memory, counted as it is allocated. One test only: what others allocate at the
 //! same time would count, too.
-#![cfg(feature = "encode")]
 
 mod common;
 

@@ -5,42 +5,11 @@ mod common;
 
 use std::io::Read;
 
-use common::entropy::{Code, Grid};
-use common::{File, Ghdr, RGB, Random, bits, chunk, decode, decode_valid, of_chunks};
+use common::layered::{
+    BEFORE, IN_A_LAYER, LAYERS, SIZE, chunks, damaged, decoded, regions, showing,
+};
+use common::{Random, bits, chunk, decode, decode_valid, of_chunks};
 use image_gip::{DecodeError, Decoder, Region, RenderOptions};
-
-const SIZE: (u32, u32) = (300, 200);
-const LAYERS: usize = 24;
-const IN_A_LAYER: usize = 20;
-/// Chunks before the first layer: header, steps, bounds.
-const BEFORE: usize = 3;
-
-/// A picture of layers that each have a place of their own; some Gaussians lie beside it.
-fn sample() -> File {
-    let header = Ghdr { color: RGB, width: SIZE.0, height: SIZE.1, ..Ghdr::default() };
-    let grid = Grid::new(header.sides());
-    let mut random = Random(5);
-    let layer = |number: usize| {
-        let [x, y] = [(number % 6) as f32 * 50.0, (number / 6) as f32 * 50.0];
-        let mut code = |_| {
-            let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
-            let axes = vec![within(20), within(9), within(9)];
-            let [size, ratio, slant] = [within(6), within(3), within(3)];
-            let place = grid.units([x + random.range(0.0, 50.0), y + random.range(0.0, 50.0)]);
-            Code { class: 2, axes, size, ratio, slant, place }
-        };
-        (0..IN_A_LAYER).map(&mut code).collect()
-    };
-    let layers = (0..LAYERS).map(layer).collect();
-    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
-}
-
-/// The chunks of the sample, with bounds.
-fn chunks() -> Vec<Vec<u8>> {
-    let file = sample();
-    let bounds = file.bounds();
-    file.with(b"bNDS", &bounds).chunks()
-}
 
 fn rendered(file: &[u8], options: &RenderOptions) -> Result<Vec<u8>, DecodeError> {
     let mut decoder = Decoder::new(file)?;
@@ -73,11 +42,67 @@ fn a_region_is_that_part_of_the_picture() {
 }
 
 #[test]
-fn layers_that_do_not_show_are_not_decoded() {
-    let mut chunks = chunks();
-    let first = &mut chunks[BEFORE];
-    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
-    let bytes = of_chunks(&chunks);
+fn the_layers_that_show_are_decoded_and_no_others() {
+    for (size, region, count) in regions() {
+        let options = RenderOptions::new().with_size(size.0, size.1).with_region(region);
+        let expected = showing(size, region);
+        assert_eq!(expected.len(), count, "{size:?}, {region:?}");
+        let found = decoded(|file| rendered(file, &options).is_ok());
+        assert_eq!(found, expected, "{size:?}, {region:?}");
+    }
+}
+
+#[test]
+fn the_whole_picture_takes_all_layers() {
+    let all: Vec<usize> = (0..LAYERS).collect();
+    for (width, height) in [SIZE, (30, 20), (600, 400)] {
+        let options = RenderOptions::new().with_size(width, height);
+        assert_eq!(decoded(|file| rendered(file, &options).is_ok()), all, "{width}x{height}");
+    }
+    assert_eq!(decoded(|file| image_gip::decode(file).is_ok()), all);
+}
+
+#[cfg(feature = "image")]
+#[test]
+fn the_decoder_for_image_decodes_the_layers_that_show() {
+    use image::{ImageDecoder, ImageDecoderRect};
+    use image_gip::GipDecoder;
+
+    for (size, region, count) in regions() {
+        let row = 3 * region.width as usize;
+        // Rows that follow each other, and rows with a gap.
+        for row_pitch in [row, row + 5] {
+            let found = decoded(|file| {
+                let mut decoder = GipDecoder::new(file).expect("it begins well");
+                decoder.set_size(size.0, size.1).expect("within limits");
+                let Region { x, y, width, height } = region;
+                let mut samples = vec![0; row_pitch * height as usize];
+                decoder.read_rect(x, y, width, height, &mut samples, row_pitch).is_ok()
+            });
+            assert_eq!(found, showing(size, region), "{size:?}, {region:?}");
+            assert_eq!(found.len(), count, "{size:?}, {region:?}");
+        }
+    }
+    // One rectangle after the other takes the layers of each.
+    let bytes = damaged(&showing(SIZE, Region { x: 280, y: 180, width: 20, height: 20 }));
+    let mut decoder = GipDecoder::new(&bytes[..]).expect("it begins well");
+    let mut samples = [0; 3 * 20 * 20];
+    for (x, y) in [(0, 0), (140, 90), (0, 180)] {
+        decoder.read_rect(x, y, 20, 20, &mut samples, 60).expect("it is far away");
+    }
+    decoder.read_rect(280, 180, 20, 20, &mut samples, 60).expect_err("it shows");
+
+    let whole = |file: &[u8]| {
+        let decoder = GipDecoder::new(file).expect("it begins well");
+        let mut samples = vec![0; decoder.total_bytes() as usize];
+        decoder.read_image(&mut samples).is_ok()
+    };
+    assert_eq!(decoded(whole), (0..LAYERS).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_is_wrong_with_a_layer_is_told_where_it_shows() {
+    let bytes = damaged(&[0]);
     let part = |x, y| RenderOptions::new().with_region(Region { x, y, width: 20, height: 20 });
     rendered(&bytes, &part(280, 180)).expect("what is not sound is far away");
     let (expected, error) = decode(&bytes);
@@ -119,10 +144,7 @@ fn after_a_region_there_is_still_all_else() {
 
 #[test]
 fn the_picture_after_a_region_says_what_the_region_left_out() {
-    let mut chunks = chunks();
-    let first = &mut chunks[BEFORE];
-    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
-    let bytes = of_chunks(&chunks);
+    let bytes = damaged(&[0]);
     let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
     let far = Region { x: 280, y: 180, width: 20, height: 20 };
     decoder.set_options(RenderOptions::new().with_region(far));

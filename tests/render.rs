@@ -8,7 +8,7 @@ use common::{
     CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Ghdr, QUARTIC, RGB, RGBA,
     ROTATION_SCALE, Random, cases, decode_valid,
 };
-use image_gip::{ColorModel, DecodeError, Region, RenderOptions, Threads};
+use image_gip::{ColorModel, DecodeError, Region, RenderOptions, RequestError, Threads};
 use proptest::prelude::*;
 
 /// A file of floats with these rows of components.
@@ -470,11 +470,17 @@ fn samples_round_to_the_nearest_and_clamp() {
         picture.render_u8(&RenderOptions::new(), &mut eight).expect("a sound request");
         picture.render_u16(&RenderOptions::new(), &mut sixteen).expect("a sound request");
         let nearest = |full: f64| (f64::from(value).clamp(0.0, 1.0) * full).round();
-        assert!(eight.iter().all(|&s| f64::from(s) == nearest(255.0)), "{value} gives {eight:?}");
-        assert!(
-            sixteen.iter().all(|&s| (f64::from(s) - nearest(65535.0)).abs() <= 1.0),
-            "{value} gives {sixteen:?}"
-        );
+        assert_eq!(eight.map(f64::from), [nearest(255.0); 4], "{value}");
+        assert_eq!(sixteen.map(f64::from), [nearest(65535.0); 4], "{value}");
+    }
+}
+
+/// What was wrong with a request.
+#[track_caller]
+fn refused(result: Result<(), DecodeError>) -> RequestError {
+    match result.expect_err("refused") {
+        DecodeError::Request(error) => error,
+        error => panic!("{error}"),
     }
 }
 
@@ -494,7 +500,8 @@ fn a_color_model_widens_but_never_narrows() {
             let result = picture.render_u8(&options, &mut out);
             let is_gray = stored.channels() <= 2;
             if stored.has_alpha() && !output.has_alpha() || !is_gray && output.channels() < 3 {
-                assert!(matches!(result, Err(DecodeError::Request(_))), "{stored:?} to {output:?}");
+                let expected = RequestError::ColorModel { from: stored, to: output };
+                assert_eq!(refused(result), expected);
                 assert!(out.iter().all(|&sample| sample == 7), "the buffer was touched");
                 continue;
             }
@@ -529,24 +536,34 @@ fn requests_that_make_no_sense_are_refused() {
     let picture = decoder.picture().expect("the header has arrived");
     let region = |x, y, width, height| Region { x, y, width, height };
     let whole = RenderOptions::new;
-    for (options, length) in [
-        (whole(), 199),
-        (whole(), 201),
-        (whole(), 0),
-        (whole().with_size(0, 10), 0),
-        (whole().with_size(10, 0), 0),
-        (whole().with_size((1 << 23) + 1, 1), (1 << 23) + 1),
-        (whole().with_size(1 << 31, 1 << 31).with_region(region(0, 0, 1, 1)), 1),
-        (whole().with_region(region(0, 0, 0, 1)), 0),
-        (whole().with_region(region(0, 0, 21, 1)), 21),
-        (whole().with_region(region(20, 0, 1, 1)), 1),
-        (whole().with_region(region(0, 10, 1, 1)), 1),
-        (whole().with_region(region(u32::MAX, 0, 2, 1)), 2),
-        (whole().with_region(region(1, 0, u32::MAX, 1)), 1),
+    let length = |found| RequestError::BufferLength { found, wanted: 200 };
+    let outside = |region| RequestError::Region { region, width: 20, height: 10 };
+    let sides = |width, height| RequestError::OutputSize { width, height };
+    let mut cases = vec![
+        (whole(), 199, length(199)),
+        (whole(), 201, length(201)),
+        (whole(), 0, length(0)),
+        (whole().with_size(1 << 31, 1 << 31).with_region(region(0, 0, 1, 1)), 1, {
+            sides(1 << 31, 1 << 31)
+        }),
+    ];
+    for (width, height) in [(0, 10), (10, 0), ((1 << 23) + 1, 1), (1, u32::MAX)] {
+        cases.push((whole().with_size(width, height), 10, sides(width, height)));
+    }
+    for region in [
+        region(0, 0, 0, 1),
+        region(0, 0, 1, 0),
+        region(0, 0, 21, 1),
+        region(20, 0, 1, 1),
+        region(0, 10, 1, 1),
+        region(u32::MAX, 0, 2, 1),
+        region(1, 0, u32::MAX, 1),
     ] {
+        cases.push((whole().with_region(region), 1, outside(region)));
+    }
+    for (options, length, expected) in cases {
         let mut out = vec![7; length];
-        let error = picture.render_u8(&options, &mut out).expect_err("refused");
-        assert!(matches!(error, DecodeError::Request(_)), "{options:?}: {error}");
+        assert_eq!(refused(picture.render_u8(&options, &mut out)), expected, "{options:?}");
         assert!(out.iter().all(|&sample| sample == 7), "{options:?}: the buffer was touched");
     }
     // The largest sides are fine.

@@ -14,7 +14,7 @@ const SPECIFICATION: &str = include_str!("../spec/gip.md");
 struct Example(&'static str);
 
 /// Of the packed coding.
-fn fixed() -> Example {
+fn packed() -> Example {
     let (_, text) = SPECIFICATION.split_once("\n### 14.1 ").expect("section 14.1");
     Example(text.split_once("\n### ").expect("another section").0)
 }
@@ -79,44 +79,45 @@ fn render(picture: &Picture<'_>, options: &RenderOptions) -> Vec<u8> {
 }
 
 #[test]
-fn the_hex_decodes_to_the_values_and_pixels_that_are_printed() {
-    let decoder = decode_valid(&fixed().file());
+fn the_hex_of_the_packed_coding_decodes_to_what_is_printed() {
+    let decoder = decode_valid(&packed().file());
     let picture = decoder.picture().expect("a complete file");
     assert_eq!((picture.header().width, picture.header().height), (6, 4));
     assert_eq!(decoder.metadata().texts[0].text, "Three blobs");
 
-    fixed().check_values(decoder.gaussians());
+    packed().check_values(decoder.gaussians());
     // The codes of the first layer give the first row.
-    let codes = fixed().table("| bits | component |");
-    let values = &fixed().table("| x | y |")[0];
+    let codes = packed().table("| bits | component |");
+    assert_eq!(codes.len(), 8);
+    let values = &packed().table("| x | y |")[0];
     assert!(codes.iter().map(|row| row[3]).eq(values.iter().copied()));
 
-    let printed = fixed().blocks("pixels");
+    let printed = packed().blocks("pixels");
     assert_eq!(render(&picture, &RenderOptions::new()), pixels(printed[0]));
     assert_eq!(render(&picture, &RenderOptions::new().with_prefix(1)), pixels(printed[1]));
 }
 
 #[test]
 fn the_integer_holds_the_codes() {
-    let (_, rest) = fixed().0.split_once("little-endian integer, are 0x").expect("the integer");
+    let (_, rest) = packed().0.split_once("little-endian integer, are 0x").expect("the integer");
     let integer: String = rest.chars().take_while(char::is_ascii_hexdigit).collect();
     let integer = u128::from_str_radix(&integer, 16).expect("hexadecimal");
-    for row in fixed().table("| bits | component |") {
+    for row in packed().table("| bits | component |") {
         let (first, last) = row[0].split_once(" to ").expect("a range");
         let [first, last, code] =
             [first, last, row[2]].map(|n| n.parse::<u32>().expect("a number"));
         assert_eq!(integer >> first & ((1 << (last - first + 1)) - 1), code.into(), "{row:?}");
     }
-    let start = fixed().file().len() - 12 - (12 + 22) - 4 - 9;
+    let start = packed().file().len() - 12 - (12 + 22) - 4 - 9;
     let bytes = integer.to_le_bytes();
-    assert_eq!(fixed().file()[start..start + 9], bytes[..9]);
+    assert_eq!(packed().file()[start..start + 9], bytes[..9]);
 }
 
 #[test]
 fn the_trace_of_one_pixel_is_what_prefixes_give() {
-    let decoder = decode_valid(&fixed().file());
+    let decoder = decode_valid(&packed().file());
     let picture = decoder.picture().expect("a complete file");
-    let trace = fixed().table("| Gaussian | q |");
+    let trace = packed().table("| Gaussian | q |");
     assert_eq!(trace.len(), 3);
     for (index, (row, gaussian)) in trace.iter().zip(decoder.gaussians()).enumerate() {
         let mut planes = [0.0; 6 * 4 * 3];
@@ -135,7 +136,7 @@ fn the_trace_of_one_pixel_is_what_prefixes_give() {
 }
 
 #[test]
-fn the_hex_of_coding_1_decodes_to_the_values_and_pixels_that_are_printed() {
+fn the_hex_of_the_entropy_coding_decodes_to_what_is_printed() {
     let decoder = decode_valid(&entropy_coded().file());
     entropy_coded().check_values(decoder.gaussians());
     let picture = decoder.picture().expect("a complete file");
@@ -146,7 +147,7 @@ fn the_hex_of_coding_1_decodes_to_the_values_and_pixels_that_are_printed() {
 }
 
 #[test]
-fn the_symbols_of_coding_1_are_those_in_the_bytes() {
+fn the_symbols_of_the_entropy_coding_are_those_in_the_bytes() {
     let file = entropy_coded().file();
     let (quantizers, layer) = (8 + 48 + 8, 8 + 48 + 40 + 8);
     let steps = file[quantizers..quantizers + 28].as_chunks().0;

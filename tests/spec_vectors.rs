@@ -226,7 +226,7 @@ fn valid_vectors() -> Vec<Vector> {
     vec![
         Vector::valid(
             "gray8",
-            "gray, 8 bits, quartic kernel, Cholesky parameterization, packed; other sizes, regions, models",
+            "packed coding: gray, 8 bits, quartic kernel, Cholesky parameterization; other sizes, regions and colour models",
             random_file(60, header(GRAY, 24, 16), 20),
         )
         .also(&[
@@ -247,12 +247,12 @@ fn valid_vectors() -> Vec<Vector> {
             random_file(61, header(GRAY_ALPHA, 17, 9), 15),
         )
         .also(&[Rendering::Color(ColorModel::Rgba)]),
-        Vector::valid("rgb8", "red, green, blue", random_file(62, header(RGB, 40, 24), 30)).also(&[
+        Vector::valid("rgb8", "RGB, 8 bits", random_file(62, header(RGB, 40, 24), 30)).also(&[
             Rendering::Size(20, 12),
             Rendering::Size(13, 50),
             Rendering::Color(ColorModel::Rgba),
         ]),
-        Vector::valid("rgba8", "with straight alpha", random_file(63, header(RGBA, 19, 23), 20)),
+        Vector::valid("rgba8", "RGB and straight alpha", random_file(63, header(RGBA, 19, 23), 20)),
         Vector::valid(
             "gray16",
             "gray, 16 bits",
@@ -261,13 +261,13 @@ fn valid_vectors() -> Vec<Vector> {
         .also(&[Rendering::Size(9, 6), Rendering::Color(ColorModel::Rgba)]),
         Vector::valid(
             "rgba16",
-            "four channels, 16 bits",
+            "RGBA, 16 bits",
             random_file(65, Ghdr { depth: 16, ..header(RGBA, 16, 16) }, 20),
         ),
         Vector::valid(
             "paper",
             "the paper's choices: exp(-q/2) cut off at weight 1/255, covariance parameterization with variances \
-             in log, 12/12 + 10/10/10 + 6/6/6 bits; codes that are no covariance are not drawn",
+             in log, 12/12 + 10/10/10 + 6/6/6 bits; Gaussians whose codes give no covariance matrix are not drawn",
             {
                 let codes = codes(66, &covariance_entries, 40);
                 File::new(paper, covariance_entries.clone(), vec![codes])
@@ -276,7 +276,7 @@ fn valid_vectors() -> Vec<Vector> {
         .also(&[Rendering::Size(20, 12)]),
         Vector::valid(
             "parameterization-covariance",
-            "covariance parameterization in floats, with an indefinite, a singular and a negative one",
+            "covariance parameterization in floats; four of the six matrices are not positive definite",
             floats(
                 Ghdr { parameterization: COVARIANCE, ..gray },
                 &[
@@ -291,7 +291,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "parameterization-rotation-scale",
-            "rotation and scale in floats: all quadrants, many turns, an angle over 1024, negative \
+            "rotation and scale in floats: angles in all quadrants, of many turns, and over 1024; negative \
              scales",
             floats(
                 Ghdr { parameterization: ROTATION_SCALE, ..gray },
@@ -311,7 +311,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "kernel-cutoff-2",
-            "exp(-q/2) with a step at q = 2; pixel centres that lie exactly on it are drawn",
+            "exponential kernel with cut-off 2, which leaves an edge; pixel centres exactly on it are drawn",
             floats(
                 Ghdr { kernel: EXPONENTIAL, cutoff: 2.0, ..gray },
                 &[[8.5, 8.5, 1.0, 0.0, 1.0, 0.7], [16.0, 7.0, 4.0, 1.0, 3.0, 0.4]],
@@ -319,7 +319,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "kernel-cutoff-64",
-            "exp(-q/2) with the largest cut-off",
+            "exponential kernel with the largest cut-off",
             floats(
                 Ghdr { kernel: EXPONENTIAL, cutoff: 64.0, depth: 16, ..gray },
                 &[[8.5, 8.5, 1.0, 0.0, 1.0, 0.7], [16.0, 7.0, 4.0, 1.0, 3.0, 0.4]],
@@ -333,11 +333,11 @@ fn valid_vectors() -> Vec<Vector> {
             let codes = codes(68, &even, 7);
             File::new(header(RGBA, 24, 16), even.clone(), vec![codes])
         }),
-        Vector::valid("logarithms", "a logarithmic quantizer on every component", {
+        Vector::valid("logarithms", "a logarithmic quantizer for every component", {
             let codes = codes(69, &logs, 12);
             File::new(gray, logs.clone(), vec![codes])
         }),
-        Vector::valid("layers", "four layers; what a prefix shows", layered).also(&[
+        Vector::valid("layers", "four layers; pictures of the first Gaussians only", layered).also(&[
             Rendering::Prefix(5),
             Rendering::Prefix(6),
             Rendering::Prefix(0),
@@ -346,13 +346,13 @@ fn valid_vectors() -> Vec<Vector> {
         Vector::valid("metadata", "an ICC profile, Exif, XMP and three texts", described),
         Vector::valid_chunks(
             "ancillary",
-            "unknown ancillary chunks in every place, and a known one too late: all skipped",
+            "unknown ancillary chunks wherever they may stand, and a known one after a layer: all are skipped",
             ancillary.0,
             &ancillary.1,
         ),
         Vector::valid(
             "no-gaussians",
-            "a base colour and nothing else",
+            "no Gaussians: the base colour alone",
             File::of_floats(
                 Ghdr { color: RGBA, base: [0, 0x7FFF, 0x8000, 0xFFFF], ..Ghdr::default() },
                 &[],
@@ -372,7 +372,7 @@ fn valid_vectors() -> Vec<Vector> {
         .also(&[Rendering::Size(16, 16)]),
         Vector::valid(
             "far-outside",
-            "centres outside the picture, near and far; some reach in",
+            "Gaussians centred outside the picture, near and far, some of which reach into it",
             floats(
                 gray,
                 &[
@@ -386,7 +386,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "needles",
-            "long and thin at several slants, up to the bounds",
+            "long, thin Gaussians at several slants, up to the bounds of section 8.5",
             floats(
                 gray,
                 &[
@@ -402,7 +402,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "huge",
-            "a hundred and a million times wider than the picture",
+            "Gaussians a hundred and a million times as wide as the picture",
             floats(
                 gray,
                 &[
@@ -414,7 +414,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "dots",
-            "0.01 pixels wide and less: seen only where a pixel centre is hit",
+            "Gaussians 0.01 pixels wide and less, which show only where they hit a pixel centre",
             floats(
                 gray,
                 &[
@@ -429,7 +429,7 @@ fn valid_vectors() -> Vec<Vector> {
         .also(&[Rendering::Size(6, 4), Rendering::Size(96, 64)]),
         Vector::valid(
             "not-drawn",
-            "one sound Gaussian and fifteen that are out of bounds",
+            "one Gaussian that is drawn, and fifteen that are not: out of bounds",
             {
                 let sound = [8.0, 8.0, 3.0, 1.0, 2.0, 0.7];
                 let mut rows = vec![sound];
@@ -459,7 +459,7 @@ fn valid_vectors() -> Vec<Vector> {
         ),
         Vector::valid(
             "order",
-            "amplitudes of +-100 and more that cancel: the order of summation shows",
+            "amplitudes of 100 and more that cancel, so that the order of summation shows",
             floats(
                 Ghdr { depth: 16, ..gray },
                 &[
@@ -551,7 +551,7 @@ fn invalid_vectors() -> Vec<Vector> {
     let scale = |scale: f32| with_entry(Entry::linear(8, scale, 0.5));
     vec![
         Vector::invalid("xempty", "no byte at all", Vec::new()),
-        Vector::invalid("xsignature", "line feeds converted by a transfer in text mode", {
+        Vector::invalid("xsignature", "line endings that a transfer in text mode has converted", {
             let mut bytes = bytes.clone();
             bytes.remove(4);
             bytes
@@ -562,10 +562,10 @@ fn invalid_vectors() -> Vec<Vector> {
             "ends within the second layer: the Gaussians that arrived are shown",
             bytes[..8 + 48 + 84 + 40 + 8 + 4 + 24 + 5].to_vec(),
         ),
-        Vector::invalid("xtruncated-end", "lacks GEND", removed(5)),
+        Vector::invalid("xtruncated-end", "no GEND", removed(5)),
         Vector::invalid(
             "xcrc-header",
-            "wrong CRC",
+            "a wrong CRC of the header",
             changed(0, &|c| {
                 let at = last(c);
                 c[at] ^= 1;
@@ -576,13 +576,17 @@ fn invalid_vectors() -> Vec<Vector> {
             "a flipped bit in the second layer",
             changed(3, &|c| c[20] ^= 4),
         ),
-        Vector::invalid("xcrc-end", "wrong CRC of the last chunk: all Gaussians are kept", {
+        Vector::invalid("xcrc-end", "a wrong CRC of the last chunk: all Gaussians are kept", {
             changed(5, &|c| {
                 let at = last(c);
                 c[at] ^= 1;
             })
         }),
-        Vector::invalid("xcritical", "unknown critical chunk", inserted(2, chunk(b"ABCD", b"?"))),
+        Vector::invalid(
+            "xcritical",
+            "an unknown critical chunk",
+            inserted(2, chunk(b"ABCD", b"?")),
+        ),
         Vector::invalid(
             "xtype",
             "a type that is not four letters",
@@ -609,26 +613,30 @@ fn invalid_vectors() -> Vec<Vector> {
         Vector::invalid("xcoding", "an unknown coding", with_header(&|h| h.coding = 2)),
         Vector::invalid("xcolor", "an unknown colour model", with_header(&|h| h.color = 4)),
         Vector::invalid("xdepth", "a sample depth of 12", with_header(&|h| h.depth = 12)),
-        Vector::invalid("xwidth-zero", "no width", with_header(&|h| h.width = 0)),
-        Vector::invalid("xheight-over", "over 2^20 rows", with_header(&|h| h.height = 1_048_577)),
+        Vector::invalid("xwidth-zero", "a width of 0", with_header(&|h| h.width = 0)),
+        Vector::invalid(
+            "xheight-over",
+            "a height over 2^20",
+            with_header(&|h| h.height = 1_048_577),
+        ),
         Vector::invalid(
             "xcount-fewer",
-            "a Gaussian less than declared",
+            "one Gaussian fewer than declared",
             with_header(&|h| h.gaussians = 5),
         ),
         Vector::invalid(
             "xcount-more",
-            "a Gaussian more than declared",
+            "one Gaussian more than declared",
             with_header(&|h| h.gaussians = 3),
         ),
         Vector::invalid(
             "xlayers-fewer",
-            "a layer less than declared",
+            "one layer fewer than declared",
             with_header(&|h| h.layers = 4),
         ),
         Vector::invalid(
             "xlayers-more",
-            "a layer more than declared",
+            "one layer more than declared",
             with_header(&|h| h.layers = 2),
         ),
         Vector::invalid(
@@ -653,7 +661,7 @@ fn invalid_vectors() -> Vec<Vector> {
         ),
         Vector::invalid(
             "xcutoff-quartic",
-            "a quartic kernel that ends elsewhere",
+            "quartic kernel with a cut-off other than 4",
             with_header(&|h| {
                 (h.kernel, h.cutoff) = (QUARTIC, 9.0);
             }),
@@ -677,7 +685,7 @@ fn invalid_vectors() -> Vec<Vector> {
         ),
         Vector::invalid(
             "xbase",
-            "base colour in a channel that gray lacks",
+            "a base colour in a channel that gray does not have",
             with_header(&|h| {
                 h.base[1] = 1;
             }),
@@ -705,7 +713,7 @@ fn invalid_vectors() -> Vec<Vector> {
         ),
         Vector::invalid(
             "xlayer-empty",
-            "a layer of no Gaussians",
+            "a layer without Gaussians",
             replaced(3, chunk(b"GAUS", &[0; 4])),
         ),
         Vector::invalid("xpadding", "a padding bit that is not zero", padded),

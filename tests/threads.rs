@@ -24,8 +24,8 @@ fn sample() -> File {
         let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
         let axes = vec![within(9), within(5), within(3)];
         let [size, ratio, slant] = [within(4), within(2), within(2)];
-        let place = grid.units([random.range(0.0, 200.0), random.range(0.0, 150.0)]);
-        Code { class: 2, axes, size, ratio, slant, place }
+        let center = grid.units([random.range(0.0, 200.0), random.range(0.0, 150.0)]);
+        Code { class: 2, axes, size, ratio, slant, center }
     };
     let layers = LAYERS.map(|count| (0..count).map(&mut code).collect()).into();
     File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
@@ -39,8 +39,8 @@ fn damaged(layer: usize) -> Vec<u8> {
     of_chunks(&chunks)
 }
 
-/// What the adapter makes of a file: its Gaussians, and how it ends.
-fn adapted(bytes: &[u8]) -> (Vec<Gaussian>, Result<(), DecodeError>) {
+/// What the decoder of a reader makes of a file: its Gaussians, and how it ends.
+fn read(bytes: &[u8]) -> (Vec<Gaussian>, Result<(), DecodeError>) {
     let mut decoder = Decoder::new(bytes).expect("it begins well");
     let result = decoder.read_to_end();
     (decoder.picture().expect("what is left is sound").gaussians().to_vec(), result)
@@ -51,7 +51,7 @@ fn layers_side_by_side_are_those_one_after_the_other() {
     let bytes = sample().bytes();
     let expected = decode_valid(&bytes);
     for threads in THREADS {
-        let (gaussians, result) = on_threads(threads, || adapted(&bytes));
+        let (gaussians, result) = on_threads(threads, || read(&bytes));
         result.expect("a sound file");
         assert_eq!(bits(&gaussians), bits(expected.gaussians()), "{threads} threads");
     }
@@ -65,7 +65,7 @@ fn a_damaged_layer_keeps_those_before_it() {
         let error = error.expect_err("a damaged layer").to_string();
         assert_eq!(expected.gaussians().len(), LAYERS[..layer].iter().sum::<usize>());
         for threads in THREADS {
-            let (gaussians, result) = on_threads(threads, || adapted(&bytes));
+            let (gaussians, result) = on_threads(threads, || read(&bytes));
             assert_eq!(bits(&gaussians), bits(expected.gaussians()), "{layer}, {threads} threads");
             assert_eq!(result.expect_err("a damaged layer").to_string(), error);
         }
@@ -76,7 +76,7 @@ fn a_damaged_layer_keeps_those_before_it() {
 fn what_was_wrong_first_is_told() {
     let mut bytes = damaged(1);
     bytes.truncate(bytes.len() - 5);
-    let (gaussians, result) = on_threads(2, || adapted(&bytes));
+    let (gaussians, result) = on_threads(2, || read(&bytes));
     assert_eq!(gaussians.len(), LAYERS[0]);
     assert!(!result.expect_err("a damaged layer").is_unexpected_end());
 }

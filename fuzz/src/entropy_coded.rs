@@ -6,7 +6,7 @@ use image_gip::{DecodeError, StreamDecoder};
 use crate::entropy::{self, Code, Grid};
 use crate::rans;
 
-/// What an entropy-coded file has in place of quantizers and fixed codes.
+/// What an entropy-coded file has instead of quantizers and packed codes.
 #[derive(Arbitrary, Debug)]
 pub struct EntropyCoded {
     steps: [Step; 8],
@@ -35,7 +35,7 @@ struct Gaussian {
     ratio: Number,
     slant: Number,
     /// In 2^-16 of the sides of the grid.
-    place: [u16; 2],
+    center: [u16; 2],
 }
 
 /// Small or large.
@@ -114,9 +114,9 @@ impl Step {
 impl Gaussian {
     fn code(&self, sides: [u32; 2], channels: usize) -> Code {
         let grid = Grid::new(sides);
-        let place = |axis: usize| {
+        let center = |axis: usize| {
             let side = u64::from(grid.roots[axis] * grid.root * 128);
-            (side * u64::from(self.place[axis]) >> 16) as u32
+            (side * u64::from(self.center[axis]) >> 16) as u32
         };
         Code {
             class: u32::from(self.class % 8),
@@ -124,7 +124,7 @@ impl Gaussian {
             size: self.size.value(),
             ratio: self.ratio.value(),
             slant: self.slant.value(),
-            place: [place(0), place(1)],
+            center: [center(0), center(1)],
         }
     }
 }

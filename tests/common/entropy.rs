@@ -1,5 +1,5 @@
-//! Layers of the entropy coding (sections 7.4 and 7.5), written from `spec/gip.md` alone: a writer that turns
-//! codes into symbols and bits, and a reader that gives the codes and their values.
+//! Layers of the entropy coding (sections 7.4 and 7.5), written from `spec/gip.md` alone: a writer
+//! that turns codes into symbols and plain bits, and a reader that gives the codes and their values.
 
 use super::exp::exp;
 use super::rans::{Decoder, Encoder, Flaw, Op};
@@ -10,15 +10,16 @@ pub(crate) type Steps = [f32];
 /// One Gaussian as it is coded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Code {
+    /// The precision class.
     pub(crate) class: u32,
-    /// As many as channels.
+    /// The colour axes, as many as channels.
     pub(crate) axes: Vec<i32>,
-    /// How much the size is above what its cell lets expect.
+    /// By how much the size exceeds the one that is expected in its cell.
     pub(crate) size: i32,
     pub(crate) ratio: i32,
     pub(crate) slant: i32,
-    /// The centre in the units of the grid.
-    pub(crate) place: [u32; 2],
+    /// In the units of the grid.
+    pub(crate) center: [u32; 2],
 }
 
 /// The grid of section 7.4.
@@ -73,10 +74,10 @@ impl Cell {
         [first, second]
     }
 
-    fn holds(&self, place: [u32; 2]) -> bool {
+    fn holds(&self, center: [u32; 2]) -> bool {
         let inside = |axis: usize| {
             let start = self.corner[axis] * 128;
-            (start..start + self.sides[axis] * 128).contains(&place[axis])
+            (start..start + self.sides[axis] * 128).contains(&center[axis])
         };
         inside(0) && inside(1)
     }
@@ -86,14 +87,14 @@ impl Cell {
     }
 }
 
-/// The numbers of a share among the Gaussians of a cell: the first and the last.
-fn share(symbol: u32, count: u32) -> [u64; 2] {
-    let edge = |s: u32| (u64::from(s) * (u64::from(count) + 1)).div_ceil(16);
-    [edge(symbol), edge(symbol + 1) - 1]
+/// The numbers of Gaussians that a symbol stands for, from low to high, of as many in a cell.
+fn count_range(symbol: u32, count: u32) -> [u64; 2] {
+    let low = |s: u32| (u64::from(s) * (u64::from(count) + 1)).div_ceil(16);
+    [low(symbol), low(symbol + 1) - 1]
 }
 
-/// How many bits tell the numbers of a share apart.
-fn share_bits([low, high]: [u64; 2]) -> u32 {
+/// How many plain bits tell these numbers apart.
+fn range_bits([low, high]: [u64; 2]) -> u32 {
     (high - low + 1).next_power_of_two().ilog2()
 }
 
@@ -124,7 +125,7 @@ fn expected_size(steps: &Steps, class: u32, level: u32) -> i32 {
     ((0.1 + 0.19 * level as f32) / (steps[1] * fine(class))) as i32
 }
 
-/// Section 7.5, without what depends on the place.
+/// Section 7.5, without what depends on the position.
 struct Shape {
     size: f32,
     cholesky: [f32; 3],
@@ -142,12 +143,13 @@ impl Shape {
         Self { size: s, cholesky: [l11, l21, l22] }
     }
 
-    /// How many bits a place in this cell has along each axis.
-    fn place_bits(&self, steps: &Steps, class: u32, cell: &Cell) -> [u32; 2] {
+    /// How many plain bits the position in this cell has along each axis.
+    fn position_bits(&self, steps: &Steps, class: u32, cell: &Cell) -> [u32; 2] {
         [0, 1].map(|axis| {
             let l = self.cholesky[2 * axis];
-            let side = ((steps[0] * fine(class)) * l) * core::f32::consts::SQRT_2;
-            let exponent = (side.to_bits() >> 23) as i32 - 127;
+            let d = ((steps[0] * fine(class)) * l) * core::f32::consts::SQRT_2;
+            let exponent = (d.to_bits() >> 23) as i32 - 127;
+            // The position interval is 2^-f pixels.
             let f = (-exponent).min(6);
             (f + cell.sides[axis].ilog2() as i32).max(0) as u32
         })
@@ -159,7 +161,7 @@ fn part(cell: &Cell, axis: usize, bits: u32) -> u32 {
     (cell.sides[axis] * 128) >> bits
 }
 
-/// The symbols and bits of a layer; brings `layer` into the order of the tree and its places to
+/// The symbols and plain bits of a layer; brings `layer` into the order of the tree, and its centres to
 /// where a decoder finds them.
 pub(crate) fn write(sides: [u32; 2], steps: &Steps, layer: &mut Vec<Code>) -> Vec<Op> {
     let grid = Grid::new(sides);
@@ -181,7 +183,7 @@ fn write_cell(
     if cell.is_split(grid, count) {
         let parts = cell.parts(grid);
         let (first, second): (Vec<Code>, Vec<Code>) =
-            codes.into_iter().partition(|code| parts[0].holds(code.place));
+            codes.into_iter().partition(|code| parts[0].holds(code.center));
         write_count(encoder, count, first.len() as u32);
         for (part, codes) in parts.into_iter().zip([first, second]) {
             if !codes.is_empty() {
@@ -191,7 +193,7 @@ fn write_cell(
         return;
     }
     for mut code in codes {
-        assert!(cell.holds(code.place), "{code:?} is outside the grid");
+        assert!(cell.holds(code.center), "{code:?} is outside the grid");
         write_code(encoder, steps, &cell, &mut code);
         done.push(code);
     }
@@ -203,10 +205,10 @@ fn write_count(encoder: &mut Encoder, count: u32, first: u32) {
         return;
     }
     let number = u64::from(first);
-    let symbol = (0..16).find(|&s| number <= share(s, count)[1]).expect("at most `count`");
-    let share = share(symbol, count);
+    let symbol = (0..16).find(|&s| number <= count_range(s, count)[1]).expect("at most `count`");
+    let range = count_range(symbol, count);
     encoder.symbol(173 + count.ilog2(), symbol);
-    encoder.bits(share_bits(share), (number - share[0]) as u32);
+    encoder.bits(range_bits(range), (number - range[0]) as u32);
 }
 
 fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code) {
@@ -234,13 +236,13 @@ fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code
     encoder.signed(slant_context(class, code.ratio), shift, code.slant);
 
     let size = code.size.wrapping_add(expected_size(steps, class, cell.level()));
-    let bits = Shape::new(steps, code, size).place_bits(steps, class, cell);
+    let bits = Shape::new(steps, code, size).position_bits(steps, class, cell);
     for (axis, bits) in bits.into_iter().enumerate() {
         let part = part(cell, axis, bits);
         let corner = cell.corner[axis] * 128;
-        let p = (code.place[axis] - corner) / part;
+        let p = (code.center[axis] - corner) / part;
         encoder.bits(bits, p);
-        code.place[axis] = corner + p * part + part / 2;
+        code.center[axis] = corner + p * part + part / 2;
     }
 }
 
@@ -304,9 +306,9 @@ fn read_count(decoder: &mut Decoder<'_>, count: u32) -> Result<u32, Flaw> {
         let first = decoder.symbol(157 + count)?;
         return if first <= count { Ok(first) } else { Err("a part with more than the whole") };
     }
-    let share = share(decoder.symbol(173 + count.ilog2())?, count);
-    let number = share[0] + u64::from(decoder.bits(share_bits(share))?);
-    if number <= share[1] { Ok(number as u32) } else { Err("a count beyond its share") }
+    let range = count_range(decoder.symbol(173 + count.ilog2())?, count);
+    let number = range[0] + u64::from(decoder.bits(range_bits(range))?);
+    if number <= range[1] { Ok(number as u32) } else { Err("a count beyond its range") }
 }
 
 fn read_code(
@@ -336,14 +338,14 @@ fn read_code(
     let size = decoder.signed(129 + r, shift)?;
     let ratio = decoder.signed(132 + r, shift)?;
     let slant = decoder.signed(slant_context(class, ratio), shift)?;
-    let mut code = Code { class, axes, size, ratio, slant, place: [0; 2] };
+    let mut code = Code { class, axes, size, ratio, slant, center: [0; 2] };
 
     let whole_size = size.wrapping_add(expected_size(steps, class, cell.level()));
     let shape = Shape::new(steps, &code, whole_size);
-    let bits = shape.place_bits(steps, class, cell);
+    let bits = shape.position_bits(steps, class, cell);
     for (axis, bits) in bits.into_iter().enumerate() {
         let part = part(cell, axis, bits);
-        code.place[axis] = cell.corner[axis] * 128 + decoder.bits(bits)? * part + part / 2;
+        code.center[axis] = cell.corner[axis] * 128 + decoder.bits(bits)? * part + part / 2;
     }
     let values = values(grid, steps, &code, &shape);
     Ok((code, values))
@@ -352,7 +354,7 @@ fn read_code(
 /// Section 7.5.
 fn values(grid: &Grid, steps: &Steps, code: &Code, shape: &Shape) -> Vec<f32> {
     let root = (grid.root * 128) as i32;
-    let center = code.place.map(|units| (units as i32 - root) as f32 / 128.0);
+    let center = code.center.map(|units| (units as i32 - root) as f32 / 128.0);
     let mut axes = [0.0; 4];
     for ((axis, &code), &step) in axes.iter_mut().zip(&code.axes).zip(&steps[4..]) {
         *axis = code as f32 * (step / shape.size);

@@ -5,6 +5,7 @@
 
 pub(crate) mod entropy;
 mod exp;
+pub(crate) mod layered;
 pub(crate) mod memory;
 pub(crate) mod oracle;
 pub(crate) mod rans;

@@ -85,8 +85,8 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let header = &file.header;
     let scale =
         [request.size.0 as f32 / header.width as f32, request.size.1 as f32 / header.height as f32];
-    let share = if header.kernel == EXPONENTIAL { 12.0 } else { 6.0 };
-    let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / share } else { 0.0 });
+    let d = if header.kernel == EXPONENTIAL { 12.0 } else { 6.0 };
+    let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / d } else { 0.0 });
     let (left, top, width, height) = request.region;
     let mut planes: Vec<Vec<f32>> = (0..header.channels())
         .map(|c| vec![f32::from(header.base[c]) / 65535.0; width as usize * height as usize])

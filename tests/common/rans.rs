@@ -1,6 +1,6 @@
 //! The entropy coder (section 7.3), written from `spec/gip.md` alone.
 
-/// The shares of sixteen symbols, and how many symbols were read with them.
+/// How sixteen symbols divide the 2^15 slots, and how many symbols were read with them.
 #[derive(Clone, Debug)]
 struct Model {
     /// start(0) to start(16).
@@ -9,7 +9,7 @@ struct Model {
 }
 
 impl Model {
-    fn learn(&mut self, symbol: u32) {
+    fn adapt(&mut self, symbol: u32) {
         let rate = match self.read {
             0..32 => 5,
             32..96 => 6,
@@ -22,8 +22,8 @@ impl Model {
         }
     }
 
-    /// start(symbol) and how much there is to start(symbol + 1).
-    fn share(&self, symbol: u32) -> (u32, u32) {
+    /// The first slot of a symbol, and how many it has.
+    fn slots(&self, symbol: u32) -> (u32, u32) {
         let symbol = symbol as usize;
         let (start, end) = (self.starts[symbol], self.starts[symbol + 1]);
         (start as u32, (end - start) as u32)
@@ -65,20 +65,20 @@ pub(crate) enum Op {
 /// The bytes of a layer from which a decoder reads `ops`.
 pub(crate) fn encode(ops: &[Op]) -> Vec<u8> {
     let mut models = Models::new();
-    // The models learn forwards, but the last is coded first.
-    let shares = ops.iter().map(|&op| match op {
+    // The models adapt forwards, but the last is coded first.
+    let ranges = ops.iter().map(|&op| match op {
         Op::Symbol { context, symbol } => {
             let model = &mut models.0[context as usize];
-            let (start, size) = model.share(symbol);
-            model.learn(symbol);
+            let (start, size) = model.slots(symbol);
+            model.adapt(symbol);
             (u64::from(start), u64::from(size), 1 << 15)
         }
         Op::Bits { count, value } => (u64::from(value), 1, 1 << count),
     });
-    let shares: Vec<(u64, u64, u64)> = shares.collect();
+    let ranges: Vec<(u64, u64, u64)> = ranges.collect();
     let (mut state, mut words) = (1_u64 << 16, Vec::new());
     // What the decoder does, undone.
-    for &(start, size, total) in shares.iter().rev() {
+    for &(start, size, total) in ranges.iter().rev() {
         // States from here on would not fit into 32 bits.
         let room = (size << 32) / total;
         if state >= room {
@@ -128,12 +128,12 @@ impl<'a> Decoder<'a> {
 
     pub(crate) fn symbol(&mut self, context: u32) -> Result<u32, Flaw> {
         let model = &mut self.models.0[context as usize];
-        let share = self.state % (1 << 15);
-        let symbol = (0..16).find(|&s| share < model.starts[s + 1] as u32);
-        let symbol = symbol.expect("the shares end with 2^15") as u32;
-        let (start, size) = model.share(symbol);
-        self.state = size * (self.state >> 15) + share - start;
-        model.learn(symbol);
+        let slot = self.state % (1 << 15);
+        let symbol = (0..16).find(|&s| slot < model.starts[s + 1] as u32);
+        let symbol = symbol.expect("the slots end with 2^15") as u32;
+        let (start, size) = model.slots(symbol);
+        self.state = size * (self.state >> 15) + slot - start;
+        model.adapt(symbol);
         self.ops.push(Op::Symbol { context, symbol });
         self.refill()?;
         Ok(symbol)

@@ -18,11 +18,11 @@ fn usual_steps(color: u8) -> Vec<f32> {
 const LEAST_STEP: f32 = 1.0 / 1_048_576.0;
 const MOST_STEP: f32 = 1024.0;
 
-/// A Gaussian of class 2 at a point of the picture, as large as its cell lets expect, not slanted.
+/// A Gaussian of precision class 2 at a point of the picture, as large as its cell lets expect, not slanted.
 fn at(header: &Ghdr, point: [f32; 2], first: i32) -> Code {
     let mut axes = vec![0; header.channels()];
     axes[0] = first;
-    Code { class: 2, axes, place: Grid::new(header.sides()).units(point), ..Code::default() }
+    Code { class: 2, axes, center: Grid::new(header.sides()).units(point), ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the picture.
@@ -36,8 +36,8 @@ fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
         let (color, shape) = (6 << class.saturating_sub(3), 1 << class.saturating_sub(1));
         let axes = (0..header.channels()).map(|_| within(color)).collect();
         let [size, ratio, slant] = [within(shape), within(shape), within(shape)];
-        let place = grid.units(sides.map(|side| random.range(0.0, side)));
-        Code { class, axes, size, ratio, slant, place }
+        let center = grid.units(sides.map(|side| random.range(0.0, side)));
+        Code { class, axes, size, ratio, slant, center }
     };
     (0..count).map(one).collect()
 }
@@ -75,7 +75,7 @@ pub(super) fn valid() -> Vec<Vector> {
     let classes = {
         let header = header(RGBA, 32, 16);
         let of_class = |class: u32| {
-            // Just over, and as much below, what a symbol of this class can say.
+            // One step of a symbol is this much. Codes beside its multiples need the plain bits, too.
             let (color, shape) = (1 << class.saturating_sub(3), 1 << class.saturating_sub(2));
             let base = at(&header, [4.0 * class as f32 + 1.5, 9.2], 5 * color + class as i32);
             let axes = vec![base.axes[0], 2 * color + 1, -3 * color - 1, 4 * color];
@@ -85,7 +85,7 @@ pub(super) fn valid() -> Vec<Vector> {
                 size: -shape - 1,
                 ratio: 2 * shape - 1,
                 slant: 1 - 2 * shape,
-                place: [more.place[0] + 100, more.place[1] - 700],
+                center: [more.center[0] + 100, more.center[1] - 700],
                 ..more
             };
             [more, less]
@@ -116,7 +116,7 @@ pub(super) fn valid() -> Vec<Vector> {
     let crowd = {
         let point = [9.3, 7.7];
         let mut codes: Vec<Code> = (-4..5).map(|first| at(&gray, point, first)).collect();
-        // The class of each differs, and so does the cell of its position.
+        // Their precision classes differ, and so do their position intervals.
         codes.iter_mut().zip(0..).for_each(|(code, class)| code.class = class % 8);
         codes.push(at(&gray, [9.3, 8.2], 3));
         usual(gray, codes)
@@ -217,7 +217,7 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid(
             "entropy-gray-alpha8",
-            "entropy coding: the axes are gray and alpha",
+            "entropy coding: gray and alpha, which are the two axes",
             scattered(162, gray_alpha, 15),
         ),
         Vector::valid(
@@ -227,7 +227,7 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid(
             "entropy-rgb8",
-            "entropy coding: three axes give red, green, blue",
+            "entropy coding: RGB from three colour axes",
             scattered(164, header(RGB, 40, 24), 30),
         )
         .also(&[Rendering::Size(20, 12)]),
@@ -238,7 +238,7 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid(
             "entropy-rgba8",
-            "entropy coding: the fourth axis is alpha",
+            "entropy coding: RGBA, whose alpha is the fourth axis",
             scattered(166, header(RGBA, 19, 23), 20),
         ),
         Vector::valid(
@@ -253,39 +253,43 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid(
             "entropy-layers",
-            "entropy coding: four layers; models begin anew in each",
+            "entropy coding: four layers; the models begin anew in each",
             layers,
         )
         .also(&[Rendering::Prefix(5), Rendering::Prefix(6), Rendering::Prefix(20)]),
-        Vector::valid("entropy-bounds", "entropy coding: where each of four layers shows", bounded)
-            .also(&[
-                Rendering::Region(1, 2, 3, 4),
-                Rendering::Region(30, 17, 10, 7),
-                Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
-            ]),
+        Vector::valid(
+            "entropy-bounds",
+            "entropy coding: bNDS says where each of four layers shows",
+            bounded,
+        )
+        .also(&[
+            Rendering::Region(1, 2, 3, 4),
+            Rendering::Region(30, 17, 10, 7),
+            Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
+        ]),
         Vector::valid(
             "entropy-classes",
-            "entropy coding: all classes, with plain bits under codes",
+            "entropy coding: all precision classes; the higher ones have plain bits below their symbols",
             classes,
         ),
         Vector::valid(
             "entropy-excess",
-            "entropy coding: codes around the last that have a symbol, and up to the largest there are",
+            "entropy coding: codes on both sides of the largest that needs no excess, and up to the largest of all",
             excess,
         ),
         Vector::valid(
             "entropy-crowd",
-            "entropy coding: nine Gaussians in one pixel, which is not split",
+            "entropy coding: nine Gaussians in a cell of one pixel, which is not split",
             crowd,
         ),
         Vector::valid(
             "entropy-many",
-            "entropy coding: counts of 16 and more, and of 256 and more; models learn at every rate",
+            "entropy coding: cells of 16 Gaussians and more, and of 256 and more; models adapt at every rate",
             many,
         ),
         Vector::valid(
             "entropy-dense",
-            "entropy coding: just four Gaussians for each byte",
+            "entropy coding: four Gaussians for each byte, the most that is allowed",
             dense(216),
         ),
         Vector::valid(
@@ -311,12 +315,12 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid(
             "entropy-clamped",
-            "entropy coding: logarithms confined to -20 to 20 decide how long a place is; one is drawn",
+            "entropy coding: logarithms of shapes clamped to [-20, 20], on which the position interval depends; one Gaussian is drawn",
             clamped,
         ),
         Vector::valid(
             "entropy-not-drawn",
-            "entropy coding: six Gaussians out of bounds, and one that is drawn",
+            "entropy coding: one Gaussian that is drawn, and six that are not: out of bounds",
             not_drawn,
         ),
         Vector::valid("entropy-steps-least", "entropy coding: all steps are 2^-20", least),
@@ -383,10 +387,12 @@ pub(super) fn invalid() -> Vec<Vector> {
     let start = 8 + chunks[..3].iter().map(Vec::len).sum::<usize>();
     let invalid = Vector::invalid;
     vec![
-        invalid("xentropy-parameterization", "entropy coding with another parameterization", {
-            with_header(&|h| h.parameterization = COVARIANCE)
-        }),
-        invalid("xentropy-length-quantizers", "entropy coding: a step too few", {
+        invalid(
+            "xentropy-parameterization",
+            "entropy coding: a parameterization other than Cholesky",
+            with_header(&|h| h.parameterization = COVARIANCE),
+        ),
+        invalid("xentropy-length-quantizers", "entropy coding: one step too few", {
             replaced(1, chunk(b"QNTZ", &steps(&usual_steps[1..])))
         }),
         invalid("xentropy-step-nan", "entropy coding: a step of NaN", {
@@ -400,15 +406,15 @@ pub(super) fn invalid() -> Vec<Vector> {
         invalid("xentropy-step-over", "entropy coding: a step just over 2^10", {
             with_step(4, next(MOST_STEP, 1))
         }),
-        invalid("xentropy-count-more", "entropy coding: a Gaussian more than declared", {
+        invalid("xentropy-count-more", "entropy coding: one Gaussian more than declared", {
             with_header(&|h| h.gaussians -= 1)
         }),
-        invalid("xentropy-count-fewer", "entropy coding: a Gaussian less than declared", {
+        invalid("xentropy-count-fewer", "entropy coding: one Gaussian fewer than declared", {
             with_header(&|h| h.gaussians += 1)
         }),
         refused(
             "xentropy-empty",
-            "entropy coding: a layer of no Gaussians",
+            "entropy coding: a layer without Gaussians",
             &changed(&|payload| payload[0] = 0),
             "no Gaussians",
         ),
@@ -417,98 +423,98 @@ pub(super) fn invalid() -> Vec<Vector> {
         }),
         refused(
             "xentropy-class-8",
-            "entropy coding: class 8",
+            "entropy coding: precision class 8",
             &with_symbol(&|context| context == 0, 8),
             "a class over 7",
         ),
         refused(
             "xentropy-class-15",
-            "entropy coding: class 15",
+            "entropy coding: precision class 15",
             &with_symbol(&|context| context == 0, 15),
             "a class over 7",
         ),
         refused(
             "xentropy-few",
-            "entropy coding: a part of one Gaussian holds two",
+            "entropy coding: two Gaussians in a part of a cell that has one",
             &with_symbol(&|context| context == 158, 2),
             "a part with more than the whole",
         ),
         refused(
             "xentropy-share",
-            "entropy coding: a number beyond the share that was read",
-            // The first symbol and bits tell how many of 40 are in the left half. Of 41 numbers
-            // the first share has 0, 1 and 2.
+            "entropy coding: plain bits beyond the range of numbers that their symbol stands for",
+            // The first symbol and bits tell how many of 40 are in the left half. Of these 41 numbers
+            // the first symbol stands for 0, 1 and 2.
             &with_ops(&|ops| {
                 ops[0] = Op::Symbol { context: 178, symbol: 0 };
                 ops[1] = Op::Bits { count: 2, value: 3 };
             }),
-            "a count beyond its share",
+            "a count beyond its range",
         ),
         refused(
             "xentropy-short",
-            "entropy coding: too short for a number of Gaussians",
+            "entropy coding: a layer too short for its number of Gaussians",
             &payload[..3],
             "no count",
         ),
         refused(
             "xentropy-short-state",
-            "entropy coding: too short for a state",
+            "entropy coding: a layer too short for the state",
             &[&[1, 0, 0, 0], &payload[4..6]].concat(),
             "no state",
         ),
         refused(
             "xentropy-state",
-            "entropy coding: a state that begins below 2^16",
+            "entropy coding: an initial state below 2^16",
             &changed(&|payload| payload[6..8].fill(0)),
             "the state begins below 2^16",
         ),
         refused(
             "xentropy-words-fewer",
-            "entropy coding: a word is missing",
+            "entropy coding: one word too few",
             &changed(&|payload| payload.truncate(payload.len() - 2)),
             "no word left",
         ),
         refused(
             "xentropy-words-more",
-            "entropy coding: a word is left",
+            "entropy coding: one word too many",
             &changed(&|payload| payload.extend([0, 0])),
             "words left",
         ),
         refused(
             "xentropy-byte-more",
-            "entropy coding: half a word is left",
+            "entropy coding: one byte too many",
             &changed(&|payload| payload.push(0)),
             "words left",
         ),
         refused(
             "xentropy-end-state",
-            "entropy coding: another state at the end",
+            "entropy coding: a final state other than 2^16",
             &with_ops(&|ops| ops.push(Op::Bits { count: 1, value: 1 })),
             "another state at the end",
         ),
         invalid(
             "xentropy-bounds-fewer",
-            "entropy coding: it is said of one layer only where it shows, and there are two",
+            "entropy coding: bNDS with bounds of one layer, where there are two",
             file.clone().with(b"bNDS", &[0, 0, 255, 255]).bytes(),
         ),
         invalid(
             "xentropy-bounds-reversed",
-            "entropy coding: a layer shows in rows that end before they begin",
+            "entropy coding: bNDS with a last row above the first one",
             file.clone().with(b"bNDS", &[0, 0, 255, 255, 7, 9, 7, 8]).bytes(),
         ),
         invalid(
             "xentropy-bounds-twice",
-            "entropy coding: it is said twice where layers show",
+            "entropy coding: two bNDS",
             file.clone().with(b"bNDS", &[0, 0, 255, 255].repeat(2)).with(b"bNDS", &[0; 8]).bytes(),
         ),
-        invalid("xentropy-crc", "entropy coding: a wrong CRC, found when the layer is complete", {
+        invalid("xentropy-crc", "entropy coding: a flipped bit in the second layer", {
             let mut bytes = file.bytes();
             bytes[start + 20] ^= 4;
             bytes
         }),
         invalid(
             "xentropy-truncated",
-            "entropy coding: ends within the second layer, of which nothing is kept",
+            "entropy coding: ends within the second layer, of which nothing is shown",
             file.bytes()[..start + 40].to_vec(),
         ),
     ]

@@ -260,6 +260,43 @@ mod tests {
     }
 
     #[test]
+    fn help_explains_every_argument() {
+        let mut tool = Args::command();
+        tool.build();
+        let mut commands: Vec<clap::Command> = tool.get_subcommands().cloned().collect();
+        assert_eq!(commands.len(), 4 + 1, "four and `help`");
+        commands.push(tool);
+        for mut command in commands {
+            let help = command.render_long_help().to_string();
+            let words = help.split_whitespace().collect::<Vec<_>>().join(" ");
+            let names = |text: &str| {
+                assert!(words.contains(text), "{}: {text} is missing:\n{help}", command.get_name());
+            };
+            names(&command.get_about().expect("a text").to_string());
+            for argument in command.get_arguments() {
+                let text = argument.get_long_help().or(argument.get_help()).expect("a text");
+                names(&text.to_string().split_whitespace().collect::<Vec<_>>().join(" "));
+                if let Some(long) = argument.get_long() {
+                    names(&format!("--{long}"));
+                }
+                if !argument.get_action().takes_values() {
+                    continue;
+                }
+                for name in argument.get_value_names().expect("it takes values") {
+                    names(name);
+                }
+                for default in argument.get_default_values() {
+                    names(&format!("[default: {}]", default.display()));
+                }
+                for value in argument.get_possible_values() {
+                    let text = value.get_help().expect("a text");
+                    names(&format!("- {}: {text}", value.get_name()));
+                }
+            }
+        }
+    }
+
+    #[test]
     fn targets() {
         let target = |flags: &[&str]| {
             let args = [&["gip", "encode", "a", "b"], flags].concat();

@@ -47,7 +47,7 @@ fn first_sample(bytes: &[u8]) -> Option<u8> {
     decoder.feed(bytes).ok()?;
     let picture = decoder.picture()?;
     let options = RenderOptions::new();
-    let mut pixels = vec![0; picture.output_len(&options)?];
+    let mut pixels = vec![0; picture.output_len(&options).ok()?];
     picture.render_u8(&options, &mut pixels).ok()?;
     pixels.first().copied()
 }
