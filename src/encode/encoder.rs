@@ -1,4 +1,4 @@
-//! What a caller holds: the encoder with its options, and what it returns.
+//! The public interface of the encoder: its options, and the file and report that it returns.
 
 use core::ops::ControlFlow;
 use std::time::Instant;
@@ -16,8 +16,9 @@ use crate::container::Metadata;
 use crate::kernel::Kernel;
 use crate::threads::Threads;
 
-/// Iterations by effort, from 1 to 9, and passes over the codes of coded Gaussians: where time is
-/// short, iterations gain more, and in the end they gain little without the passes.
+/// For the efforts 1 to 9: iterations of training, and passes of rate-distortion optimization over
+/// the codes of an entropy-coded file. In a short run, time is better spent on iterations; in a
+/// long one, more iterations gain little without more passes.
 const EFFORTS: [(u32, u32); 9] = [
     (60, 2),
     (90, 2),
@@ -29,11 +30,12 @@ const EFFORTS: [(u32, u32); 9] = [
     (4_800, 16),
     (9_600, 16),
 ];
-/// Fewest iterations where the error decides how many Gaussians there are: after fewer, it would take
-/// far too many.
-const FEWEST_BY_ERROR: u32 = 180;
+/// Fewest iterations for a target that sets the error instead of the number of Gaussians: a fit
+/// of fewer iterations needs far too many Gaussians to reach the error.
+const MIN_ITERATIONS_BY_ERROR: u32 = 180;
 
-/// Encodes interleaved 8-bit samples, rows from the top, with the default options of [`Encoder`].
+/// Encodes interleaved 8-bit samples, rows from the top, with the default options of [`Encoder`],
+/// and returns the `.gip` file.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,7 +47,8 @@ const FEWEST_BY_ERROR: u32 = 180;
 /// ```
 ///
 /// # Errors
-/// When a side is not 1 to 2^20, or there are not width x height x channels samples.
+/// [`EncodeError::Source`] when a side is not 1 to 2^20 pixels long, or `samples` does not hold
+/// width x height x channels samples.
 pub fn encode(
     width: u32,
     height: u32,
@@ -56,8 +59,8 @@ pub fn encode(
     Ok(Encoder::new().encode(&source)?.bytes)
 }
 
-/// Encodes pictures to `.gip`, with options. [`encode`](crate::encode()) is the short way without
-/// them.
+/// An encoder of `.gip` files and its options. For the default options,
+/// [`encode`](crate::encode()) is a single call.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -90,7 +93,7 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder that picks the number of Gaussians by itself, at default effort, entropy coded.
+    /// An encoder with the default options: [`Target::Auto`], effort 5, [`Precision::Entropy`].
     pub fn new() -> Self {
         Self {
             target: Target::default(),
@@ -103,61 +106,67 @@ impl Encoder {
         }
     }
 
-    /// What the file shall meet: a count, a size, a rate, a quality.
+    /// The target that the file has to meet: a number of Gaussians, a size, a rate, a PSNR or a
+    /// quality. Default [`Target::Auto`].
     pub fn with_target(mut self, target: Target) -> Self {
         self.target = target;
         self
     }
 
-    /// How much time to spend, 1 (least) to 9 (most). Default 5.
+    /// How much time to spend, from 1 (least) to 9 (most). Default 5.
     pub fn with_effort(mut self, effort: u8) -> Self {
         self.effort = effort;
         self
     }
 
-    /// How attributes are stored. Default [`Precision::Entropy`].
+    /// How the attributes of the Gaussians are stored. Default [`Precision::Entropy`].
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
         self
     }
 
-    /// Seed of everything random. Same source, options and seed give the same file.
+    /// The seed of all random numbers. The same source, options and seed give the same file.
+    /// Default 0.
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.seed = seed;
         self
     }
 
-    /// The threads to use. Default [`Threads::Pool`]. The file does not depend on them.
+    /// The threads to use; the file does not depend on them. Default [`Threads::Pool`].
     pub fn with_threads(mut self, threads: Threads) -> Self {
         self.threads = threads;
         self
     }
 
-    /// ICC profile, Exif, XMP and texts to store with the picture.
+    /// The ICC profile, Exif, XMP and texts to store with the picture. Default: none.
     pub fn with_metadata(mut self, metadata: Metadata) -> Self {
         self.metadata = metadata;
         self
     }
 
-    /// Sets the constants of training in place of those that the effort implies.
+    /// Trains with these constants instead of those that the effort implies. The effort then sets
+    /// only the number of passes of rate-distortion optimization ([`Precision::Entropy`]).
     pub fn with_training(mut self, training: Training) -> Self {
         self.training = Some(training);
         self
     }
 
-    /// Encodes `source`.
+    /// Encodes `source`. A target that cannot be met is not an error: the file comes as close as
+    /// it can, and [`Report::shortfall`] gives the reason.
     ///
     /// # Errors
-    /// When an option is out of range, or no file can meet the target.
+    /// [`EncodeError::Option`] when an option is out of range, when the target is a size smaller
+    /// than a file without Gaussians, or when no thread can be started.
     pub fn encode(&self, source: &Source<'_>) -> Result<Encoded, EncodeError> {
         self.encode_with(source, &mut |_| ControlFlow::Continue(()))
     }
 
-    /// Encodes `source` and calls `progress` at every iteration, and every few milliseconds of what
-    /// takes longer.
+    /// As [`Encoder::encode`], with a callback: `progress` is called at every iteration of
+    /// training, and every few milliseconds during everything that takes longer. It cancels the
+    /// encoding by returning [`ControlFlow::Break`].
     ///
     /// # Errors
-    /// As [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` breaks.
+    /// Those of [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` cancels.
     pub fn encode_with(
         &self,
         source: &Source<'_>,
@@ -195,14 +204,15 @@ impl Encoder {
         })
     }
 
-    /// Checks all options and settles the training's constants and the passes over codes.
+    /// Checks all options; returns the constants of training and the number of passes of
+    /// rate-distortion optimization.
     fn check(&self) -> Result<(Training, u32), EncodeError> {
         let Some(&(iterations, passes)) = EFFORTS.get(usize::from(self.effort).wrapping_sub(1))
         else {
             return Err(OptionError::Effort(self.effort).into());
         };
         self.target.check()?;
-        let fewest = if self.target.is_by_error() { FEWEST_BY_ERROR } else { 1 };
+        let fewest = if self.target.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
         let iterations = iterations.max(fewest);
         self.metadata.check().map_err(OptionError::Metadata)?;
         let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
@@ -214,43 +224,46 @@ impl Encoder {
     }
 }
 
-/// A pool for those who want one thread: training knows of no other way to share work.
+/// A pool of one thread, for [`Threads::One`]: the encoder always runs in a pool.
 fn pool_of_one() -> Result<rayon::ThreadPool, OptionError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     pool.map_err(|error| OptionError::Threads(error.to_string()))
 }
 
-/// A file and how it came about.
+/// An encoded file and a report about it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 #[must_use]
 pub struct Encoded {
     /// The whole `.gip` file.
     pub bytes: Vec<u8>,
-    /// Figures.
+    /// What the encoding achieved and cost.
     pub report: Report,
 }
 
-/// Figures of one encoding.
+/// What an encoding achieved and cost.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Report {
-    /// Gaussians in the file.
+    /// Number of Gaussians in the file.
     pub gaussians: u32,
-    /// PSNR of the decoded file against the source at the source's depth, in dB; infinite for an
-    /// exact copy.
+    /// PSNR in dB of the decoded file against the source, over all samples at the source's depth;
+    /// infinite for an exact copy.
     pub psnr: f64,
-    /// PSNR of the decoded file before it is rounded to samples (but clamped), in dB: what papers
-    /// report.
+    /// PSNR in dB of the decoded file against the source, where the decoded samples are floats,
+    /// clamped but not rounded. This is the PSNR that papers report.
     pub psnr_float: f64,
     /// Iterations of training.
     pub iterations: u32,
-    /// Kernel evaluations of training: pairs of a Gaussian and a pixel, each with its gradient.
+    /// Evaluations of the kernel and its gradient during training, one for each pair of a Gaussian
+    /// and a pixel.
     pub evaluations: u64,
     /// Wall-clock time in seconds.
     pub seconds: f64,
-    /// Most bytes that the encoder held at a time, the source and the file not counted.
+    /// Largest amount of memory in bytes that the encoder's buffers took at one time, not counting
+    /// the source and the file.
     pub peak_memory: u64,
-    /// Why the target was not met within 1 % of size or 0.05 dB; `None` when it was.
+    /// Why the file misses its target by more than the tolerance (1 % of a size, 0.05 dB of a
+    /// PSNR); `None` when it meets the target.
     pub shortfall: Option<Shortfall>,
 }

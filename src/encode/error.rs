@@ -1,11 +1,11 @@
-//! What can go wrong while encoding.
+//! The errors of the encoder.
 
 use thiserror::Error;
 
 use crate::color::ColorModel;
 use crate::container::{MAX_SIDE, MetadataError};
 
-/// Why a picture was not encoded.
+/// Why a picture could not be encoded.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum EncodeError {
@@ -15,12 +15,12 @@ pub enum EncodeError {
     /// An option is out of range.
     #[error("invalid option: {0}")]
     Option(#[from] OptionError),
-    /// The progress callback asked to stop.
+    /// The progress callback cancelled the encoding.
     #[error("encoding was cancelled")]
     Cancelled,
 }
 
-/// Why samples are not a picture that the format can hold.
+/// Why a source is not a picture that the format can hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum SourceError {
@@ -32,12 +32,12 @@ pub enum SourceError {
         /// Height in pixels.
         height: u32,
     },
-    /// There are not as many samples as width x height x channels.
+    /// The number of samples is not width x height x channels.
     #[error("{found} samples; {width}x{height} {color:?} needs {wanted}")]
     SampleCount {
-        /// Samples that were given.
+        /// Number of samples given.
         found: usize,
-        /// Samples that the picture has.
+        /// Number of samples that the picture needs.
         wanted: u64,
         /// Width in pixels.
         width: u32,
@@ -48,7 +48,7 @@ pub enum SourceError {
     },
 }
 
-/// Which option is out of range; the text says what is allowed.
+/// An option that is out of range; the text says what is allowed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum OptionError {
@@ -58,27 +58,28 @@ pub enum OptionError {
     /// The number in a [`Target`](crate::Target) is out of range.
     #[error("{name} {value}; it must be {least} to {most}")]
     Target {
-        /// What the number is.
+        /// Name of the quantity, with its unit.
         name: &'static str,
         /// The number.
         value: f64,
-        /// The least that is allowed.
+        /// The least number allowed.
         least: f64,
-        /// The most that is allowed.
+        /// The largest number allowed.
         most: f64,
     },
-    /// The size asked for is less than a file takes without any Gaussian.
+    /// The target is a size smaller than a file without Gaussians.
     #[error("a size of {bytes} bytes; this picture takes at least {least} without any Gaussian")]
     Size {
-        /// Bytes asked for.
+        /// The target in bytes.
         bytes: u64,
-        /// The fewest that are possible.
+        /// Size in bytes of the file without Gaussians.
         least: u64,
     },
     /// The metadata cannot be stored.
     #[error(transparent)]
     Metadata(#[from] MetadataError),
-    /// A constant of [`Training`](crate::training::Training) breaks this rule.
+    /// A constant of [`Training`](crate::training::Training) is out of range; the text is the rule
+    /// that it breaks.
     #[error("training: {0}")]
     Training(&'static str),
     /// No thread could be started.

@@ -1,11 +1,11 @@
-//! What the pipeline is asked for.
+//! The input of the pipeline.
 
 use super::fit::training::Training;
 use super::options::{Precision, Target};
 use super::source::Source;
 use crate::container::Metadata;
 
-/// What is to be encoded, and how.
+/// A picture to encode, and the options to encode it with.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
     pub(crate) source: &'a Source<'a>,
@@ -14,6 +14,6 @@ pub(crate) struct Job<'a> {
     pub(crate) seed: u64,
     pub(crate) metadata: &'a Metadata,
     pub(crate) training: &'a Training,
-    /// Of rate-distortion optimisation over the codes of entropy-coded Gaussians.
+    /// Passes of rate-distortion optimization over the codes of an entropy-coded file.
     pub(crate) passes: u32,
 }

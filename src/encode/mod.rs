@@ -1,5 +1,7 @@
-//! The encoder: pixels to Gaussians (`fit`), Gaussians to codes (`rdo`), codes to bytes (`file`);
-//! `pipeline` is the way through them (paper: GaussianImage++).
+//! The encoder, after the paper GaussianImage++.
+//!
+//! `fit` turns pixels into Gaussians, `rdo` turns Gaussians into codes of the entropy coding, and
+//! `file` writes codes as bytes; `pipeline` runs these stages one after the other.
 
 mod encoder;
 mod entropy;

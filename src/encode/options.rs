@@ -1,43 +1,46 @@
-//! What a caller can ask of the encoder.
+//! Options of the encoder: the target of a file and the precision of its attributes.
 
 use super::error::OptionError;
 
-/// What the file shall meet.
+/// The target that an encoded file has to meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Target {
-    /// As many Gaussians as the picture needs for a sensible quality: the same as
-    /// `Quality(50.0)`.
+    /// A medium quality: the same as `Quality(50.0)`.
     #[default]
     Auto,
-    /// At most this many Gaussians, 1 to 2^22; fewer where the picture needs fewer.
+    /// At most this many Gaussians, from 1 to 2^22. A picture that needs fewer gets fewer.
     Gaussians(u32),
-    /// A file of at most this many bytes, and at least 99 % of it. Where that many bring a picture
-    /// hardly anything, the file is smaller, and the report's shortfall says so.
+    /// A file of at most this many bytes, from 1 to 2^30, and of at least 99 % of them. Where so many
+    /// bytes bring hardly anything, the file is smaller, and [`Report::shortfall`](crate::Report) says
+    /// so.
     Bytes(u64),
-    /// A file of at most this many bits per pixel, and at least 99 % of it; see [`Target::Bytes`].
+    /// A file of at most this many bits per pixel, from 10^-6 to 10^6, and of at least 99 % of
+    /// them. The whole file counts; see also [`Target::Bytes`].
     BitsPerPixel(f64),
-    /// A PSNR of the decoded file at the source's depth, in dB, from 1 to 120: at least this much
-    /// and at most 0.05 dB more. A PSNR that is out of reach ends with what the effort reaches, after up
-    /// to one Gaussian per pixel and three times the effort's iterations; the report's shortfall says so.
+    /// A PSNR of the decoded file in dB, at the source's depth, from 1 to 120: at least this much,
+    /// and at most 0.05 dB more. A PSNR that is out of reach ends with what the effort reaches, after
+    /// at most one Gaussian per pixel and three times the effort's iterations, and
+    /// [`Report::shortfall`](crate::Report) says so.
     Psnr(f64),
-    /// A quality from 0 to 100. Every picture gets Gaussians until each lowers the squared error
-    /// by the same amount, so simple pictures get few; 10 more is about 1.6 times the Gaussians.
+    /// A quality from 0 (smallest file) to 100 (best picture). It sets the squared error that
+    /// remains per Gaussian, the same for every picture, so simple pictures get few Gaussians. A
+    /// quality higher by 10 takes 1.2 to 1.3 times as many Gaussians.
     Quality(f64),
 }
 
 /// By how much a PSNR may exceed its target, in dB.
 pub(crate) const PSNR_TOLERANCE: f64 = 0.05;
-/// The least share of a size that a file must fill.
+/// The share of a target size that a file must reach.
 pub(crate) const SIZE_TOLERANCE: f64 = 0.99;
-/// Most Gaussians that an encoder writes: as many as a decoder accepts by default.
+/// Most Gaussians that the encoder writes: as many as a decoder accepts by default.
 pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
 
 /// The quality of [`Target::Auto`].
 const AUTO_QUALITY: f64 = 50.0;
 
 impl Target {
-    /// Says what is out of range, if anything is, and what is allowed.
+    /// Refuses a number that is out of range.
     pub(crate) fn check(self) -> Result<(), OptionError> {
         let within = |name, value, least, most| {
             if (least..=most).contains(&value) {
@@ -58,7 +61,8 @@ impl Target {
         }
     }
 
-    /// The most bytes that the file may have.
+    /// Most bytes that the file of a picture with so many pixels may have; `None` if the target
+    /// does not set a size.
     pub(crate) fn bytes(self, pixels: usize) -> Option<u64> {
         match self {
             Self::Bytes(bytes) => Some(bytes),
@@ -67,31 +71,35 @@ impl Target {
         }
     }
 
-    /// Whether the error decides how many Gaussians there are.
+    /// Whether the target sets the error, and so leaves the number of Gaussians open.
     pub(crate) fn is_by_error(self) -> bool {
         matches!(self, Self::Psnr(_)) || self.error_per_gaussian().is_some()
     }
 
-    /// The squared error, in full samples, that every Gaussian shall account for at this quality.
+    /// The squared error that remains per Gaussian at this quality, where a full sample is 1;
+    /// `None` if the target is not a quality.
     pub(crate) fn error_per_gaussian(self) -> Option<f64> {
         let quality = match self {
             Self::Auto => AUTO_QUALITY,
             Self::Quality(quality) => quality,
             _ => return None,
         };
-        // In steps of 8 bits: 100,000 at quality 0, 1,000 at quality 100.
+        // With samples of 0 to 255: 100,000 at quality 0, 1,000 at quality 100.
         Some(10_f64.powf(5.0 - 0.02 * quality) / (255.0 * 255.0))
     }
 }
 
-/// How attributes are stored.
+/// How the attributes of the Gaussians are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Precision {
-    /// 32-bit floats: the fit exactly as it is.
+    /// The packed coding with 32-bit floats: the trained values themselves, without quantization
+    /// error (spec, sections 6 and 7.2).
     Float,
-    /// Quantization-aware training and bit packing.
+    /// The packed coding with codes of fixed bit depths, after quantization-aware training (spec,
+    /// sections 6 and 7.2; paper, section "Compression Framework").
     Packed,
-    /// Entropy coded, every code chosen by what it costs and what it does to the picture.
+    /// The entropy coding, with codes chosen by rate-distortion optimization (spec, sections 7.3
+    /// to 7.5). It gives the smallest files.
     Entropy,
 }

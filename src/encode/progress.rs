@@ -1,26 +1,27 @@
-//! What a caller is told during an encoding, and how it stops one.
+//! Progress reports to the caller, and cancellation by it.
 
 use core::fmt;
 use core::ops::ControlFlow;
 
 use super::error::EncodeError;
 
-/// How far the encoder is.
+/// The progress of an encoding.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Progress {
-    /// Iterations done.
+    /// Iterations of training done so far.
     pub iteration: u32,
-    /// Iterations in all, as far as known.
+    /// Iterations planned in total. The number grows when a finished fit is extended to meet its
+    /// target.
     pub iterations: u32,
-    /// Gaussians at this moment.
+    /// Present number of Gaussians.
     pub gaussians: u32,
-    /// PSNR of the float rendering at this moment, in dB.
+    /// PSNR in dB of the present Gaussians, rendered to floats and clamped.
     pub psnr: f64,
 }
 
-/// The caller's function and what it was told last. Whatever takes more than some milliseconds
-/// polls it now and then.
+/// The caller's callback and the last progress reported to it. Code that runs for more than a few
+/// milliseconds polls it, so that the caller can cancel at any time.
 pub(crate) struct Observer<'a> {
     callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     progress: Progress,
@@ -35,16 +36,19 @@ impl<'a> Observer<'a> {
         Self { callback, progress }
     }
 
-    /// Tells the caller something new.
-    pub(crate) fn tell(&mut self, progress: Progress) -> Result<(), EncodeError> {
+    /// Reports progress to the caller.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn report(&mut self, progress: Progress) -> Result<(), EncodeError> {
         self.progress = progress;
         self.poll()
     }
 
-    /// Gives the caller a chance to stop.
+    /// Calls the callback with the last progress, so that the caller can cancel.
     ///
     /// # Errors
-    /// [`EncodeError::Cancelled`] when it does.
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn poll(&mut self) -> Result<(), EncodeError> {
         match (self.callback)(&self.progress) {
             ControlFlow::Continue(()) => Ok(()),

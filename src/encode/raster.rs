@@ -1,4 +1,4 @@
-//! The source picture as planes, tile by tile, in the layout of the training pass.
+//! The source picture as planes of tiles, in the layout of the training pass.
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 use rayon::prelude::*;
@@ -6,26 +6,26 @@ use rayon::prelude::*;
 use super::source::Source;
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Pixels per row of a tile of the training pass: twice as wide as the decoder's, since each splat of
-/// a tile has sums to be gathered afterwards.
+/// Width in pixels of a tile of the training pass, twice that of the decoder's tiles: every splat
+/// of a tile costs a reduction of its gradient sums, and wider tiles need fewer reductions.
 pub(crate) const TILE_WIDTH: usize = 16;
 
 /// One channel of a tile, row by row.
 pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
-/// One channel of the source in a tile, row by row, [`FULL_SCALE`] being a full sample: half as large
-/// as floats and as exact.
+/// One channel of the source in a tile, row by row, where a full sample is [`FULL_SCALE`]: as exact
+/// as floats, in half the memory.
 pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];
-/// What a full sample is in a [`SamplePlane`].
+/// The value of a full sample in a [`SamplePlane`].
 pub(crate) const FULL_SCALE: f32 = 65535.0;
 
 /// The samples of a picture, one [`SamplePlane`] per tile and channel: all channels of the
-/// first tile, then all of the second. Pixels of a tile that lie outside the picture are 0.
+/// first tile, then all of the second, and so on. Samples of a tile outside the picture are 0.
 #[derive(Debug)]
 pub(crate) struct Raster {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) channels: usize,
-    /// Half of the distance between neighbouring samples of the source's depth.
+    /// Half of the quantization step of the source's depth, where a full sample is 1.
     pub(crate) half_step: f32,
     planes: Vec<SamplePlane>,
 }
@@ -57,7 +57,7 @@ impl Raster {
         self.planes[tile * CHANNELS..][..CHANNELS].try_into().expect("a tile has all channels")
     }
 
-    /// The samples of a pixel, 1.0 being a full one; 0 for absent channels.
+    /// The samples of a pixel, where a full sample is 1; 0 for absent channels.
     pub(crate) fn sample(&self, x: usize, y: usize) -> [f32; 4] {
         let tile = y / TILE_HEIGHT * self.width.div_ceil(TILE_WIDTH) + x / TILE_WIDTH;
         let mut sample = [0.0; 4];
@@ -68,7 +68,7 @@ impl Raster {
         sample
     }
 
-    /// A row of one channel, 1.0 being a full sample.
+    /// A row of one channel, where a full sample is 1.
     pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = f32> {
         let columns = self.width.div_ceil(TILE_WIDTH);
         let tiles = self.planes[y / TILE_HEIGHT * columns * self.channels..]
@@ -78,7 +78,7 @@ impl Raster {
         samples.take(self.width).map(|&sample| f32::from(sample) / FULL_SCALE)
     }
 
-    /// The mean of each channel over the picture; 0 for absent channels.
+    /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) fn mean(&self) -> [f32; 4] {
         let mut sums = [0_u64; 4];
         for (index, plane) in self.planes.iter().enumerate() {
@@ -89,7 +89,7 @@ impl Raster {
         sums.map(|sum| (sum as f64 / full) as f32)
     }
 
-    /// The sum of squared errors of a PSNR in dB, a full sample being 1.
+    /// The sum of squared errors at a PSNR in dB, where a full sample is 1.
     pub(crate) fn error_of(&self, psnr: f64) -> f64 {
         (self.pixels() * self.channels) as f64 * 10_f64.powf(-psnr / 10.0)
     }
@@ -98,7 +98,7 @@ impl Raster {
         self.width * self.height
     }
 
-    /// Bytes held.
+    /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
         size_of_val(&self.planes[..])
     }

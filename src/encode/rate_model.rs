@@ -1,51 +1,59 @@
-//! How fine and how dear things are, by the error that a picture has anyway: what training, rounding
-//! and the choice of codes have in common.
+//! The rate model of the entropy coding: what training, rounding to the lattice and the choice of
+//! codes assume about rate (bits) and distortion (squared error, where a full sample is 1).
+//!
+//! All steps follow from one, the step of colour, which is proportional to the square root of the
+//! squared error per Gaussian. The *strength* of a Gaussian is the Euclidean length of its colour
+//! times the square root of its area l11 l22: the squared strength is proportional to the sum of
+//! the squares that it adds to the picture.
 
 use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
-/// Bits that a Gaussian takes, about: what decides how many a size holds.
+/// Bits that an entropy-coded Gaussian takes on average. A file of a given size is fitted with as
+/// many Gaussians as fit in at this rate.
 pub(crate) const BITS_PER_GAUSSIAN: f64 = 29.0;
-/// The share of the error that is there before rounding.
+/// The share of a target's squared error that the fit may have; quantization adds the rest.
 pub(crate) const SHARE_OF_FIT: f64 = 0.8;
-/// The squared step of colour for a squared error of 1 per Gaussian: what gives Gaussians of
-/// [`BITS_PER_GAUSSIAN`].
-const STEP: f64 = 0.22;
-/// Steps that a lattice may have.
-const STEPS: (f64, f64) = (1e-4, 16.0);
-/// Squared error that a bit is worth, in squared steps of colour: where the error of rounding
-/// falls as fast by finer steps as it grows by their bits.
+/// The squared step of colour, as a share of the squared error per Gaussian: with it, a Gaussian
+/// takes about [`BITS_PER_GAUSSIAN`].
+const SQUARED_STEP: f64 = 0.22;
+/// The range of the step of colour.
+const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
+/// The Lagrange multiplier lambda, in squared steps of colour per bit: with it, making all steps a
+/// little finer lowers the distortion by as much as lambda times the bits that it adds.
 const LAMBDA: f32 = 0.322;
-/// Steps of geometry that harm as much as a step of colour, for a Gaussian whose colour times the
-/// root of its area is 1: from integrals of the quartic kernel's derivatives.
+/// Steps of geometry whose quantization adds as much distortion as that of a step of colour, for a
+/// Gaussian of strength 1: from integrals of the quartic kernel's derivatives.
 const POSITION: f32 = 1.095;
 const SIZE: f32 = 0.775;
 const RATIO: f32 = 0.866;
 const SLANT: f32 = 1.732;
-/// How much of what bits are worth counts in training: all of it leaves less error to be corrected
-/// later than it saves.
-const SHRINKAGE: f32 = 0.4;
-/// Components of a Gaussian beside its colours.
+/// The weight of the rate term in training, as a share of lambda. It is tuned: at full weight,
+/// training loses more quality than it saves bits.
+const RATE_WEIGHT: f32 = 0.4;
+/// Components of a Gaussian's geometry: two of position, three of shape.
 const GEOMETRY: usize = 5;
 
-/// The logarithm to base 2 of the step of colour for `count` Gaussians that leave a squared error.
+/// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has the squared
+/// error `error`.
 pub(crate) fn step_for(error: f64, count: usize) -> f64 {
-    0.5 * (STEP * error / count.max(1) as f64).log2()
+    0.5 * (SQUARED_STEP * error / count.max(1) as f64).log2()
 }
 
-/// The lattice of a step of colour, given by its logarithm to base 2.
+/// The lattice for a step of colour, given by its base-2 logarithm.
 pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
-    let step = step.exp2().clamp(STEPS.0, STEPS.1) as f32;
+    let step = step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1) as f32;
     Lattice::new([POSITION, SIZE, RATIO, SLANT], vec![step; model.channels()])
 }
 
-/// The squared error that a bit is worth.
+/// The Lagrange multiplier lambda for a lattice: squared error per bit.
 pub(crate) fn lambda(lattice: &Lattice) -> f32 {
     LAMBDA * lattice.color[0] * lattice.color[0]
 }
 
-/// The class of precision for a Gaussian's strength: as many times as that is twice a step.
+/// The precision class for a Gaussian: the base-2 logarithm of its strength in steps of colour,
+/// rounded and clamped to 0 to [`MAX_CLASS`].
 pub(crate) fn class_of(gaussian: &Gaussian, lattice: &Lattice, model: ColorModel) -> u32 {
     let [l11, _, l22] = gaussian.cholesky;
     let squared = to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
@@ -53,25 +61,27 @@ pub(crate) fn class_of(gaussian: &Gaussian, lattice: &Lattice, model: ColorModel
     steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
 }
 
-/// What training has to do with bits: each component of a Gaussian takes about log2(1 + s^2) / 2 of
-/// them, s being its strength in steps, since steps of geometry get finer with it. So what is weak
-/// fades away, and what is strong gets there without others that cancel it.
+/// The rate term of the training loss. Every component of a Gaussian is taken to cost
+/// log2(1 + s^2) / 2 bits, where s is the Gaussian's strength in steps of colour: the steps of
+/// geometry get finer as it grows. The term makes weak Gaussians fade away, and keeps strong ones
+/// from growing only to cancel each other.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shrinkage {
+pub(crate) struct RateTerm {
     squared_step: f32,
     weight: f32,
 }
 
-impl Shrinkage {
-    /// For `count` Gaussians that leave a squared error.
+impl RateTerm {
+    /// The term for `count` Gaussians whose picture has the squared error `error`.
     pub(crate) fn new(error: f64, count: usize, channels: usize) -> Self {
         let squared_step = (2.0 * step_for(error, count)).exp2() as f32;
         let components = (GEOMETRY + channels) as f32;
-        let weight = SHRINKAGE * LAMBDA * components * (0.5 * core::f32::consts::LOG2_E);
+        let weight = RATE_WEIGHT * LAMBDA * components * (0.5 * core::f32::consts::LOG2_E);
         Self { squared_step, weight: weight * squared_step }
     }
 
-    /// Half of the derivative by the colour of what the Gaussian's bits are worth.
+    /// The gradient by the colour of half the rate term: the training loss is half the squared
+    /// error.
     pub(crate) fn gradient(&self, gaussian: &Gaussian) -> [f32; 4] {
         let [l11, _, l22] = gaussian.cholesky;
         let area = l11 * l22;
@@ -86,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shrinkage_is_the_derivative_of_bits() {
+    fn the_gradient_is_that_of_the_bits() {
         let gaussian = Gaussian {
             center: [3.0, 4.0],
             cholesky: [2.0, 0.3, 1.5],
@@ -94,18 +104,18 @@ mod tests {
         };
         let (error, count) = (3.0, 20);
         let lattice = lattice(step_for(error, count), ColorModel::Rgb);
-        let worth = |color: [f64; 4]| {
+        let rate_term = |color: [f64; 4]| {
             let squared = color.iter().map(|color| color * color).sum::<f64>() * 2.0 * 1.5;
             let steps = squared / f64::from(lattice.color[0]).powi(2);
             let bits = 8.0 * 0.5 * (1.0 + steps).log2();
-            f64::from(SHRINKAGE) * f64::from(lambda(&lattice)) * bits
+            f64::from(RATE_WEIGHT) * f64::from(lambda(&lattice)) * bits
         };
-        let gradient = Shrinkage::new(error, count, 3).gradient(&gaussian);
+        let gradient = RateTerm::new(error, count, 3).gradient(&gaussian);
         for channel in 0..3 {
-            let at = |off: f64| {
+            let at = |offset: f64| {
                 let mut color = gaussian.color.map(f64::from);
-                color[channel] += off;
-                worth(color)
+                color[channel] += offset;
+                rate_term(color)
             };
             let half = (at(1e-4) - at(-1e-4)) / 2e-4 / 2.0;
             let relative = f64::from(gradient[channel]) / half - 1.0;
@@ -115,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn classes_double() {
+    fn each_class_is_for_twice_the_strength() {
         let lattice = lattice(0.0, ColorModel::Gray);
         let class = |color: f32| {
             let cholesky = [4.0, 1.0, 1.0];

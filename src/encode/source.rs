@@ -13,7 +13,7 @@ pub struct Source<'a> {
     samples: SourceSamples<'a>,
 }
 
-/// SourceSamples of either depth.
+/// Samples of either depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SourceSamples<'a> {
     Eight(&'a [u8]),
@@ -21,10 +21,11 @@ pub(crate) enum SourceSamples<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// A picture of 8-bit samples: width x height x channels of them.
+    /// A picture of 8-bit samples, 0 to 255: width x height x channels of them, pixel after pixel.
     ///
     /// # Errors
-    /// When a side is not 1 to 2^20, or the number of samples does not fit.
+    /// [`SourceError::Size`] when a side is not 1 to 2^20 pixels long; [`SourceError::SampleCount`]
+    /// when there are not width x height x channels samples.
     pub fn new_u8(
         width: u32,
         height: u32,
@@ -35,7 +36,8 @@ impl<'a> Source<'a> {
         Ok(Self { width, height, color, samples: SourceSamples::Eight(samples) })
     }
 
-    /// A picture of 16-bit samples in the machine's byte order.
+    /// A picture of 16-bit samples, 0 to 65535: width x height x channels of them, pixel after
+    /// pixel.
     ///
     /// # Errors
     /// As [`Source::new_u8`].
@@ -61,7 +63,7 @@ impl<'a> Source<'a> {
         self.height
     }
 
-    /// What the channels mean.
+    /// The colour model: which channels there are, and in which order.
     #[must_use]
     pub fn color(&self) -> ColorModel {
         self.color
@@ -81,7 +83,7 @@ impl<'a> Source<'a> {
         self.samples
     }
 
-    /// The sample at an index of the interleaved order, with 16 bits.
+    /// The sample at an index in interleaved order, scaled to 16 bits.
     pub(crate) fn wide_sample(&self, index: usize) -> u16 {
         match self.samples {
             SourceSamples::Eight(samples) => u16::from(samples[index]) * 257,
@@ -90,6 +92,7 @@ impl<'a> Source<'a> {
     }
 }
 
+/// Refuses a side that is out of range, and a number of samples that the sides do not give.
 fn check(width: u32, height: u32, color: ColorModel, samples: usize) -> Result<(), SourceError> {
     if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
         return Err(SourceError::Size { width, height });

@@ -1,12 +1,12 @@
-//! Strips of a large picture.
+//! Division of a large picture into strips.
 
 use crate::region::Region;
 
-/// Pixels that are rendered and compared at a time, about: floats of a large picture are many, and
-/// the observer does not wait.
+/// Most pixels of a strip. It bounds the memory of a rendering to floats, and the time from one
+/// poll of the observer to the next.
 const STRIP_PIXELS: u32 = 1 << 20;
 
-/// A picture in strips of whole rows, which are rendered and compared one by one.
+/// The strips of a picture from top to bottom, each of whole rows.
 pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
     let rows = (STRIP_PIXELS / width).max(1);
     let region = move |y| Region { x: 0, y, width, height: rows.min(height - y) };

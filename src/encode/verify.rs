@@ -1,4 +1,5 @@
-//! What the file really shows: the encoder's figures come from its own decoder.
+//! Verification: the distortion of a file as its decoder renders it, which is what the encoder
+//! reports.
 
 use rayon::prelude::*;
 
@@ -10,19 +11,19 @@ use crate::decode::StreamDecoder;
 use crate::limits::Limits;
 use crate::render::{RenderOptions, Sample};
 
-/// A file, decoded again.
+/// A file that was decoded for comparison with its source.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
     stream: StreamDecoder,
     source: &'a Source<'a>,
 }
 
-/// How far the decoded picture is from the source.
+/// The distortion of the decoded picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Distortion {
-    /// Of samples of the source's depth, in dB.
+    /// PSNR in dB of samples rounded to the source's depth.
     pub(crate) psnr: f64,
-    /// Before rounding to samples, but clamped; in dB.
+    /// PSNR in dB of samples that are clamped, but not rounded.
     pub(crate) psnr_float: f64,
 }
 
@@ -34,12 +35,16 @@ impl<'a> Verified<'a> {
         Self { stream, source }
     }
 
-    /// Gaussians in the file.
+    /// Number of Gaussians in the file.
     pub(crate) fn gaussians(&self) -> u32 {
         self.stream.gaussians().len() as u32
     }
 
-    /// The distortion of the picture of the first `count` Gaussians.
+    /// The distortion of the picture that the first `count` Gaussians make, or all of them if there
+    /// are fewer.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn distortion(
         &self,
         count: u32,
@@ -84,7 +89,7 @@ impl<'a> Verified<'a> {
                 }
                 errors
             });
-            // In the order of the rows, whatever thread was first.
+            // Added row by row, so that the sums do not depend on the threads.
             for [by_samples, by_values] in errors.collect::<Vec<_>>() {
                 rounded += by_samples;
                 exact += by_values;

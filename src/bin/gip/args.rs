@@ -1,4 +1,4 @@
-//! What the command line accepts.
+//! The arguments of the command line, with their help texts.
 
 use core::num::NonZeroU32;
 use std::path::PathBuf;
@@ -7,21 +7,21 @@ use clap::{Parser, Subcommand, ValueEnum};
 use image_gip::{Precision, Region, Target};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Pictures as a few thousand 2D Gaussians: encodes, decodes, inspects and compares .gip files.
+/// Encodes, decodes, inspects and compares .gip files: pictures made of 2D Gaussians.
 #[derive(Debug, Parser)]
 #[command(
     version,
     arg_required_else_help = false,
     after_help = "\
 Examples:
-  gip encode photo.jpg photo.gip                     a sensible quality
+  gip encode photo.jpg photo.gip                     a medium quality
   gip encode photo.png small.gip --size 20000        a file of 20,000 bytes
   gip decode photo.gip photo.png                     back to pixels
-  gip decode photo.gip thumb.png --size 160x120      a thumbnail, straight from the Gaussians
-  gip info photo.gip                                 what the file holds
-  gip compare photo.png photo.gip                    how close they are
+  gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
+  gip info photo.gip                                 what the file contains
+  gip compare photo.png photo.gip                    how much they differ
 
-Wherever a file is read or written, `-` is standard input or standard output.
+In place of any file, `-` is standard input or standard output.
 Exit status: 0 for success, 1 for failure, 2 for wrong usage."
 )]
 pub(crate) struct Args {
@@ -37,19 +37,19 @@ pub(crate) enum Command {
     Compare(Compare),
 }
 
-/// Turns a picture into a .gip file.
+/// Encodes a picture as a .gip file.
 ///
 /// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS, ICO, farbfeld, OpenEXR, Radiance
-/// HDR and .gip, with 8 or 16 bits, gray or RGB, with or without alpha. Gray stays gray; alpha is
-/// dropped where every pixel is opaque; pictures of floats (OpenEXR, HDR) are taken as linear
-/// light, clipped and stored as 16-bit sRGB. An Exif orientation is applied to the pixels, and the
-/// tag in the stored Exif is reset. ICC profile, Exif and XMP are carried over.
+/// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
+/// Alpha is dropped if every pixel is opaque. Samples that are floats (OpenEXR, HDR) are taken as
+/// linear light, clipped, and stored as 16-bit sRGB. An Exif orientation is applied to the pixels,
+/// and the tag in the stored Exif is reset. ICC profile, Exif and XMP are stored.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
     after_help = "\
 At most one of --gaussians, --bpp, --size, --psnr and --quality may be given. If the target cannot
-be met, the file comes as close as it can and the report says why."
+be met, the file comes as close as possible, and the report gives the reason."
 )]
 pub(crate) struct Encode {
     /// The picture, or `-` for standard input.
@@ -65,42 +65,48 @@ pub(crate) struct Encode {
     /// How the Gaussians are stored.
     #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
     pub(crate) precision: PrecisionArg,
-    /// Write OUTPUT whatever its name; without this it must end in .gip.
+    /// Write OUTPUT even if its name does not end in .gip.
     #[arg(long)]
     pub(crate) force: bool,
-    /// Seed of everything random; the same picture, options and seed give the same file.
+    /// Seed of the random numbers; the same picture, options and seed give the same file.
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub(crate) seed: u64,
     #[command(flatten)]
     pub(crate) threads: ThreadCount,
     /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.
     ///
-    /// Fields: width, height, gaussians, bytes, bpp (bits per pixel of the whole file), psnr (dB,
-    /// of the decoded file), psnr_float (dB, before rounding to samples), iterations, evaluations
-    /// (of the kernel, in training), seconds, peak_memory (bytes), shortfall (null, or why the
-    /// target was not met). A PSNR that is infinite (an exact copy) is given as 999.
+    /// Fields: width, height, gaussians (their number), bytes, bpp (bits per pixel of the whole
+    /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples),
+    /// iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
+    /// (in bytes), shortfall (null, or why the target was not met). An infinite PSNR, of an exact
+    /// copy, is given as 999.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// What the file shall meet. Without any of them: a sensible quality, the same as --quality 50.
+/// The target that the file has to meet. Without any of them it is --quality 50.
 #[derive(Debug, clap::Args)]
 #[group(multiple = false)]
 pub(crate) struct TargetArgs {
     /// At most N Gaussians, from 1 to 4194304.
-    #[arg(long, help_heading = "Targets", value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
+    #[arg(long, help_heading = "Targets", value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
     gaussians: Option<u32>,
-    /// A file of B bits per pixel, from 0.0001 to 1000.
-    #[arg(long, help_heading = "Targets", value_name = "B", value_parser = |text: &str| number(text, 0.0001, 1000.0))]
+    /// A file of at most B bits per pixel, from 0.0001 to 1000.
+    #[arg(long, help_heading = "Targets", value_name = "B",
+          value_parser = |text: &str| number(text, 0.0001, 1000.0))]
     bpp: Option<f64>,
-    /// A file of BYTES bytes.
-    #[arg(long, help_heading = "Targets", value_name = "BYTES", value_parser = clap::value_parser!(u64).range(1..))]
+    /// A file of at most BYTES bytes, from 1 to 1073741824.
+    #[arg(long, help_heading = "Targets", value_name = "BYTES",
+          value_parser = clap::value_parser!(u64).range(1..))]
     size: Option<u64>,
     /// A PSNR of the decoded file of DB decibels, from 1 to 120.
-    #[arg(long, help_heading = "Targets", value_name = "DB", value_parser = |text: &str| number(text, 1.0, 120.0))]
+    #[arg(long, help_heading = "Targets", value_name = "DB",
+          value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
     /// A quality from 0 (smallest) to 100 (best) [default: 50].
-    #[arg(long, help_heading = "Targets", value_name = "Q", value_parser = |text: &str| number(text, 0.0, 100.0))]
+    #[arg(long, help_heading = "Targets", value_name = "Q",
+          value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,
 }
 
@@ -119,11 +125,11 @@ impl TargetArgs {
 /// How the Gaussians are stored.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum PrecisionArg {
-    /// 32-bit floats: the fitted values themselves, several times as large
+    /// Packed coding with 32-bit floats: the fitted values themselves; files several times as large
     F32,
-    /// Quantization-aware training, codes of fixed bit depths
+    /// Packed coding: codes of fixed bit depths, after quantization-aware training
     Packed,
-    /// Rate-distortion optimised codes, entropy coded: smallest
+    /// Entropy coding: codes chosen by rate-distortion optimization; the smallest files
     Entropy,
 }
 
@@ -147,19 +153,19 @@ pub(crate) struct ThreadCount {
 }
 
 impl ThreadCount {
-    /// The pool in which the work is done.
+    /// The thread pool in which the work is done.
     pub(crate) fn pool(&self) -> Result<ThreadPool, ThreadPoolBuildError> {
         ThreadPoolBuilder::new().num_threads(self.count.map_or(0, usize::from)).build()
     }
 }
 
-/// Turns a .gip file into a picture.
+/// Decodes a .gip file to a picture.
 ///
-/// The format follows OUTPUT's extension: png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm,
-/// ppm, pnm or pam; on standard output it is PNG. Gray becomes RGB where the format knows no gray,
-/// and 16 bits become 8 where it knows no more; alpha is never dropped: a format that has none is
-/// refused for a picture that has it. ICC profile and Exif go into the formats that take them
-/// (PNG, JPEG, WebP; TIFF the profile only). An orientation in the file's Exif is applied.
+/// The extension of OUTPUT sets the format: png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm,
+/// ppm, pnm or pam. On standard output it is PNG. Gray becomes RGB if the format has no gray, and
+/// 16 bits become 8 if it has no more. Alpha is never dropped: a picture with alpha cannot be
+/// written in a format without it. ICC profile and Exif are written to formats that support them
+/// (PNG, JPEG, WebP; in TIFF only the profile). An orientation in the file's Exif is applied.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -174,55 +180,63 @@ pub(crate) struct Decode {
     pub(crate) input: PathBuf,
     /// The picture to write, or `-` for standard output (PNG).
     pub(crate) output: PathBuf,
-    /// Render F times as wide and high, from 0.001 to 1000. The Gaussians are evaluated at that
-    /// scale; no pixels are resampled.
+    /// Render F times as wide and high, from 0.001 to 1000. The Gaussians themselves are scaled; no
+    /// pixels are resampled.
     #[arg(long, value_name = "F", conflicts_with = "size",
           value_parser = |text: &str| number(text, 0.001, 1000.0))]
     pub(crate) scale: Option<f64>,
-    /// Render the whole picture W by H pixels large.
+    /// Render the whole picture at W by H pixels.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<(u32, u32)>,
-    /// Render only the W by H pixels from (X, Y) on, in pixels of the output at its scale.
+    /// Render only a region: the W by H pixels whose first one is (X, Y). Coordinates are pixels of
+    /// the output, after --scale or --size.
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) region: Option<Region>,
-    /// Write what can be shown of a file that is cut short or damaged, and warn, instead of
-    /// failing.
+    /// If the file is truncated or damaged, write the picture of the Gaussians that can be decoded,
+    /// and print a warning, instead of failing.
     #[arg(long)]
     pub(crate) allow_partial: bool,
     #[command(flatten)]
     pub(crate) threads: ThreadCount,
 }
 
-/// Shows what a .gip file holds.
+/// Shows what a .gip file contains.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Info {
     /// The .gip file, or `-` for standard input.
     pub(crate) file: PathBuf,
-    /// Print one JSON object: all header fields, bytes per kind of chunk, bits per Gaussian by
-    /// attribute, the quantizer of each component, sizes of the metadata.
+    /// Print one JSON object: the size of the file, all fields of the header, number and bytes of
+    /// the chunks of each type, bits per Gaussian by attribute, and sizes of the metadata.
+    ///
+    /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the
+    /// quantizer of each component of the packed coding; with the entropy coding it is empty.
+    /// `lattice_steps` has the quantization steps of the entropy coding; with the packed coding it
+    /// is null.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Measures how close two pictures are.
+/// Measures how much two pictures differ.
 ///
-/// Each may be a .gip file or any picture that `gip encode` reads. Their sizes must agree. They
-/// are compared with the channels and the depth of the richer one: gray is expanded to RGB,
-/// missing alpha is opaque (and an opaque one does not count), 8 bits become 16. PSNR and the largest error are over all samples of
-/// all channels; MS-SSIM is the mean over the channels, on up to five scales as the size allows.
+/// Each may be a .gip file or any picture that `gip encode` reads. They must have the same size. An
+/// alpha channel that is opaque everywhere is ignored. Both are converted to a colour model with the
+/// channels of both, and to the greater depth: gray becomes RGB, missing alpha becomes opaque, 8
+/// bits become 16. PSNR and the largest error are over all samples of all channels. MS-SSIM is the
+/// mean over the channels, on up to five scales, as the size allows.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Compare {
     /// A picture, or `-` for standard input.
     pub(crate) a: PathBuf,
     /// Another one.
     pub(crate) b: PathBuf,
-    /// Print one JSON object: width, height, channels, depth, psnr (dB), ms_ssim, max_abs_error
-    /// (in steps of that depth). For identical pictures, whose PSNR is infinite, psnr is 999.
+    /// Print one JSON object: width, height, channels, depth (bits per sample), psnr (in dB),
+    /// ms_ssim, max_abs_error (in quantization steps of that depth). The PSNR of identical
+    /// pictures, which is infinite, is given as 999.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// A finite number within bounds.
+/// Parses a number from `least` to `most`.
 fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -230,7 +244,7 @@ fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
         .ok_or_else(|| format!("not a number from {least} to {most}"))
 }
 
-/// `WxH`.
+/// Parses `WxH`.
 fn size(text: &str) -> Result<(u32, u32), String> {
     text.split_once('x')
         .and_then(|(width, height)| {
@@ -240,7 +254,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| "not two positive whole numbers such as 640x480".into())
 }
 
-/// `X,Y,W,H`.
+/// Parses `X,Y,W,H`.
 fn region(text: &str) -> Result<Region, String> {
     let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
     match numbers.as_deref() {

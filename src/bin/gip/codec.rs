@@ -1,4 +1,4 @@
-//! Formats that `gip decode` writes.
+//! The formats that `gip decode` writes.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -11,10 +11,10 @@ use image_gip::{ColorModel, SampleDepth};
 use crate::files;
 use crate::picture::{SampleSlice, StillImage};
 
-/// Quality of the JPEGs that are written: high, because the picture has been coded once already.
+/// Quality of JPEG files: high, because the picture has coding errors already.
 const JPEG_QUALITY: u8 = 95;
 
-/// A format of output.
+/// An output format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Codec {
     Bmp,
@@ -22,13 +22,13 @@ pub(crate) enum Codec {
     Gif,
     Ico,
     Jpeg,
-    /// A graymap.
+    /// Netpbm's graymap.
     Pgm,
-    /// A pixmap.
+    /// Netpbm's pixmap.
     Ppm,
-    /// A graymap or a pixmap.
+    /// Netpbm's graymap or pixmap.
     Pnm,
-    /// An arbitrary map.
+    /// Netpbm's arbitrary map.
     Pam,
     Png,
     Qoi,
@@ -38,7 +38,7 @@ pub(crate) enum Codec {
 }
 
 impl Codec {
-    /// The format that a path's extension names. Standard output is PNG.
+    /// The format that the extension of a path names; PNG for standard output.
     pub(crate) fn of(path: &Path) -> Result<Self> {
         if files::is_standard_stream(path) {
             return Ok(Self::Png);
@@ -67,7 +67,7 @@ impl Codec {
         })
     }
 
-    /// The colour models that the format has, narrowest first.
+    /// The colour models that the format has, those with the fewest channels first.
     fn colors(self) -> &'static [ColorModel] {
         use ColorModel::{Gray, GrayAlpha, Rgb, Rgba};
         match self {
@@ -92,7 +92,8 @@ impl Codec {
         }
     }
 
-    /// The narrowest model that holds all channels of a picture, and the depth nearest to its own.
+    /// The format's colour model with the fewest channels that holds all channels of a picture, and
+    /// the picture's depth, or the format's if it lacks that one.
     pub(crate) fn choose(
         self,
         color: ColorModel,
@@ -114,7 +115,7 @@ impl Codec {
         Ok((chosen, if depths.contains(&depth) { depth } else { depths[0] }))
     }
 
-    /// Encodes a picture whose colour model and depth are as [`Codec::choose`] chose them.
+    /// Encodes a picture of the colour model and depth that [`Codec::choose`] returned.
     pub(crate) fn encode(self, picture: &StillImage) -> Result<Vec<u8>> {
         let mut out = Cursor::new(Vec::new());
         match self {
@@ -135,7 +136,7 @@ impl Codec {
         Ok(out.into_inner())
     }
 
-    /// Netpbm, which `image` does not write with 16 bits in all its variants.
+    /// Encodes a Netpbm format; `image` does not write all of them with 16 bits.
     fn netpbm(self, picture: &StillImage) -> Vec<u8> {
         let (width, height) = (picture.image.width(), picture.image.height());
         let (color, full) = (picture.color(), (1_u32 << picture.depth().bits()) - 1);
@@ -167,7 +168,7 @@ impl Codec {
 }
 
 fn write(mut encoder: impl ImageEncoder, picture: &StillImage) -> Result<()> {
-    // Encoders that cannot take a kind of metadata refuse it here; it is left out then.
+    // An encoder that does not support a kind of metadata refuses it here; it is not written then.
     if let Some(profile) = &picture.metadata.icc_profile {
         let _ = encoder.set_icc_profile(profile.clone());
     }

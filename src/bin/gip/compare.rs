@@ -21,7 +21,7 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
         let ((w, h), (v, g)) = (size(&a), size(&b));
         bail!("the sizes differ: {w}x{h} and {v}x{g}");
     }
-    // An opaque alpha channel is as good as none, and `encode` stores none.
+    // `encode` does not store an opaque alpha channel.
     a.drop_opaque_alpha();
     b.drop_opaque_alpha();
     let color = widest(a.color(), b.color());

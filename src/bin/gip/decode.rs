@@ -26,7 +26,7 @@ pub(crate) fn run(args: &args::Decode) -> Result<()> {
     output.write(&codec.encode(&picture)?)
 }
 
-/// What the arguments ask for, from a file that is sound; layers that do not show are left out.
+/// Decodes a valid file. Layers that are not visible in the region are skipped.
 fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> {
     let context = || files::input_name(&args.input);
     let mut decoder = Decoder::new(file).with_context(context)?;
@@ -41,12 +41,12 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     Ok(StillImage { image: image.with_context(context)?, metadata })
 }
 
-/// The same of what is sound of a file, with a warning.
+/// Decodes as many Gaussians of an invalid file as possible, and prints a warning.
 fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> {
     let name = files::input_name(&args.input);
     let mut stream = StreamDecoder::new();
     let Err(error) = stream.feed(file).and_then(|_| stream.finish()) else {
-        // It is the request that cannot be met.
+        // The file is valid, so the error is in the request.
         return decode(args, codec, file);
     };
     let Some(picture) = stream.picture() else { return Err(error).context(name) };
@@ -63,7 +63,7 @@ fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<Stil
     Ok(StillImage { image: image?, metadata: stream.metadata().clone() })
 }
 
-/// What is to be rendered, with samples that the output's format can hold.
+/// The options of the rendering, with the colour model and depth that the output format has.
 struct Wanted {
     options: RenderOptions,
     width: u32,
@@ -126,9 +126,9 @@ impl Wanted {
     }
 }
 
-/// The size of the whole output; `None` is the stored one.
+/// The size of the whole output; `None` for the stored size.
 fn output_size(args: &args::Decode, header: &Header) -> Option<(u32, u32)> {
-    // A side that does not fit saturates, and the limits refuse it.
+    // The cast of a side that is too long saturates, and the limits refuse it.
     let scaled = |side: u32, scale: f64| (f64::from(side) * scale).round().max(1.0) as u32;
     args.size
         .or(args.scale.map(|scale| (scaled(header.width, scale), scaled(header.height, scale))))

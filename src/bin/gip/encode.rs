@@ -12,7 +12,7 @@ use crate::args;
 use crate::files::{self, Output};
 use crate::picture::{SampleSlice, StillImage};
 
-/// What JSON says for an infinite PSNR, which JSON cannot.
+/// What stands for an infinite PSNR in JSON, which has no infinity.
 const INFINITE_PSNR: f64 = 999.0;
 
 pub(crate) fn run(args: &args::Encode) -> Result<()> {
@@ -46,20 +46,21 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     files::print(&text, Some(&args.output))
 }
 
-/// Refuses a name that says that the file is something else: programs believe it.
+/// Refuses a name with another extension than .gip: programs would take the file for another
+/// format.
 fn check_name(output: &Output) -> Result<()> {
     let Output::Regular { path, .. } = output else { return Ok(()) };
     let extension = path.extension().unwrap_or_default();
     if !extension.eq_ignore_ascii_case("gip") {
         bail!(
-            "{}: this writes .gip files only; give it a name that ends in .gip, or say --force",
+            "{}: gip encode writes .gip files only; use a name that ends in .gip, or --force",
             path.display()
         );
     }
     Ok(())
 }
 
-/// Encodes with a progress bar, which shows itself on a terminal only.
+/// Encodes with a progress bar, which is visible on a terminal only.
 fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left")?;
     let bar = ProgressBar::new(0).with_style(style);
@@ -110,7 +111,7 @@ impl Report {
         }
     }
 
-    /// The same for humans.
+    /// The report as text.
     fn to_line(&self, output: &Path, psnr: f64) -> String {
         let Self { width, height, gaussians, bytes, bpp, seconds, .. } = self;
         let mut line = format!(
@@ -130,7 +131,7 @@ pub(crate) fn bits_per_pixel(bytes: usize, width: u32, height: u32) -> f64 {
     bytes as f64 * 8.0 / (f64::from(width) * f64::from(height))
 }
 
-/// A PSNR as JSON gives it.
+/// A PSNR for JSON output.
 pub(crate) fn json_psnr(psnr: f64) -> f64 {
     psnr.min(INFINITE_PSNR)
 }

@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-/// Whether a path stands for standard input or output. The devices count too: where they lead to
-/// a regular file, it must not be replaced under whoever opened it.
+/// Whether a path stands for standard input or output. So do the devices: if they are redirected to
+/// a regular file, that file must not be replaced while another program has it open.
 pub(crate) fn is_standard_stream(path: &Path) -> bool {
     ["-", "/dev/stdin", "/dev/stdout"].iter().any(|name| path.as_os_str() == *name)
 }
 
-/// What messages call the source of an input.
+/// The name of an input in messages.
 pub(crate) fn input_name(path: &Path) -> String {
     if is_standard_stream(path) { "standard input".into() } else { path.display().to_string() }
 }
 
-/// What messages call the destination of an output.
+/// The name of an output in messages.
 pub(crate) fn output_name(path: &Path) -> String {
     if is_standard_stream(path) { "standard output".into() } else { path.display().to_string() }
 }
@@ -32,8 +32,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).with_context(|| input_name(path))
 }
 
-/// Prints text to standard output, or to standard error where the former carries a file. A reader
-/// that has closed the pipe wants no more, which is no failure.
+/// Prints text to standard output, or to standard error if the output file goes to standard output.
+/// It is not an error if the reader has closed the pipe.
 pub(crate) fn print(text: &str, output: Option<&Path>) -> Result<()> {
     let written = if output.is_some_and(is_standard_stream) {
         writeln!(io::stderr(), "{text}")
@@ -46,8 +46,8 @@ pub(crate) fn print(text: &str, output: Option<&Path>) -> Result<()> {
     }
 }
 
-/// Where a result goes. A regular file appears under its name only when it is complete: on any
-/// failure an existing file is as it was, and a new one is not there.
+/// The destination of a result. A regular file gets its name only when it is complete: after a
+/// failure, an existing file is unchanged, and a new one does not exist.
 #[derive(Debug)]
 pub(crate) enum Output {
     /// Standard output.
@@ -59,13 +59,13 @@ pub(crate) enum Output {
 }
 
 impl Output {
-    /// Finds out what stands at `path`, so that what cannot be written is known before the work.
+    /// Checks what is at `path`, so that an error is reported before the work is done.
     pub(crate) fn new(path: &Path) -> Result<Self> {
         if is_standard_stream(path) {
             return Ok(Self::Standard);
         }
         let context = || output_name(path);
-        // Through a symbolic link, the file that it leads to is written, and the link stays.
+        // The target of a symbolic link is written, and the link stays.
         let path = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => bail!("{} is a directory", path.display()),
             Ok(metadata) if !metadata.is_file() => return Ok(Self::Special(path.to_owned())),
@@ -106,7 +106,7 @@ impl Output {
 fn replace(path: &Path, directory: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".gip-");
-    // Temporary files are private; this one is to be as public as the user's mask allows.
+    // By default, temporary files are private; this one gets the permissions of a new file.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.tempfile_in(directory)?;

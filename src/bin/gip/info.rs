@@ -43,14 +43,14 @@ struct Info {
     base_color: Vec<u16>,
     chunks: Vec<Chunk>,
     bits_per_gaussian: BitsPerGaussian,
-    /// With coding "packed".
+    /// Of the packed coding; empty with the entropy coding.
     components: Vec<Component>,
-    /// With coding "entropy".
+    /// Of the entropy coding; `None` with the packed coding.
     lattice_steps: Option<LatticeSteps>,
     metadata: Metadata,
 }
 
-/// The chunks of one type; their bytes include length, type and CRC.
+/// The chunks of one type. Their bytes include length, type and CRC.
 #[derive(Debug, Serialize)]
 struct Chunk {
     kind: String,
@@ -60,9 +60,10 @@ struct Chunk {
 
 #[derive(Debug, Serialize)]
 struct BitsPerGaussian {
-    /// All bits of the chunks that hold Gaussians, by Gaussian; `None` without Gaussians.
+    /// The bits of all `GAUS` chunks, framing included, divided by the number of Gaussians; `None`
+    /// without Gaussians.
     coded: Option<f64>,
-    /// The sum of all below.
+    /// The sum of the attributes below.
     total: f64,
     position: f64,
     precision: f64,
@@ -81,7 +82,7 @@ struct Component {
     offset: Option<f32>,
 }
 
-/// What a unit of each code stands for.
+/// The quantization steps of the entropy coding (spec, section 7.5).
 #[derive(Debug, Serialize)]
 struct LatticeSteps {
     position: f32,
@@ -98,7 +99,7 @@ impl From<image_gip::LatticeSteps> for LatticeSteps {
     }
 }
 
-/// Bytes of each kind of metadata.
+/// Sizes in bytes of each kind of metadata.
 #[derive(Debug, Serialize)]
 struct Metadata {
     icc_profile: Option<usize>,
@@ -247,7 +248,7 @@ impl Display for Info {
             ),
         )?;
         if let Some(coded) = bits.coded {
-            row("  as coded", &format_args!("{coded:.2} with all framing"))?;
+            row("  with framing", &format_args!("{coded:.2}"))?;
         }
         if let Some(LatticeSteps { position, size, ratio, slant, color }) = &self.lattice_steps {
             row(

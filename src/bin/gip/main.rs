@@ -19,11 +19,11 @@ use image_gip::EncodeError;
 use args::{Args, Command};
 
 fn main() -> ExitCode {
-    // Lets `image` read .gip wherever the tool takes a picture.
+    // With this, `image` reads .gip too.
     image_gip::register();
     let args = match Args::try_parse() {
         Ok(args) => args,
-        // Help and version are no errors.
+        // Help and version are not errors.
         Err(error) if !error.use_stderr() => error.exit(),
         Err(error) => {
             eprintln!("{}", first_paragraph(&error.render().to_string()));
@@ -46,14 +46,13 @@ fn main() -> ExitCode {
     }
 }
 
-/// What is wrong with the arguments, on one line: `clap` goes on with tips and usage.
+/// The first paragraph of an error of `clap`, on one line: tips and usage follow it.
 fn first_paragraph(text: &str) -> String {
     let paragraph = text.split("\n\n").next().unwrap_or_default();
     paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// An error and its causes on one line. Many libraries repeat a cause in their own text; it is
-/// said once.
+/// An error and its causes on one line. A cause that the text of an error repeats is printed once.
 fn one_line(error: &anyhow::Error) -> String {
     let mut line = String::new();
     for cause in error.chain() {

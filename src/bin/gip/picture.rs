@@ -1,4 +1,4 @@
-//! Pictures in memory: reading them, and changing their colour model and depth.
+//! Pictures in memory: reading them, and converting their colour model and depth.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -10,16 +10,15 @@ use image_gip::{ColorModel, Metadata, SampleDepth};
 
 use crate::files;
 
-/// Most bytes that reading a picture may take: 2^30 pixels of RGB at 8 bits, and more than the
-/// tool's other parts would care to hold.
+/// Most bytes that reading a picture may take: enough for 2^30 pixels of RGB at 8 bits.
 const MAX_MEMORY: u64 = 4 << 30;
-/// Longest side that a .gip file can have.
+/// Longest side of a .gip file, in pixels.
 const MAX_SIDE: u32 = 1 << 20;
 
-/// A picture, upright, and what came with it.
+/// A picture, with its Exif orientation applied, and its metadata.
 #[derive(Debug)]
 pub(crate) struct StillImage {
-    /// Gray or RGB with or without alpha, 8 or 16 bits: one of eight of the variants.
+    /// Gray or RGB, with or without alpha, 8 or 16 bits: `image` has eight variants for these.
     pub(crate) image: DynamicImage,
     pub(crate) metadata: Metadata,
 }
@@ -37,7 +36,7 @@ impl StillImage {
         let name = || files::input_name(path);
         let bytes = files::read(path)?;
         let mut reader = ImageReader::new(Cursor::new(bytes));
-        // Some formats have no signature; for them the extension counts.
+        // A format without a signature is recognized by its extension.
         if let Ok(format) = ImageFormat::from_path(path) {
             reader.set_format(format);
         }
@@ -67,8 +66,8 @@ impl StillImage {
         Ok(picture)
     }
 
-    /// Applies an orientation to the pixels, and resets the Exif tag that may have asked for it,
-    /// so that nobody applies it again.
+    /// Applies an orientation to the pixels, and resets the orientation in the Exif, so that it is
+    /// not applied again.
     pub(crate) fn make_upright(&mut self, orientation: Orientation) {
         self.image.apply_orientation(orientation);
         if let Some(exif) = &mut self.metadata.exif {
@@ -76,14 +75,14 @@ impl StillImage {
         }
     }
 
-    /// Drops a profile that is for another colour space than the samples are in, such as that of
-    /// a CMYK picture that was converted to RGB.
+    /// Drops an ICC profile for another colour space than that of the samples, such as the profile
+    /// of a CMYK picture that was converted to RGB.
     pub(crate) fn drop_foreign_profile(&mut self) {
         let expected: &[u8] = if self.color().channels() < 3 { b"GRAY" } else { b"RGB " };
         self.metadata.icc_profile.take_if(|profile| profile.get(16..20) != Some(expected));
     }
 
-    /// What the channels mean.
+    /// The colour model.
     pub(crate) fn color(&self) -> ColorModel {
         match self.image.color().channel_count() {
             1 => ColorModel::Gray,
@@ -129,8 +128,8 @@ impl StillImage {
         }
     }
 
-    /// Changes colour model and depth. A model with the missing channels, or a greater depth,
-    /// changes no value; gray and alpha are expanded.
+    /// Converts colour model and depth. Adding channels or increasing the depth is lossless: gray
+    /// is repeated as red, green and blue, missing alpha is opaque, and 8-bit samples are scaled.
     pub(crate) fn convert(&mut self, color: ColorModel, depth: SampleDepth) {
         if (color, depth) == (self.color(), self.depth()) {
             return;
@@ -149,7 +148,7 @@ impl StillImage {
     }
 }
 
-/// The narrowest model that has the channels of both.
+/// The colour model with the fewest channels that has those of both.
 pub(crate) fn widest(a: ColorModel, b: ColorModel) -> ColorModel {
     match (a.channels().max(b.channels()) >= 3, a.has_alpha() || b.has_alpha()) {
         (false, false) => ColorModel::Gray,
@@ -163,8 +162,8 @@ fn is_opaque<T: PartialEq>(samples: &[T], channels: usize, full: &T) -> bool {
     samples.iter().skip(channels - 1).step_by(channels).all(|alpha| alpha == full)
 }
 
-/// Some writers put the JPEG marker's own prefix before the TIFF stream that Exif is. What is no
-/// TIFF stream then is dropped.
+/// The TIFF stream of Exif metadata: some programs write the prefix of JPEG's Exif marker before
+/// it. `None` for anything else.
 fn tiff_stream(mut exif: Vec<u8>) -> Option<Vec<u8>> {
     if exif.starts_with(b"Exif\0\0") {
         exif.drain(..6);
@@ -172,8 +171,8 @@ fn tiff_stream(mut exif: Vec<u8>) -> Option<Vec<u8>> {
     (exif.starts_with(b"II") || exif.starts_with(b"MM")).then_some(exif)
 }
 
-/// The picture with samples that a .gip file can hold: floats are taken as linear light, clipped
-/// to what can be shown and encoded as 16-bit sRGB.
+/// The picture with samples that a .gip file can hold: floats are taken as linear light, encoded as
+/// sRGB, and clipped and rounded to 16 bits.
 fn stored_samples(image: DynamicImage) -> DynamicImage {
     let encode = |linear: f32| match linear {
         0.003_130_8.. => 1.055 * linear.powf(1.0 / 2.4) - 0.055,

@@ -1,4 +1,4 @@
-//! The layers of a file, as `layers::plan` has them.
+//! Gaussians divided into the layers of a file, as `layers::plan` plans them, and coded.
 
 use rayon::prelude::*;
 
@@ -10,7 +10,7 @@ use crate::gaussian::MAX_COMPONENTS;
 use crate::layers::bounds::LayerBounds;
 use crate::layers::plan;
 
-/// The payloads of the layers of a packed file, from codes in its order.
+/// The payloads of the layers of a packed file, from codes in the order of the file.
 pub(super) fn write_packed_layers(
     codes: &[[u32; MAX_COMPONENTS]],
     quantizers: &[Quantizer],
@@ -24,7 +24,7 @@ pub(super) fn write_packed_layers(
     plan::packed_layers(codes.len()).into_iter().map(layer).collect()
 }
 
-/// The bytes that the layers of `count` Gaussians add to a packed file.
+/// Bytes that the layers of `count` Gaussians take in a packed file, their framing included.
 pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
     let layer = |count| {
         FRAMING as u64 + packed::LAYER_PREFIX + packed::packed_length(quantizers, count as u32)
@@ -32,16 +32,18 @@ pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u6
     plan::packed_layers(count).into_iter().map(layer).sum()
 }
 
-/// The layers of an entropy-coded file; sorts and rounds the codes as the file has them.
+/// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds
+/// their centres to their position intervals, as the decoder reads them.
 pub(crate) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
 ) -> Vec<EncodedLayer> {
-    entropy_layers(coder, codes).into_par_iter().map(|codes| coder.write(codes)).collect()
+    divide(coder, codes).into_par_iter().map(|codes| coder.write(codes)).collect()
 }
 
-/// Where each layer of an entropy-coded file shows, as its file says it; `None` where it does not.
-pub(super) fn bounds(
+/// The payload of `bNDS`: the bounds of every layer (spec, section 5.6). `None` for a file of so
+/// few layers that it has no `bNDS`. The codes are in the order of the layers.
+pub(super) fn bounds_payload(
     coder: &LayerCoder<'_>,
     codes: &[Code],
     layers: &[EncodedLayer],
@@ -64,9 +66,9 @@ pub(super) fn bounds(
     Some(bounds)
 }
 
-/// Cuts codes into the layers of an entropy-coded file: the strongest ones first, the others by where
-/// they are.
-fn entropy_layers<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
+/// Divides codes into the layers of an entropy-coded file: first the strongest ones, then the
+/// others by position.
+fn divide<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
     codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
@@ -74,15 +76,15 @@ fn entropy_layers<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a 
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {
         let (part, later) = rest.split_at_mut(first);
-        cut(coder, part, most, &mut layers);
+        divide_by_position(coder, part, most, &mut layers);
         rest = later;
     }
-    cut(coder, rest, most, &mut layers);
+    divide_by_position(coder, rest, most, &mut layers);
     layers
 }
 
-/// Cuts codes into layers of at most so many, by where they are.
-fn cut<'a>(
+/// Divides codes by position into layers of `most` codes; the last layer may have fewer.
+fn divide_by_position<'a>(
     coder: &LayerCoder<'_>,
     mut rest: &'a mut [Code],
     most: usize,
@@ -125,7 +127,7 @@ mod tests {
                 ..Code::default()
             };
             let mut codes: Vec<Code> = (0..count).map(|_| code()).collect();
-            let layers = entropy_layers(&coder, &mut codes);
+            let layers = divide(&coder, &mut codes);
             let sizes: Vec<usize> = layers.iter().map(|layer| layer.len()).collect();
             assert_eq!(sizes.iter().sum::<usize>(), count);
             assert_eq!(sizes.len(), number, "{sizes:?}");

@@ -1,4 +1,4 @@
-//! Codes to layers to bytes (spec, sections 4 to 7).
+//! Writing files: codes to layers, layers to chunks (spec, sections 4 to 7).
 
 mod layers;
 
@@ -13,7 +13,7 @@ use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::kernel::Kernel;
 
-/// All of a file but its Gaussians.
+/// The header and the metadata of a file, which its codes complete.
 #[derive(Debug)]
 pub(crate) struct FileLayout<'a> {
     header: Header,
@@ -21,7 +21,7 @@ pub(crate) struct FileLayout<'a> {
 }
 
 impl<'a> FileLayout<'a> {
-    /// `mean` is the mean of each channel.
+    /// `mean` is the mean of each channel, where a full sample is 1; it becomes the base colour.
     pub(crate) fn new(
         source: &Source<'_>,
         mean: [f32; 4],
@@ -45,17 +45,18 @@ impl<'a> FileLayout<'a> {
         Self { header, metadata }
     }
 
-    /// The header, but for the numbers of Gaussians and layers.
+    /// The header. Its coding and its numbers of Gaussians and layers are those of an empty packed
+    /// file.
     pub(crate) fn header(&self) -> &Header {
         &self.header
     }
 
-    /// The colour that Gaussians are added to, as the decoder has it.
+    /// The base colour to which Gaussians are added, rounded as in the header.
     pub(crate) fn base(&self) -> [f32; 4] {
         self.header.base()
     }
 
-    /// The file of packed Gaussians.
+    /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
     pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
         let PackedCodes { quantizers, codes } = self.ordered(packed);
         let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
@@ -64,7 +65,7 @@ impl<'a> FileLayout<'a> {
         self.write(&header, &quantization, None, &layers)
     }
 
-    /// The file of entropy-coded Gaussians.
+    /// A file with the entropy coding.
     pub(crate) fn write_entropy(&self, coded: &LatticeCodes) -> Vec<u8> {
         let header = Header {
             coding: Coding::Entropy,
@@ -75,12 +76,12 @@ impl<'a> FileLayout<'a> {
         let coder = LayerCoder::new(&coded.lattice, &header);
         let mut codes = coded.codes.clone();
         let layers = write_entropy_layers(&coder, &mut codes);
-        let bounds = layers::bounds(&coder, &codes, &layers, &header);
+        let bounds = layers::bounds_payload(&coder, &codes, &layers, &header);
         let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
         self.write(&header, &coded.lattice.to_payload(), bounds, &payloads)
     }
 
-    /// The chunks of a file, whatever its coding.
+    /// A file of either coding, from the payloads of its chunks.
     fn write(
         &self,
         header: &Header,
@@ -104,7 +105,8 @@ impl<'a> FileLayout<'a> {
         file.finish()
     }
 
-    /// Refuses a size that is less than a file takes without any Gaussian.
+    /// Refuses a target of `bytes` that is smaller than `least`, the size of a file without
+    /// Gaussians.
     pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), OptionError> {
         if bytes < least {
             return Err(OptionError::Size { bytes, least });
@@ -112,14 +114,14 @@ impl<'a> FileLayout<'a> {
         Ok(())
     }
 
-    /// The bytes of a packed file without any Gaussian.
+    /// Size in bytes of a packed file without Gaussians.
     pub(crate) fn least_length(&self, quantizers: &[Quantizer]) -> u64 {
         let empty = PackedCodes { quantizers: quantizers.to_vec(), codes: Vec::new() };
         self.write_packed(&empty).len() as u64
     }
 
-    /// The Gaussian that adds most to the picture first, so that every prefix of the file is a
-    /// picture.
+    /// The codes sorted by the importance of their Gaussians, largest first, so that every prefix
+    /// of the file is a picture.
     pub(crate) fn ordered(&self, fitted: &PackedCodes) -> PackedCodes {
         let mut order: Vec<_> = fitted
             .codes
@@ -145,17 +147,16 @@ impl<'a> FileLayout<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coding::entropy::{CenterGrid, Code};
     use crate::color::ColorModel;
     use crate::decode::Decoder;
     use crate::encode::rate_model;
-
-    use crate::coding::entropy::{CenterGrid, Code};
     use crate::region::Region;
     use crate::render::RenderOptions;
 
     const SIDES: [u32; 2] = [900, 700];
 
-    /// A file of so many Gaussians, some of them beside the picture.
+    /// A file of random Gaussians, some of them outside the picture.
     fn file(count: usize) -> Vec<u8> {
         let [width, height] = SIDES;
         let samples = vec![9; (width * height) as usize];
@@ -186,15 +187,16 @@ mod tests {
         })
     }
 
-    /// The samples of a region, and how many Gaussians are kept decoded.
+    /// The samples of a region, and how many Gaussians the decoder keeps. If `all`, it decodes the
+    /// whole file first.
     fn decoded(file: &[u8], options: &RenderOptions, all: bool) -> (Vec<u8>, usize) {
-        let mut decoder = Decoder::new(file).expect("it begins well");
+        let mut decoder = Decoder::new(file).expect("the header is valid");
         if all {
-            decoder.read_to_end().expect("it is sound");
+            decoder.read_to_end().expect("the file is valid");
         }
         decoder.set_options(options.clone());
-        let mut samples = vec![0; decoder.output_len().expect("it fits")];
-        decoder.decode_into(&mut samples).expect("it is sound");
+        let mut samples = vec![0; decoder.output_len().expect("it is within the limits")];
+        decoder.decode_into(&mut samples).expect("the file is valid");
         (samples, decoder.stream().gaussians().len())
     }
 
@@ -207,13 +209,13 @@ mod tests {
             let options = options.with_region(region);
             let (expected, gaussians) = decoded(&file, &options, true);
             assert_eq!(gaussians, 33_000);
-            // Those that were decoded for the region alone are not kept.
+            // Gaussians that are decoded for a region alone are not kept.
             assert_eq!(decoded(&file, &options, false), (expected, 0), "{region:?}");
         }
     }
 
     #[test]
-    fn few_layers_say_nothing_of_where_they_show() {
+    fn a_file_of_few_layers_has_no_bounds_and_is_decoded_whole() {
         let options = RenderOptions::new().with_region(Region { x: 0, y: 0, width: 9, height: 9 });
         assert_eq!(decoded(&file(3000), &options, false).1, 3000);
     }

@@ -1,24 +1,24 @@
-//! How many Gaussians a picture gets.
+//! The budget: how many Gaussians a picture gets.
 
-/// What decides the number of Gaussians.
+/// What sets the number of Gaussians. Errors are sums of squared errors, where a full sample is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Budget {
-    /// This many.
+    /// This many Gaussians.
     Count(usize),
-    /// As many as bring the sum of squared errors down to this.
+    /// As many Gaussians as bring the error down to this.
     Error(f64),
-    /// As many as leave this much of the sum of squared errors per Gaussian: the same slope of
-    /// error against count for every picture, so a simple one gets few.
+    /// As many Gaussians as leave this error per Gaussian. The slope of the error over the number
+    /// of Gaussians is then the same for every picture, so simple pictures get few.
     ErrorPerGaussian(f64),
 }
 
-/// The sum of squared errors falls about with this power of the count (Kodak, 1,000 to 10,000
-/// Gaussians).
+/// The error is about proportional to the number of Gaussians to the power of -`POWER` (Kodak,
+/// 1,000 to 10,000 Gaussians).
 const POWER: f64 = 1.1;
 
 impl Budget {
-    /// The count that seems right, given that `count` Gaussians will leave an error of about
-    /// `error`; at most `most`.
+    /// The number of Gaussians that is expected to meet the budget, extrapolated from `count`
+    /// Gaussians with an error of `error`; at most `most`.
     pub(crate) fn wanted(self, count: usize, error: f64, most: usize) -> usize {
         let ratio = match self {
             Self::Count(wanted) => return wanted.min(most),
@@ -27,7 +27,7 @@ impl Budget {
                 (error / count.max(1) as f64 / target).powf(1.0 / (POWER + 1.0))
             }
         };
-        // A float's cast saturates; of NaN it is zero, and a target of zero wants all there are.
+        // The cast of a float saturates, and that of NaN gives 0. A target of 0 gives `most`.
         let wanted = (count.max(1) as f64 * ratio).ceil() as usize;
         wanted.min(most)
     }

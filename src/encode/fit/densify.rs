@@ -1,67 +1,69 @@
-//! Distortion-driven densification: where new Gaussians go and what they start as (paper, section
-//! "Distortion Driven Densification").
+//! Distortion-driven densification, D3: the positions, shapes and colours of new Gaussians (paper,
+//! section "Distortion Driven Densification"; the variance of their shapes: section "Content Aware
+//! Gaussian Filters").
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::adam::{Domain, Row};
 use super::parameterization;
 use super::pass::Pass;
+use super::row::{Row, RowBounds};
 use super::training::{Densification, Distortion, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Gaussians whose peak is below this share of a full sample are useless: a 16th of a step of 8
-/// bits.
-pub(crate) const USELESS_COLOR: f32 = 1.0 / 4096.0;
+/// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
+/// pruned: a 16th of the quantization step of 8 bits.
+pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
 
-/// Where a new Gaussian goes.
+/// The position of a new Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Spot {
+struct NewPosition {
+    /// Index of the pixel that is its centre.
     pixel: u32,
-    /// The variance that it is born with, as a share of the filter's, in (0, 1]. Where a small part
-    /// of a picture has all of its distortion, hundreds of Gaussians of the same size as elsewhere
-    /// would lie on top of each other, take steps in the same direction, and never come to rest.
-    room: f32,
+    /// Its variance as a share of the filter's, in (0, 1]. Where a small part of a picture has
+    /// nearly all of the distortion, hundreds of Gaussians with the full variance would overlap
+    /// there, take steps in the same direction, and never converge.
+    variance_share: f32,
 }
 
-/// Where a picture stands when Gaussians are added.
+/// What the positions, shapes and colours of new Gaussians depend on.
 #[derive(Debug)]
-pub(crate) struct Site<'a> {
+pub(crate) struct Densifier<'a> {
     pub(crate) options: &'a Densification,
     pub(crate) filter: GaussianFilter,
     pub(crate) raster: &'a Raster,
     /// The last pass over the picture.
     pub(crate) pass: &'a Pass,
-    pub(crate) bounds: Domain,
-    /// Gaussians that are there already.
-    pub(crate) present: usize,
+    pub(crate) bounds: RowBounds,
+    /// Number of Gaussians before.
+    pub(crate) count: usize,
 }
 
-impl Site<'_> {
-    /// Up to `count` new Gaussians where the picture is worst. Fewer where there is nothing left
-    /// to correct.
-    pub(crate) fn newcomers(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
-        let spots = match self.options.placement {
-            Placement::Top => top(count, &self.map()),
+impl Densifier<'_> {
+    /// Up to `count` new Gaussians where the distortion is large. There are fewer where fewer
+    /// pixels have any distortion.
+    pub(crate) fn new_gaussians(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+        let positions = match self.options.placement {
+            Placement::Top => top(count, &self.distortion_map()),
             Placement::Spread => {
-                spread(count, self.raster.width, self.tiles(), rng.f64(), |tile| {
+                spread(count, self.raster.width, self.tile_grid(), rng.f64(), |tile| {
                     self.distortions(tile)
                 })
             }
         };
-        let total = self.present + spots.len();
+        let total = self.count + positions.len();
         let variance = self
             .filter
             .variance(self.raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        spots.into_iter().map(|spot| self.born(&spot, variance, rng)).collect()
+        positions.into_iter().map(|position| self.new_gaussian(&position, variance, rng)).collect()
     }
 
-    /// A new Gaussian, of so much variance where it has all the room.
-    fn born(&self, spot: &Spot, variance: f32, rng: &mut fastrand::Rng) -> Row {
-        let (pixel, variance) = (spot.pixel as usize, variance * spot.room);
+    /// A new Gaussian, where `variance` is the filter's.
+    fn new_gaussian(&self, position: &NewPosition, variance: f32, rng: &mut fastrand::Rng) -> Row {
+        let (pixel, variance) = (position.pixel as usize, variance * position.variance_share);
         let (x, y) = (pixel % self.raster.width, pixel / self.raster.width);
         let mut row = [0.0; MAX_COMPONENTS];
         row[0] = x as f32 + 0.5;
@@ -84,18 +86,18 @@ impl Site<'_> {
                 NewColor::Residual(share) => -share * residual[channel],
             };
         }
-        self.bounds.confined(row)
+        self.bounds.clamped(row)
     }
 
-    /// Columns and rows of tiles.
-    fn tiles(&self) -> [usize; 2] {
+    /// Numbers of columns and rows of tiles.
+    fn tile_grid(&self) -> [usize; 2] {
         [self.raster.width.div_ceil(TILE_WIDTH), self.raster.height.div_ceil(TILE_HEIGHT)]
     }
 
     /// The distortion of every pixel, row by row.
-    fn map(&self) -> Vec<f32> {
+    fn distortion_map(&self) -> Vec<f32> {
         let mut map = vec![0.0; self.raster.pixels()];
-        let [columns, _] = self.tiles();
+        let [columns, _] = self.tile_grid();
         let rows = map.par_chunks_mut(self.raster.width * TILE_HEIGHT).enumerate();
         rows.for_each(|(row, lines)| {
             for column in 0..columns {
@@ -111,35 +113,35 @@ impl Site<'_> {
         map
     }
 
-    /// The distortion of every pixel of a tile; 0 where the output could not be improved.
+    /// The distortion of every pixel of a tile; 0 where the output is exact already.
     fn distortions(&self, tile: usize) -> TilePlane {
         let residuals = self.pass.residuals(tile, self.raster.channels);
-        let measure = |measure: &dyn Fn(f32, f32) -> f32| -> TilePlane {
+        let over_channels = |combine: &dyn Fn(f32, f32) -> f32| -> TilePlane {
             let mut plane = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
             for residual in residuals {
                 for (value, residual) in
                     plane.as_flattened_mut().iter_mut().zip(residual.as_flattened())
                 {
-                    *value = measure(*value, residual.abs());
+                    *value = combine(*value, residual.abs());
                 }
             }
             plane
         };
         let mut distortions = match self.options.distortion {
-            Distortion::L1 => measure(&|sum, residual| sum + residual),
+            Distortion::L1 => over_channels(&|sum, residual| sum + residual),
             Distortion::L3 => {
-                let mut plane = measure(&|sum, residual| sum + residual * residual);
+                let mut plane = over_channels(&|sum, residual| sum + residual * residual);
                 for value in plane.as_flattened_mut() {
                     *value *= value.sqrt();
                 }
                 plane
             }
         };
-        let worst = measure(&f32::max);
-        let pixels = distortions.as_flattened_mut().iter_mut().zip(worst.as_flattened());
-        for (value, &worst) in pixels {
-            // Less than half a step of the source's depth: exact after rounding.
-            if worst < self.raster.half_step {
+        let largest = over_channels(&f32::max);
+        let pixels = distortions.as_flattened_mut().iter_mut().zip(largest.as_flattened());
+        for (value, &largest) in pixels {
+            // A residual of less than half a quantization step disappears when samples are rounded.
+            if largest < self.raster.half_step {
                 *value = 0.0;
             }
         }
@@ -147,53 +149,57 @@ impl Site<'_> {
     }
 }
 
-/// The pixels of largest distortion, the first of equals, with all the room, as the paper has it.
-fn top(count: usize, map: &[f32]) -> Vec<Spot> {
+/// [`Placement::Top`]: the `count` pixels of largest distortion, with the full variance. Of pixels
+/// with equal distortion, the first ones are taken.
+fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
     let mut order: Vec<u32> = (0..map.len() as u32).filter(|&at| map[at as usize] > 0.0).collect();
-    let worst =
+    let descending =
         |a: &u32, b: &u32| map[*b as usize].total_cmp(&map[*a as usize]).then_with(|| a.cmp(b));
     if count < order.len() {
-        order.select_nth_unstable_by(count, worst);
+        order.select_nth_unstable_by(count, descending);
         order.truncate(count);
     }
-    order.sort_unstable_by(worst);
-    order.into_iter().map(|pixel| Spot { pixel, room: 1.0 }).collect()
+    order.sort_unstable_by(descending);
+    order.into_iter().map(|pixel| NewPosition { pixel, variance_share: 1.0 }).collect()
 }
 
-/// Up to `count` pixels, in every part of the picture as many as it has of the distortion: at equal
-/// steps of the distortion summed up along a Z curve of tiles. `phase` in [0, 1) shifts them all.
+/// [`Placement::Spread`]: up to `count` pixels, whose density is proportional to the distortion.
+/// They lie at equal steps of the distortion's sum along a Z curve of tiles; `phase`, in [0, 1),
+/// shifts all of them by a part of a step.
 ///
-/// A tile with more than the mean of the distortion has that much less room for each. Born with the
-/// root of it, they overlap but can come to rest: as small as their room, short runs do not get them
-/// to grow in time (0.5 dB less at effort 2).
+/// Where a tile has r times the mean distortion, and r is more than 1, each new Gaussian has 1/r of
+/// the area that it would have on average. Its variance is smaller by the square root of r: they
+/// overlap, but they converge. A variance smaller by r itself is too small to grow in a short run
+/// (0.5 dB less at effort 2).
 fn spread(
     count: usize,
     width: usize,
     [columns, rows]: [usize; 2],
     phase: f64,
     distortions: impl Fn(usize) -> TilePlane + Sync,
-) -> Vec<Spot> {
-    // Summed up by tile first, on all threads; only tiles with a step in them are looked into.
+) -> Vec<NewPosition> {
+    // The tiles are summed up on all threads; then only those that contain a step are visited.
     let sum_of =
         |tile| distortions(tile).as_flattened().iter().map(|&value| f64::from(value)).sum();
     let sums: Vec<f64> = (0..columns * rows).into_par_iter().map(sum_of).collect();
     let total: f64 = sums.iter().sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
     let (mut sum, mut next) = (0.0, phase * step);
-    let mut spots = Vec::new();
+    let mut positions = Vec::new();
     along_z([0, 0], [columns, rows], &mut |column, row| {
         let tile = row * columns + column;
         let end = sum + sums[tile];
         if end > next {
-            let room = (mean / sums[tile]).sqrt().min(1.0) as f32;
+            let variance_share = (mean / sums[tile]).sqrt().min(1.0) as f32;
             let first = row * TILE_HEIGHT * width + column * TILE_WIDTH;
             for (y, line) in distortions(tile).iter().enumerate() {
                 for (x, &value) in line.iter().enumerate() {
                     sum += f64::from(value);
-                    // What is not to be improved, or not of the picture, is never chosen.
+                    // Pixels that are exact or outside the picture have no distortion.
                     if sum > next && value > 0.0 {
-                        spots.push(Spot { pixel: (first + y * width + x) as u32, room });
-                        // A pixel of more than one step gets one Gaussian.
+                        let pixel = (first + y * width + x) as u32;
+                        positions.push(NewPosition { pixel, variance_share });
+                        // A pixel that contains several steps gets one Gaussian.
                         next += step * ((sum - next) / step).ceil();
                     }
                 }
@@ -201,10 +207,10 @@ fn spread(
         }
         sum = end;
     });
-    spots
+    positions
 }
 
-/// Visits the points of a rectangle along a Z curve: neighbours follow each other closely.
+/// Visits the points of a rectangle along a Z curve, on which neighbours follow each other closely.
 fn along_z([x, y]: [usize; 2], [width, height]: [usize; 2], visit: &mut impl FnMut(usize, usize)) {
     if width.max(height) <= 1 {
         if width.min(height) == 1 {
@@ -221,8 +227,8 @@ fn along_z([x, y]: [usize; 2], [width, height]: [usize; 2], visit: &mut impl FnM
     }
 }
 
-/// The paper's random covariance plus the filter's variance. Three random numbers need not be a
-/// covariance; those that are none are drawn again.
+/// [`NewShape::Random`]: random shape values, plus the filter's variance. In the paper's
+/// parameterization, not every draw is a covariance; an invalid one is drawn again.
 fn random_shape(
     parameterization: Parameterization,
     variance: f32,
@@ -231,7 +237,7 @@ fn random_shape(
     loop {
         let mut shape = Vec3::new(rng.f32(), rng.f32(), rng.f32());
         for (value, positive) in
-            shape.as_mut().iter_mut().zip(parameterization::logarithmic(parameterization))
+            shape.as_mut().iter_mut().zip(parameterization::is_logarithmic(parameterization))
         {
             *value += if positive { 0.5 } else { 0.0 };
         }
@@ -249,8 +255,8 @@ fn random_shape(
 mod tests {
     use super::*;
 
-    fn pixels(spots: &[Spot]) -> Vec<u32> {
-        spots.iter().map(|spot| spot.pixel).collect()
+    fn pixels(positions: &[NewPosition]) -> Vec<u32> {
+        positions.iter().map(|position| position.pixel).collect()
     }
 
     #[test]
@@ -258,7 +264,7 @@ mod tests {
         let map = [0.0, 3.0, 1.0, 3.0, 0.0, 2.0];
         assert_eq!(pixels(&top(3, &map)), [1, 3, 5]);
         assert_eq!(pixels(&top(1, &map)), [1]);
-        // What is exact gets no Gaussian, however many are asked for.
+        // Exact pixels get no Gaussian, however many are asked for.
         assert_eq!(pixels(&top(10, &map)), [1, 3, 5, 2]);
     }
 
@@ -269,16 +275,16 @@ mod tests {
 
     #[test]
     fn spread_pixels_follow_the_distortion() {
-        // Left half: weak; right half: three times as much.
+        // The right half has three times the distortion of the left one.
         let width = 50;
-        let spots = spread(397, width, [4, 5], 0.5, |tile| {
+        let positions = spread(397, width, [4, 5], 0.5, |tile| {
             tile_of(tile % 4, |x| match x {
                 0..25 => 1.0,
                 25..50 => 3.0,
                 _ => 0.0,
             })
         });
-        let pixels = pixels(&spots);
+        let pixels = pixels(&positions);
         assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
         sorted.sort_unstable();
@@ -286,7 +292,7 @@ mod tests {
         assert_eq!(sorted.len(), pixels.len(), "each at most once");
         let right = pixels.iter().filter(|&&at| at as usize % width >= 25).count();
         assert!((290..=305).contains(&right), "{right}");
-        // Evenly: every tile has its share.
+        // Every tile has its share.
         for (column, share) in [(0, 12.7), (2, 38.1)] {
             for row in 0..5 {
                 let inside = |at: &&u32| {
@@ -298,17 +304,18 @@ mod tests {
             }
         }
         // A tile has a distortion of 200 on average; the third column of tiles has 384 in each.
-        for spot in &spots {
-            match spot.pixel as usize % width {
-                0..16 => assert_eq!(spot.room, 1.0),
-                32..48 => assert!((spot.room.powi(2) - 200.0 / 384.0).abs() < 1e-6, "{spot:?}"),
-                _ => assert!(spot.room > 0.0 && spot.room <= 1.0, "{spot:?}"),
+        for position in &positions {
+            let share = position.variance_share;
+            match position.pixel as usize % width {
+                0..16 => assert_eq!(share, 1.0),
+                32..48 => assert!((share.powi(2) - 200.0 / 384.0).abs() < 1e-6, "{position:?}"),
+                _ => assert!(share > 0.0 && share <= 1.0, "{position:?}"),
             }
         }
     }
 
     #[test]
-    fn spread_leaves_out_what_is_exact() {
+    fn spread_skips_exact_pixels() {
         let exact = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
         assert!(spread(10, 7, [1, 1], 0.0, |_| exact).is_empty());
         let mut map = exact;

@@ -1,105 +1,106 @@
-//! Quantization-aware training with LSQ+: learnable scale and offset per component, straight-
-//! through rounding (paper, section "Compression Framework"; Bhalgat et al., LSQ+, 2020).
+//! Quantization-aware training (QAT) with LSQ+: every component has a learnable scale and offset,
+//! and gradients pass the rounding by the straight-through estimator (paper, section "Compression
+//! Framework"; Bhalgat et al., LSQ+, 2020).
 //!
-//! What training sees is what the file stores: values go through the very quantizers that are
-//! written and the very function that the decoder calls.
+//! Training renders exactly what the file will hold: the values pass through the same quantizers
+//! that the file stores, and are decoded by the same function that the decoder calls.
 
-use super::adam::{Domain, Row};
 use super::parameterization;
+use super::row::{Row, RowBounds};
 use super::training;
 use crate::coding::packed::{MAX_PARAMETER, Quantizer, UniformQuantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 
-/// The quantizers of all components while they are trained.
+/// The quantizers of all components during training.
 #[derive(Clone, Debug)]
 pub(crate) struct LsqQuantizers {
-    components: Vec<Component>,
+    components: Vec<LsqQuantizer>,
     parameterization: Parameterization,
-    steps: i32,
+    /// Steps of Adam so far.
+    age: i32,
 }
 
+/// The quantizer of one component during training.
 #[derive(Clone, Copy, Debug)]
-struct Component {
-    steps: UniformQuantizer,
-    /// The logarithm of the least value, for components that are quantized by their logarithm.
-    least: Option<f32>,
-    /// The offset is kept a multiple of the scale, so that zero has a code of its own.
+struct LsqQuantizer {
+    quantizer: UniformQuantizer,
+    /// For a logarithmic quantizer, the logarithm of the least value.
+    min_logarithm: Option<f32>,
+    /// Whether the offset is kept a multiple of the scale, so that a code stands for exactly 0.
     has_zero: bool,
-    /// Adam's means and mean squares of the gradients by scale and offset.
+    /// Adam's moving averages of the gradients by scale and offset, and of their squares.
     mean: [f32; 2],
     square: [f32; 2],
 }
 
-/// Gradients by the scale and the offset of every component.
+/// Gradients by the scale and the offset of every component's quantizer.
 pub(crate) type QuantizerGradients = [[f32; 2]; MAX_COMPONENTS];
 
 impl LsqQuantizers {
-    /// LsqQuantizers that cover `rows`.
-    pub(crate) fn new(rows: &[Row], bounds: Domain, options: &training::Quantization) -> Self {
-        let logarithmic = parameterization::logarithmic(bounds.parameterization);
-        // Variances are squares of deviations.
+    /// Quantizers whose ranges cover `rows`, except for outliers of colour.
+    pub(crate) fn new(rows: &[Row], bounds: RowBounds, options: &training::Quantization) -> Self {
+        let is_logarithmic = parameterization::is_logarithmic(bounds.parameterization);
+        // A variance is the square of a deviation.
         let power = if bounds.parameterization == Parameterization::Covariance { 2.0 } else { 1.0 };
-        let least = power * parameterization::MIN_DEVIATION.ln();
+        let min_logarithm = power * parameterization::MIN_DEVIATION.ln();
         let components = (0..5 + bounds.channels).map(|index| {
-            let (bits, least, has_zero) = match index {
+            let (bits, min_logarithm, has_zero) = match index {
                 0 | 1 => (options.position_bits, None, false),
                 2..5 => {
                     let has_zero =
                         bounds.parameterization == Parameterization::Covariance && index == 3;
-                    (options.shape_bits, logarithmic[index - 2].then_some(least), has_zero)
+                    let min_logarithm = is_logarithmic[index - 2].then_some(min_logarithm);
+                    (options.shape_bits, min_logarithm, has_zero)
                 }
                 _ => (options.color_bits, None, false),
             };
-            let values = rows.iter().map(|row| domain(row[index], least));
-            let (low, high) = if index < 5 { range(values) } else { bulk(values) };
-            let mut component = Component {
-                steps: UniformQuantizer { bits, scale: 1.0, offset: low },
-                least,
+            let values = rows.iter().map(|row| to_uniform(row[index], min_logarithm));
+            let (low, high) = if index < 5 { range(values) } else { three_sigma_range(values) };
+            let mut component = LsqQuantizer {
+                quantizer: UniformQuantizer { bits, scale: 1.0, offset: low },
+                min_logarithm,
                 has_zero,
                 mean: [0.0; 2],
                 square: [0.0; 2],
             };
-            component.steps.scale = (high - low) / component.steps.max_code() as f32;
-            component.confine();
+            component.quantizer.scale = (high - low) / component.quantizer.max_code() as f32;
+            component.clamp();
             component
         });
-        Self {
-            components: components.collect(),
-            parameterization: bounds.parameterization,
-            steps: 0,
-        }
+        Self { components: components.collect(), parameterization: bounds.parameterization, age: 0 }
     }
 
     /// The quantizers as the file stores them.
     pub(crate) fn stored(&self) -> Vec<Quantizer> {
-        self.components.iter().map(Component::stored).collect()
+        self.components.iter().map(LsqQuantizer::stored).collect()
     }
 
-    /// The codes of a Gaussian. Where rounding makes its shape none that is drawn, the covariance
-    /// moves towards the axes until it is.
+    /// The codes of a Gaussian. If rounding makes a covariance invalid, the code of its
+    /// off-diagonal entry moves towards that of 0 until the covariance is valid.
     pub(crate) fn codes(&self, row: &Row) -> [u32; MAX_COMPONENTS] {
         let mut codes = [0; MAX_COMPONENTS];
         for ((code, &value), component) in codes.iter_mut().zip(row).zip(&self.components) {
-            *code = component.steps.code(domain(value, component.least));
+            *code = component.quantizer.code(to_uniform(value, component.min_logarithm));
         }
         if self.parameterization == Parameterization::Covariance && !self.is_drawable(&codes) {
-            // Zero covariance is always sound; find the sound code next to the rounded one.
-            let mut sound = self.components[3].steps.code(0.0);
-            let mut unsound = codes[3];
-            while sound.abs_diff(unsound) > 1 {
-                codes[3] = u32::midpoint(sound, unsound);
+            // An off-diagonal entry of 0 is always valid: bisect between its code and the rounded
+            // one.
+            let mut valid = self.components[3].quantizer.code(0.0);
+            let mut invalid = codes[3];
+            while valid.abs_diff(invalid) > 1 {
+                codes[3] = u32::midpoint(valid, invalid);
                 if self.is_drawable(&codes) {
-                    sound = codes[3];
+                    valid = codes[3];
                 } else {
-                    unsound = codes[3];
+                    invalid = codes[3];
                 }
             }
-            codes[3] = sound;
+            codes[3] = valid;
         }
         codes
     }
 
-    /// The values that the codes of a Gaussian stand for.
+    /// The values that the codes of a Gaussian stand for, computed as the decoder does.
     pub(crate) fn decoded(&self, codes: &[u32; MAX_COMPONENTS]) -> Row {
         let mut row = [0.0; MAX_COMPONENTS];
         for ((value, &code), component) in row.iter_mut().zip(codes).zip(&self.components) {
@@ -108,48 +109,53 @@ impl LsqQuantizers {
         row
     }
 
-    /// Turns the gradient by decoded values into the gradient by the trained ones, and returns
-    /// the gradients by scales and offsets.
+    /// The backward pass through the quantizers of a Gaussian, with the straight-through estimator.
+    ///
+    /// `row` holds the trained values and `decoded` the decoded ones. `gradient` is by the decoded
+    /// values before and by the trained ones after. Returns the gradients by scales and offsets.
     pub(crate) fn backward(
         &self,
         row: &Row,
         decoded: &Row,
         gradient: &mut Row,
     ) -> QuantizerGradients {
-        let mut by_steps = [[0.0; 2]; MAX_COMPONENTS];
+        let mut by_quantizer = [[0.0; 2]; MAX_COMPONENTS];
         for (index, component) in self.components.iter().enumerate() {
-            let UniformQuantizer { scale, offset, .. } = component.steps;
-            let max = component.steps.max_code() as f32;
-            let position = (domain(row[index], component.least) - offset) / scale;
-            let mut by_domain = gradient[index];
-            if component.least.is_some() {
-                by_domain *= decoded[index];
+            let UniformQuantizer { scale, offset, .. } = component.quantizer;
+            let max = component.quantizer.max_code() as f32;
+            // The code before it is clamped and rounded.
+            let code = (to_uniform(row[index], component.min_logarithm) - offset) / scale;
+            let mut by_uniform = gradient[index];
+            if component.min_logarithm.is_some() {
+                by_uniform *= decoded[index];
             }
-            by_steps[index] = if position < 0.0 {
-                [0.0, by_domain]
-            } else if position > max {
-                [by_domain * max, by_domain]
+            by_quantizer[index] = if code < 0.0 {
+                [0.0, by_uniform]
+            } else if code > max {
+                [by_uniform * max, by_uniform]
             } else {
-                [by_domain * (position.round_ties_even() - position), 0.0]
+                [by_uniform * (code.round_ties_even() - code), 0.0]
             };
-            gradient[index] = if (0.0..=max).contains(&position) {
-                by_domain / if component.least.is_some() { row[index] } else { 1.0 }
+            gradient[index] = if (0.0..=max).contains(&code) {
+                by_uniform / if component.min_logarithm.is_some() { row[index] } else { 1.0 }
             } else {
                 0.0
             };
         }
-        by_steps
+        by_quantizer
     }
 
-    /// Takes one step of Adam on scales and offsets.
+    /// Takes one step of Adam on scales and offsets, against gradients summed over `count`
+    /// Gaussians.
     pub(crate) fn step(&mut self, gradients: &QuantizerGradients, count: usize, rate: f32) {
-        self.steps += 1;
-        let unbias = [1.0 - 0.9_f32.powi(self.steps), 1.0 - 0.999_f32.powi(self.steps)];
+        self.age += 1;
+        let unbias = [1.0 - 0.9_f32.powi(self.age), 1.0 - 0.999_f32.powi(self.age)];
         for (component, gradient) in self.components.iter_mut().zip(gradients) {
             component.step(gradient, count, rate, unbias);
         }
     }
 
+    /// Whether codes stand for a valid Gaussian.
     fn is_drawable(&self, codes: &[u32; MAX_COMPONENTS]) -> bool {
         let row = self.decoded(codes);
         Gaussian::from_components(&row[..self.components.len()], self.parameterization)
@@ -157,18 +163,17 @@ impl LsqQuantizers {
     }
 }
 
-impl Component {
+impl LsqQuantizer {
     fn stored(&self) -> Quantizer {
-        match self.least {
-            Some(_) => Quantizer::Log(self.steps),
-            None => Quantizer::Linear(self.steps),
+        match self.min_logarithm {
+            Some(_) => Quantizer::Log(self.quantizer),
+            None => Quantizer::Linear(self.quantizer),
         }
     }
 
     fn step(&mut self, gradient: &[f32; 2], count: usize, rate: f32, unbias: [f32; 2]) {
-        // LSQ's scaling of the gradient, which keeps the steps of a plain optimizer in proportion
-        // to those of the weights; Adam normalizes it away.
-        let scaling = 1.0 / (count as f32 * self.steps.max_code() as f32).sqrt();
+        // LSQ's gradient scale. It matters to plain gradient descent; Adam normalizes it away.
+        let scaling = 1.0 / (count as f32 * self.quantizer.max_code() as f32).sqrt();
         let mut steps = [0.0; 2];
         for (index, gradient) in gradient.iter().enumerate() {
             let gradient = gradient * scaling;
@@ -180,35 +185,34 @@ impl Component {
                 steps[index] = rate * *mean / unbias[0] / root;
             }
         }
-        let scale = self.steps.scale;
-        self.steps.scale -= steps[0] * scale;
-        self.steps.offset -= steps[1] * scale;
-        self.confine();
+        let scale = self.quantizer.scale;
+        self.quantizer.scale -= steps[0] * scale;
+        self.quantizer.offset -= steps[1] * scale;
+        self.clamp();
     }
 
-    /// Keeps scale and offset within what a decoder accepts, and decoded values within what it
-    /// draws.
-    fn confine(&mut self) {
-        let UniformQuantizer { bits: _, scale, offset } = &mut self.steps;
+    /// Clamps scale and offset to what a decoder accepts, and so that decoded values are valid.
+    fn clamp(&mut self) {
+        let UniformQuantizer { bits: _, scale, offset } = &mut self.quantizer;
         *scale = scale.clamp(1e-9, MAX_PARAMETER);
         *offset = offset.clamp(-MAX_PARAMETER, MAX_PARAMETER);
-        if let Some(least) = self.least {
-            *offset = offset.max(least);
+        if let Some(min_logarithm) = self.min_logarithm {
+            *offset = offset.max(min_logarithm);
         }
         if self.has_zero {
-            let zero = (-*offset / *scale).round().clamp(0.0, self.steps.max_code() as f32);
-            self.steps.offset = -zero * self.steps.scale;
+            let zero = (-*offset / *scale).round().clamp(0.0, self.quantizer.max_code() as f32);
+            self.quantizer.offset = -zero * self.quantizer.scale;
         }
     }
 }
 
-/// A value in the domain in which it is quantized uniformly.
-fn domain(value: f32, least: Option<f32>) -> f32 {
-    // The bound serves the paper's covariance on its way out of the positive definite ones.
-    if least.is_some() { value.max(1e-9).ln() } else { value }
+/// What the uniform quantizer is applied to: the value, or its logarithm.
+fn to_uniform(value: f32, min_logarithm: Option<f32>) -> f32 {
+    // A variance of the paper's parameterization can be negative before it is pruned.
+    if min_logarithm.is_some() { value.max(1e-9).ln() } else { value }
 }
 
-/// The least and the largest value; [0, 0] of none.
+/// The least and the largest value; (0, 0) if there is none.
 fn range(values: impl Iterator<Item = f32>) -> (f32, f32) {
     values
         .fold(None, |range: Option<(f32, f32)>, value| match range {
@@ -218,9 +222,9 @@ fn range(values: impl Iterator<Item = f32>) -> (f32, f32) {
         .unwrap_or_default()
 }
 
-/// Three standard deviations to both sides of the mean, inside the range: LSQ+'s start for values
-/// with long tails.
-fn bulk(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
+/// Three standard deviations to both sides of the mean, but at most the range of the values: how
+/// LSQ+ initializes quantizers of values with long tails.
+fn three_sigma_range(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
     let (low, high) = range(values.clone());
     let count = values.clone().count().max(1) as f64;
     let mean = values.clone().map(f64::from).sum::<f64>() / count;
@@ -241,11 +245,12 @@ mod tests {
     const PARAMETERIZATIONS: [Parameterization; 3] =
         [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
-    fn bounds(parameterization: Parameterization) -> Domain {
-        Domain { parameterization, channels: 3, size: Vec2::new(300.0, 200.0) }
+    fn bounds(parameterization: Parameterization) -> RowBounds {
+        RowBounds { parameterization, channels: 3, size: Vec2::new(300.0, 200.0) }
     }
 
-    /// Sound Gaussians, from tiny to as large as the picture, needles among them.
+    /// Valid Gaussians, from tiny ones to ones as large as the picture, some of them very
+    /// elongated.
     fn rows(parameterization: Parameterization, count: usize, seed: u64) -> Vec<Row> {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut number = move |low: f32, high: f32| low + (high - low) * rng.f32();
@@ -263,7 +268,7 @@ mod tests {
                 for value in &mut row[5..8] {
                     *value = number(-0.5, 1.0);
                 }
-                bounds(parameterization).confined(row)
+                bounds(parameterization).clamped(row)
             })
             .collect()
     }
@@ -278,7 +283,7 @@ mod tests {
                 let mut options = Training::fast(1).quantization;
                 options.shape_bits = shape_bits;
                 let mut quantizers = LsqQuantizers::new(&rows, bounds(parameterization), &options);
-                // Scales and offsets as training may have moved them.
+                // Training moves scales and offsets.
                 let gradient = [[f32::from(drift as i8), -f32::from(drift as i8)]; MAX_COMPONENTS];
                 for _ in 0..5 {
                     quantizers.step(&gradient, rows.len(), 0.05);
@@ -287,24 +292,24 @@ mod tests {
                     let codes = quantizers.codes(row);
                     prop_assert!(quantizers.is_drawable(&codes), "{parameterization:?}: {row:?}");
                     for (code, component) in codes.iter().zip(&quantizers.components) {
-                        prop_assert!(*code <= component.steps.max_code());
+                        prop_assert!(*code <= component.quantizer.max_code());
                     }
                 }
             }
         }
 
         #[test]
-        fn rounding_errs_by_half_a_step(seed: u64) {
+        fn the_rounding_error_is_at_most_half_a_step(seed: u64) {
             let rows = rows(Parameterization::Cholesky, 40, seed);
             let options = Training::fast(1).quantization;
             let quantizers = LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
             for row in &rows {
                 let decoded = quantizers.decoded(&quantizers.codes(row));
-                // Position and shape cover their whole range; colours are clipped on purpose.
+                // The ranges of position and shape are covered; outliers of colour are clipped.
                 for (index, component) in quantizers.components.iter().enumerate().take(5) {
-                    let least = component.least;
-                    let error = domain(decoded[index], least) - domain(row[index], least);
-                    prop_assert!(error.abs() <= 0.501 * component.steps.scale + 1e-5);
+                    let uniform = |row: &Row| to_uniform(row[index], component.min_logarithm);
+                    let error = uniform(&decoded) - uniform(row);
+                    prop_assert!(error.abs() <= 0.501 * component.quantizer.scale + 1e-5);
                 }
             }
         }
@@ -316,9 +321,9 @@ mod tests {
         let options = Training::fast(1).quantization;
         let quantizers = LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
         // A colour inside, below and above the range.
-        let UniformQuantizer { scale, offset, .. } = quantizers.components[5].steps;
-        let max = quantizers.components[5].steps.max_code() as f32;
-        for (position, by_scale, by_offset, passes) in
+        let UniformQuantizer { scale, offset, .. } = quantizers.components[5].quantizer;
+        let max = quantizers.components[5].quantizer.max_code() as f32;
+        for (position, by_scale, by_offset, by_value) in
             [(3.25, -0.25, 0.0, 1.0), (-2.0, 0.0, 1.0, 0.0), (max + 2.0, max, 1.0, 0.0)]
         {
             let mut row = rows[0];
@@ -326,12 +331,12 @@ mod tests {
             let decoded = quantizers.decoded(&quantizers.codes(&row));
             let mut gradient = [0.0; MAX_COMPONENTS];
             gradient[5] = 2.0;
-            let by_steps = quantizers.backward(&row, &decoded, &mut gradient);
-            assert!((by_steps[5][0] - 2.0 * by_scale).abs() < 1e-3, "scale at {position}");
-            assert_eq!(by_steps[5][1], 2.0 * by_offset, "offset at {position}");
-            assert_eq!(gradient[5], 2.0 * passes, "value at {position}");
+            let by_quantizer = quantizers.backward(&row, &decoded, &mut gradient);
+            assert!((by_quantizer[5][0] - 2.0 * by_scale).abs() < 1e-3, "scale at {position}");
+            assert_eq!(by_quantizer[5][1], 2.0 * by_offset, "offset at {position}");
+            assert_eq!(gradient[5], 2.0 * by_value, "value at {position}");
         }
-        // Through the logarithm the gradient passes as if nothing had been rounded.
+        // A logarithmic quantizer passes the gradient as if nothing were rounded in the logarithm.
         let decoded = quantizers.decoded(&quantizers.codes(&rows[0]));
         let mut gradient = [1.0; MAX_COMPONENTS];
         quantizers.backward(&rows[0], &decoded, &mut gradient);

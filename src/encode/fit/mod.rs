@@ -1,4 +1,4 @@
-//! The training loop: from a picture to Gaussians (paper, section "Methodology").
+//! The training loop, which fits Gaussians to a picture (paper, section "Methodology").
 
 mod adam;
 mod bins;
@@ -7,17 +7,20 @@ mod densify;
 mod lsq;
 mod parameterization;
 mod pass;
+mod row;
 mod schedule;
 pub(crate) mod training;
+mod training_tile;
 
 use glam::Vec2;
 use rayon::prelude::*;
 
-use adam::{Domain, Parameters, Row, shape_of};
+use adam::Parameters;
 use budget::Budget;
-use densify::{Site, USELESS_COLOR};
+use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use pass::Pass;
+use row::{Row, RowBounds, shape_of};
 use schedule::TrainingSchedule;
 use training::{Portion, Training};
 
@@ -25,28 +28,30 @@ use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
 use super::progress::{Observer, Progress};
 use super::raster::Raster;
-use super::rate_model::Shrinkage;
+use super::rate_model::RateTerm;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::render::splat::Splat;
 
-/// How much the error is expected to fall by training alone, once growth has ended.
+/// The error after training as a share of the error during growth: training continues to lower the
+/// error when no more Gaussians are added.
 const FORESEEN: f64 = 0.75;
-/// Passes from one binning to the next, while no Gaussians come or go.
+/// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
-/// Gaussians that one thread prepares in one go.
+/// Gaussians that one task turns into splats.
 const CHUNK: usize = 512;
 
-/// What fits took.
+/// What fits have cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Work {
     pub(crate) iterations: u32,
+    /// Evaluations of the kernel, one for each pair of a Gaussian and a pixel.
     pub(crate) evaluations: u64,
-    /// Bytes.
+    /// In bytes.
     pub(crate) peak_memory: usize,
 }
 
-/// A picture being fitted.
+/// The Gaussians of a picture during training.
 #[derive(Debug)]
 pub(crate) struct Fit<'a> {
     raster: &'a Raster,
@@ -54,15 +59,17 @@ pub(crate) struct Fit<'a> {
     budget: Budget,
     precision: Precision,
     base: [f32; 4],
-    bounds: Domain,
+    bounds: RowBounds,
     parameters: Parameters,
+    /// Those of quantization-aware training, once it has started.
     quantizers: Option<LsqQuantizers>,
+    /// The state of least error since Gaussians were last added or removed.
     best: Option<Snapshot>,
     pass: Pass,
-    /// Passes for which the bins are good yet.
+    /// Passes for which the present bins remain valid.
     binned_for: u32,
     splats: Vec<Splat>,
-    /// Sum of squared errors of the last pass.
+    /// The sum of squared errors of the last pass.
     error: f64,
     work: Work,
     rng: fastrand::Rng,
@@ -92,7 +99,7 @@ impl<'a> Fit<'a> {
             budget,
             precision,
             base,
-            bounds: Domain {
+            bounds: RowBounds {
                 parameterization: training.parameterization,
                 channels: raster.channels,
                 size: Vec2::new(raster.width as f32, raster.height as f32),
@@ -168,7 +175,8 @@ impl<'a> Fit<'a> {
         self.settle(observer)
     }
 
-    /// The best Gaussians so far.
+    /// The best Gaussians so far as codes of the packed coding: those of the trained quantizers, or
+    /// floats.
     pub(crate) fn fitted(&self) -> PackedCodes {
         let empty = Snapshot { error: 0.0, rows: Vec::new(), quantizers: None };
         let Snapshot { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
@@ -184,7 +192,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The best Gaussians so far, as they are.
+    /// The best Gaussians so far, without quantization.
     pub(crate) fn gaussians(&self) -> Vec<Gaussian> {
         let rows = self.best.as_ref().map_or(&[][..], |best| &best.rows);
         let components = 5 + self.raster.channels;
@@ -193,31 +201,34 @@ impl<'a> Fit<'a> {
         rows.iter().map(gaussian).collect()
     }
 
-    /// The squared error of the best Gaussians.
+    /// The sum of squared errors of the best Gaussians so far.
     pub(crate) fn best_error(&self) -> f64 {
         self.best.as_ref().map_or(self.error, |best| best.error)
     }
 
-    /// What training has taken so far.
+    /// What training has cost so far.
     pub(crate) fn work(&self) -> Work {
         self.work
     }
 
+    /// Number of Gaussians.
     pub(crate) fn len(&self) -> usize {
         self.parameters.len()
     }
 
-    /// Most Gaussians that this picture may get: one per pixel.
+    /// Most Gaussians that the picture may get: one per pixel.
     pub(crate) fn most(&self) -> usize {
         self.raster.pixels().min(MAX_GAUSSIANS as usize)
     }
 
-    /// The count that the budget asks for, if training lowers the error by `foreseen`.
+    /// The number of Gaussians that the budget sets, if training changes the error by the factor
+    /// `foreseen`.
     fn wanted(&self, foreseen: f64) -> usize {
         self.budget.wanted(self.parameters.len(), self.error * foreseen, self.most())
     }
 
-    /// How many Gaussians to add if `kept` are to stay, with so many steps to come after this one.
+    /// How many Gaussians this growth step adds. `kept` Gaussians remain when the surplus has been
+    /// culled; `steps_left` growth steps follow this one.
     fn portion(&self, kept: usize, steps_left: u32) -> usize {
         let densification = &self.training.densification;
         let grown = kept as f64 * (1.0 + f64::from(densification.surplus));
@@ -230,8 +241,9 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// One iteration: a pass, and a step of everything that is trained. If `settled`, the values
-    /// of the pass are kept where they are the best so far.
+    /// One iteration: a pass, and a step of the optimizer, where `factor` scales all learning
+    /// rates. `iterations` is how many are planned in total, for the progress report. If `settled`,
+    /// the state before the step may become the best so far.
     fn iterate(
         &mut self,
         factor: f32,
@@ -241,9 +253,9 @@ impl<'a> Fit<'a> {
     ) -> Result<(), EncodeError> {
         self.forward(observer)?;
         if settled {
-            self.remember();
+            self.keep_if_best();
         }
-        observer.tell(Progress {
+        observer.report(Progress {
             iteration: self.work.iterations,
             iterations,
             gaussians: self.parameters.len() as u32,
@@ -256,7 +268,7 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    /// Renders what the file would hold now, and takes the gradient.
+    /// Renders the Gaussians as the file would store them, and computes error and gradients.
     fn forward(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         let components = 5 + self.raster.channels;
@@ -284,28 +296,28 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    /// Carries the pass's gradients on to the trained values and the quantizers, and takes a step
-    /// of both.
+    /// The rest of the backward pass, from the gradients by splats to those by trained values and
+    /// quantizers, and a step of the optimizer against both.
     fn step(&mut self, factor: f32) {
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let options = &self.training.optimizer;
-        let shrinkage = (self.precision == Precision::Entropy)
-            .then(|| Shrinkage::new(self.error, self.len(), channels));
+        let rate_term = (self.precision == Precision::Entropy)
+            .then(|| RateTerm::new(self.error, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
             self.parameters.step(options, self.bounds, factor, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
                 let by_splat = pass.gradient(index, channels);
                 let (center, shape) =
-                    by_splat.moments.gradients(parameterization, shape_of(&decoded));
+                    by_splat.geometry.gradients(parameterization, shape_of(&decoded));
                 let mut gradient = [0.0; MAX_COMPONENTS];
                 gradient[..2].copy_from_slice(&center.to_array());
                 gradient[2..5].copy_from_slice(&shape.to_array());
                 gradient[5..].copy_from_slice(&by_splat.color);
-                if let Some(shrinkage) = shrinkage {
+                if let Some(rate_term) = rate_term {
                     let gaussian =
                         Gaussian::from_components(&decoded[..5 + channels], parameterization);
-                    let by_color = shrinkage.gradient(&gaussian);
+                    let by_color = rate_term.gradient(&gaussian);
                     gradient[5..].iter_mut().zip(by_color).for_each(|(sum, part)| *sum += part);
                 }
                 if let Some(quantizers) = quantizers {
@@ -314,7 +326,7 @@ impl<'a> Fit<'a> {
                 gradient
             });
         if let Some(quantizers) = &mut self.quantizers {
-            // In the order of the Gaussians, whatever thread was first.
+            // Added in the order of the Gaussians, so that the sum does not depend on the threads.
             let mut total = QuantizerGradients::default();
             by_chunk.iter().for_each(|sum| add(&mut total, sum));
             let rate = self.training.quantization.learning_rate * factor;
@@ -322,36 +334,38 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// Densification: adds up to `count` Gaussians where the distortion is large.
     fn grow(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         if count == 0 {
             return Ok(());
         }
-        // They are of no use to the new population, and room for the map of distortions.
-        self.unbin();
-        let site = Site {
+        // The bins will not be valid for the new Gaussians, and the distortion map needs memory.
+        self.free_bins();
+        let densifier = Densifier {
             options: &self.training.densification,
             filter: self.training.filter,
             raster: self.raster,
             pass: &self.pass,
             bounds: self.bounds,
-            present: self.parameters.len(),
+            count: self.parameters.len(),
         };
         observer.poll()?;
-        let newcomers = site.newcomers(count, &mut self.rng);
+        let rows = densifier.new_gaussians(count, &mut self.rng);
         observer.poll()?;
-        self.parameters.extend(&newcomers);
+        self.parameters.extend(&rows);
         self.parameters.sort();
-        self.restarted();
+        self.invalidate();
         Ok(())
     }
 
-    /// Forgets what was known of the values before: other Gaussians, or elsewhere.
-    fn restarted(&mut self) {
+    /// Discards the best state and the bins, which are not valid after Gaussians were added,
+    /// removed or quantized.
+    fn invalidate(&mut self) {
         self.best = None;
         self.binned_for = 0;
     }
 
-    /// Removes the `count` Gaussians of least importance.
+    /// Culling: removes the `count` Gaussians of least importance.
     fn cull(&mut self, count: usize) {
         let count = count.min(self.len());
         if count == 0 {
@@ -372,59 +386,61 @@ impl<'a> Fit<'a> {
             keep[index as usize] = false;
         }
         self.parameters.retain(|index| keep[index]);
-        self.restarted();
+        self.invalidate();
     }
 
-    /// Removes Gaussians that are invalid, or that nobody would miss.
+    /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
     fn prune(&mut self) {
         let values = &self.parameters.values;
         let (parameterization, components) =
             (self.bounds.parameterization, 5 + self.raster.channels);
         let quantizers = self.quantizers.as_ref();
-        let useful = |index: usize| {
+        let is_visible = |index: usize| {
             let row = decoded(quantizers, &values[index]);
             let gaussian = Gaussian::from_components(&row[..components], parameterization);
-            let visible = gaussian.color.iter().any(|color| color.abs() >= USELESS_COLOR);
-            let inside = self.pass.touches(index);
-            gaussian.is_drawable() && visible && inside
+            let has_color = gaussian.color.iter().any(|color| color.abs() >= MIN_COLOR);
+            let is_inside = self.pass.touches(index);
+            gaussian.is_drawable() && has_color && is_inside
         };
-        let keep: Vec<bool> = (0..values.len()).into_par_iter().map(useful).collect();
+        let keep: Vec<bool> = (0..values.len()).into_par_iter().map(is_visible).collect();
         if keep.contains(&false) {
             self.parameters.retain(|index| keep[index]);
-            self.restarted();
+            self.invalidate();
         }
     }
 
+    /// Starts quantization-aware training (paper, section "Compression Framework").
     fn start_quantization(&mut self) {
         for row in &mut self.parameters.values {
-            *row = self.bounds.confined(*row);
+            *row = self.bounds.clamped(*row);
         }
         self.quantizers = Some(LsqQuantizers::new(
             &self.parameters.values,
             self.bounds,
             &self.training.quantization,
         ));
-        self.restarted();
+        self.invalidate();
     }
 
-    /// Looks at the values of the last step, which no pass has seen yet.
+    /// Ends training: renders the values of the last step, keeps them if they are the best, and
+    /// frees memory.
     fn settle(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         self.binned_for = 0;
         self.forward(observer)?;
-        self.remember();
+        self.keep_if_best();
         self.binned_for = 0;
-        self.unbin();
+        self.free_bins();
         Ok(())
     }
 
-    /// Gives back what passes need and the next one makes anew.
-    fn unbin(&mut self) {
-        self.pass.unbin();
+    /// Frees the bins and splats, which the next pass makes again.
+    fn free_bins(&mut self) {
+        self.pass.free_bins();
         self.splats = Vec::new();
     }
 
-    /// Keeps the values of the last pass if they are the best so far.
-    fn remember(&mut self) {
+    /// Keeps a copy of the values of the last pass if their error is the least so far.
+    fn keep_if_best(&mut self) {
         if self.best.as_ref().is_none_or(|best| self.error < best.error) {
             let best = self.best.get_or_insert_with(|| Snapshot {
                 error: 0.0,
@@ -432,7 +448,7 @@ impl<'a> Fit<'a> {
                 quantizers: None,
             });
             best.error = self.error;
-            // Without room for more, which `clone_from` would take.
+            // `clone_from` would allocate more memory than needed.
             best.rows.clear();
             best.rows.reserve_exact(self.parameters.len());
             best.rows.extend_from_slice(&self.parameters.values);
@@ -446,6 +462,7 @@ impl<'a> Fit<'a> {
         10.0 * (samples / self.error).log10()
     }
 
+    /// Size in bytes.
     fn memory(&self) -> usize {
         let best = self.best.as_ref().map_or(0, |best| best.rows.capacity());
         self.raster.memory()
@@ -456,7 +473,7 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// The values that a file would hold for a trained row.
+/// The values that a decoder would read for a trained row.
 fn decoded(quantizers: Option<&LsqQuantizers>, row: &Row) -> Row {
     quantizers.map_or(*row, |quantizers| quantizers.decoded(&quantizers.codes(row)))
 }

@@ -1,29 +1,31 @@
-//! Training in the shape parameterizations: the backward half of [`Parameterization::to_cholesky`], the frames that
-//! steps are taken in, and the bounds that keep shapes sound.
+//! Training of the shape in each parameterization (paper, paragraph "2D Gaussian Splatting" of the
+//! section "Methodology"): the gradients, the frames in which steps are taken, and the bounds that
+//! keep shapes valid.
 
 use glam::{Mat2, Mat3, Vec2, Vec3};
 
 use crate::gaussian::{Parameterization, inverse_cholesky};
 
-/// Smallest standard deviation that is trained, in pixels: narrower Gaussians fall between the
-/// pixels, where no error is seen.
+/// Smallest standard deviation that is trained, in pixels: a narrower Gaussian can lie between the
+/// centres of pixels, where it has no effect and no gradient.
 pub(crate) const MIN_DEVIATION: f32 = 0.4;
 
-/// What a pass over the pixels says about the geometry of one Gaussian. With s = -2 dLoss/dq at a
-/// pixel and d = pixel centre - centre of the Gaussian, these are sums over the pixels.
+/// The sums over pixels from which the gradients by a Gaussian's geometry follow. In them,
+/// s = -2 dLoss/dq, q is the squared Mahalanobis distance of a pixel, and d is the centre of the
+/// pixel minus the centre of the Gaussian.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct GeometrySums {
-    /// Sum of s d.
+    /// The sum of s d: (x, y).
     pub(crate) first: [f32; 2],
-    /// Sum of s d d^T: (xx, xy, yy).
+    /// The sum of s d d^T: (xx, xy, yy).
     pub(crate) second: [f32; 3],
 }
 
 impl GeometrySums {
-    /// The gradients of the loss by the centre and by the three values of `parameterization`.
+    /// The gradients of the loss by the centre and by the three shape values of `parameterization`.
     ///
-    /// q = |z|^2 with z = M d, M the inverse of the Cholesky factor L. From dM = -M dL M follow
-    /// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z and
+    /// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
+    /// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
     /// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
     pub(crate) fn gradients(
         &self,
@@ -31,7 +33,7 @@ impl GeometrySums {
         values: Vec3,
     ) -> (Vec2, Vec3) {
         let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values.into()));
-        // glam's matrices are built from columns.
+        // glam builds matrices from columns.
         let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
         let [xx, xy, yy] = self.second;
         let moments = Mat2::from_cols(Vec2::new(xx, xy), Vec2::new(xy, yy));
@@ -53,7 +55,7 @@ impl GeometrySums {
             Parameterization::RotationScale => {
                 let by_covariance = by_factor * m * 0.5;
                 let (axis1, axis2) = axes(values.z);
-                // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, and a1 turns into a2, a2 into -a1.
+                // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
                 let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
                 Vec3::new(
                     2.0 * values.x * along(axis1, axis1),
@@ -67,26 +69,27 @@ impl GeometrySums {
     }
 }
 
-/// The units in which a Gaussian takes steps: a step of centre or shape is the frame times a
-/// vector of learning rates, and the gradient by that vector is the transposed frame times the
-/// gradient.
+/// The frame in which the optimizer steps: the change of the centre, or of the shape, is the matrix
+/// of the frame times the optimizer's step, and the gradient by that step is the transposed matrix
+/// times the gradient.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct StepFrame {
     pub(crate) center: Mat2,
     pub(crate) shape: Mat3,
 }
 
-impl Frame {
-    /// Pixels, and the parameterization's own units.
+impl StepFrame {
+    /// [`Units::Absolute`](super::training::Units::Absolute): pixels, and the parameterization's
+    /// own units.
     pub(crate) const ABSOLUTE: Self = Self { center: Mat2::IDENTITY, shape: Mat3::IDENTITY };
 
-    /// The Gaussian's own frame: the centre moves in standard deviations, the shape changes
-    /// relative to itself.
+    /// [`Units::Relative`](super::training::Units::Relative), the Gaussian's own frame: the centre
+    /// moves in standard deviations, and the shape changes relative to itself.
     pub(crate) fn relative(parameterization: Parameterization, values: Vec3) -> Self {
         let [l11, l21, l22] = parameterization.to_cholesky(values.into());
         let center = Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22));
         let shape = match parameterization {
-            // L becomes L (I + D) with D lower triangular, whatever L is.
+            // L becomes L (I + D), with D the lower triangular step.
             Parameterization::Cholesky => Mat3::from_cols(
                 Vec3::new(l11, l21, 0.0),
                 Vec3::new(0.0, l22, 0.0),
@@ -97,7 +100,7 @@ impl Frame {
                 Mat3::from_diagonal(Vec3::new(xx, (xx * yy).sqrt(), yy))
             }
             Parameterization::RotationScale => {
-                // A turn changes the picture as much as the axes differ.
+                // The more the axes differ, the more a rotation changes the picture.
                 let ratio = values.x / values.y;
                 let turn = 1.0 / (ratio - 1.0 / ratio).abs().max(1.0);
                 Mat3::from_diagonal(Vec3::new(values.x, values.y, turn))
@@ -107,7 +110,7 @@ impl Frame {
     }
 }
 
-/// The parameterization's values for a Cholesky factor.
+/// The shape values of a Cholesky factor.
 pub(crate) fn from_cholesky(parameterization: Parameterization, [l11, l21, l22]: [f32; 3]) -> Vec3 {
     let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
     match parameterization {
@@ -116,13 +119,13 @@ pub(crate) fn from_cholesky(parameterization: Parameterization, [l11, l21, l22]:
         Parameterization::RotationScale => {
             let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
             let s1 = (mean + half.hypot(xy)).sqrt();
-            // The determinant gives the small axis without cancellation.
+            // Computed from the determinant, the smaller deviation does not suffer cancellation.
             Vec3::new(s1, l11 * l22 / s1, 0.5 * xy.atan2(half))
         }
     }
 }
 
-/// The parameterization's values for a covariance, and that plus `variance` along both axes.
+/// The shape values of the covariance that `values` stand for, plus `variance` times the identity.
 pub(crate) fn widened(parameterization: Parameterization, values: Vec3, variance: f32) -> Vec3 {
     let [l11, l21, l22] = parameterization.to_cholesky(values.into());
     let xx = l11 * l11 + variance;
@@ -132,9 +135,9 @@ pub(crate) fn widened(parameterization: Parameterization, values: Vec3, variance
     from_cholesky(parameterization, [wide11, wide21, (yy - wide21 * wide21).max(0.0).sqrt()])
 }
 
-/// The nearest values that are a covariance with standard deviations from [`MIN_DEVIATION`] to
-/// `max`. Values that are not finite become a round Gaussian.
-pub(crate) fn confined(parameterization: Parameterization, values: Vec3, max: f32) -> Vec3 {
+/// Shape values clamped so that they are a covariance with standard deviations from about
+/// [`MIN_DEVIATION`] to about `max`. Values that are not finite become a round Gaussian.
+pub(crate) fn clamped(parameterization: Parameterization, values: Vec3, max: f32) -> Vec3 {
     if !values.is_finite() {
         return from_cholesky(parameterization, [1.0, 0.0, 1.0]);
     }
@@ -142,22 +145,23 @@ pub(crate) fn confined(parameterization: Parameterization, values: Vec3, max: f3
         Parameterization::Cholesky => {
             let l11 = values.x.clamp(MIN_DEVIATION, max);
             let l21 = values.y.clamp(-max, max);
-            // The product of both deviations is l11 l22, and the larger one at most the length of
-            // all three.
+            // The smaller deviation is l11 l22 divided by the larger one, and that is about the
+            // length of (l11, l21).
             let least = MIN_DEVIATION * (l11.hypot(l21) / l11).max(1.0);
             Vec3::new(l11, l21, values.z.clamp(MIN_DEVIATION, max).max(least))
         }
         Parameterization::Covariance => {
             let xx = values.x.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
             let yy = values.z.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
-            // Conditional variances stay above the least variance, and above what rounding of the
-            // determinant may cost.
+            // Conditional variances stay above the least variance, and so far above 0 that rounding
+            // errors of the determinant do not matter.
             let square = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0);
-            let room = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
-            Vec3::new(xx, values.y.clamp(-room, room), yy)
+            let max_xy = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
+            Vec3::new(xx, values.y.clamp(-max_xy, max_xy), yy)
         }
         Parameterization::RotationScale => {
-            // The same ellipse returns after half a turn; an exact remainder keeps far angles sound.
+            // Half a turn leaves the ellipse as it is. The remainder of a division is exact, so
+            // angles of any magnitude can be reduced.
             let half_turn = core::f32::consts::PI;
             let rest = values.z % half_turn;
             let angle =
@@ -167,15 +171,16 @@ pub(crate) fn confined(parameterization: Parameterization, values: Vec3, max: f3
     }
 }
 
-/// Which of the parameterization's values are quantized by their logarithm: those that are positive and span
-/// decades (paper, appendix: log-uniform quantization of the variances).
-pub(crate) fn logarithmic(parameterization: Parameterization) -> [bool; 3] {
+/// Which of the three shape values have a logarithmic quantizer: those that are positive and span
+/// decades (paper, appendix, section "More Analysis Results": log-uniform quantization).
+pub(crate) fn is_logarithmic(parameterization: Parameterization) -> [bool; 3] {
     match parameterization {
         Parameterization::Covariance | Parameterization::Cholesky => [true, false, true],
         Parameterization::RotationScale => [true, true, false],
     }
 }
 
+/// The directions of the two axes of a Gaussian whose first axis is at this angle to x.
 fn axes(angle: f32) -> (Vec2, Vec2) {
     let (sin, cos) = angle.sin_cos();
     (Vec2::new(cos, sin), Vec2::new(-sin, cos))
@@ -201,15 +206,17 @@ mod tests {
         #![proptest_config(config(128))]
 
         #[test]
-        fn shapes_survive_the_way_through_every_chart(
+        fn every_parameterization_keeps_the_covariance(
             l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
         ) {
             let expected = covariance(Parameterization::Cholesky, Vec3::new(l11, l21, l22));
             for parameterization in PARAMETERIZATIONS {
-                let found = covariance(parameterization, from_cholesky(parameterization, [l11, l21, l22]));
-                for (found, expected_value) in found.iter().zip(expected) {
-                    let scale = expected[0] + expected[2];
-                    prop_assert!((found - expected_value).abs() <= 1e-5 * scale, "{parameterization:?}");
+                let values = from_cholesky(parameterization, [l11, l21, l22]);
+                let found = covariance(parameterization, values);
+                let scale = expected[0] + expected[2];
+                for (found, expected) in found.iter().zip(expected) {
+                    let error = (found - expected).abs();
+                    prop_assert!(error <= 1e-5 * scale, "{parameterization:?}");
                 }
             }
         }
@@ -222,7 +229,8 @@ mod tests {
             let [xx, xy, yy] = covariance(Parameterization::Cholesky, Vec3::new(l11, l21, l22));
             for parameterization in PARAMETERIZATIONS {
                 let values = from_cholesky(parameterization, [l11, l21, l22]);
-                let found = covariance(parameterization, widened(parameterization, values, variance));
+                let wide = widened(parameterization, values, variance);
+                let found = covariance(parameterization, wide);
                 let scale = xx + yy + variance;
                 for (found, expected) in found.iter().zip([xx + variance, xy, yy + variance]) {
                     prop_assert!((found - expected).abs() <= 2e-5 * scale, "{parameterization:?}");
@@ -231,21 +239,24 @@ mod tests {
         }
 
         #[test]
-        fn whatever_is_confined_is_drawn(values in prop::array::uniform3(any::<f32>())) {
+        fn clamped_shapes_are_valid(values in prop::array::uniform3(any::<f32>())) {
             for parameterization in PARAMETERIZATIONS {
-                let confined = confined(parameterization, Vec3::from(values), 4096.0);
-                let cholesky = parameterization.to_cholesky(confined.into());
+                let clamped = clamped(parameterization, Vec3::from(values), 4096.0);
+                let cholesky = parameterization.to_cholesky(clamped.into());
                 let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
-                prop_assert!(gaussian.is_drawable(), "{parameterization:?} {values:?}: {cholesky:?}");
+                prop_assert!(
+                    gaussian.is_drawable(),
+                    "{parameterization:?} {values:?}: {cholesky:?}"
+                );
             }
         }
     }
 
     #[test]
-    fn confining_leaves_ordinary_shapes_alone() {
+    fn clamping_keeps_ordinary_shapes() {
         for parameterization in PARAMETERIZATIONS {
             let values = from_cholesky(parameterization, [3.0, -1.0, 2.0]);
-            assert_eq!(confined(parameterization, values, 100.0), values, "{parameterization:?}");
+            assert_eq!(clamped(parameterization, values, 100.0), values, "{parameterization:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! When what happens in a training run.
+//! The schedule of a training run: when Gaussians are added, culled and quantized.
 
 use super::training::Training;
 use crate::encode::options::Precision;
@@ -6,14 +6,14 @@ use crate::encode::options::Precision;
 /// Iterations between two culls of the surplus.
 const CULL_INTERVAL: u32 = 10;
 
-/// The iterations after which Gaussians come, go and get quantized. Growth comes first, then the
-/// culling of what it grew beyond the budget, then quantization.
+/// The schedule of a training run. Growth comes first, then the culling of the surplus that it
+/// added beyond the budget, then quantization.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TrainingSchedule {
     growth_end: u32,
     growth_interval: u32,
     cull_end: u32,
-    /// The first iteration with quantized values.
+    /// The first iteration with quantized values; `u32::MAX` for none.
     pub(crate) quantized_from: u32,
 }
 
@@ -29,24 +29,26 @@ impl TrainingSchedule {
             cull_end,
             quantized_from: match precision {
                 Precision::Float | Precision::Entropy => u32::MAX,
-                // Growth needs the float values; quantizers are fitted to all Gaussians.
+                // Growth works on float values, and the quantizers are initialized from the
+                // Gaussians that remain.
                 Precision::Packed => share(quantization.warm_up).clamp(cull_end, iterations - 1),
             },
         }
     }
 
-    /// Whether an iteration's Gaussians may be those of the file: none are to come or go any more.
+    /// Whether an iteration's Gaussians may become those of the file, because none will be added or
+    /// culled any more.
     pub(crate) fn is_settled(&self, iteration: u32) -> bool {
         iteration >= self.cull_end
     }
 
-    /// If Gaussians are added after `done` iterations: how many times again later.
+    /// If Gaussians are added after `done` iterations: the number of growth steps that follow.
     pub(crate) fn growths_left(&self, done: u32) -> Option<u32> {
         let due = done.is_multiple_of(self.growth_interval) && done <= self.growth_end;
         due.then(|| (self.growth_end - done) / self.growth_interval)
     }
 
-    /// If a part of the surplus goes after `done` iterations: how many times again later.
+    /// If a part of the surplus is culled after `done` iterations: the number of culls that follow.
     pub(crate) fn culls_left(&self, done: u32) -> Option<u32> {
         let left = self.cull_end.checked_sub(done)?;
         let due = left.is_multiple_of(CULL_INTERVAL) && done >= self.growth_end;
@@ -58,31 +60,73 @@ impl TrainingSchedule {
 mod tests {
     use super::*;
 
+    /// The iterations after which `left` gives something, and what it gives.
+    fn events(iterations: u32, left: impl Fn(u32) -> Option<u32>) -> Vec<(u32, u32)> {
+        (1..=iterations).filter_map(|done| Some((done, left(done)?))).collect()
+    }
+
+    fn growths(schedule: &TrainingSchedule, iterations: u32) -> Vec<(u32, u32)> {
+        events(iterations, |done| schedule.growths_left(done))
+    }
+
+    fn culls(schedule: &TrainingSchedule, iterations: u32) -> Vec<(u32, u32)> {
+        events(iterations, |done| schedule.culls_left(done))
+    }
+
+    fn paper(iterations: u32) -> Training {
+        Training { iterations, ..Training::paper() }
+    }
+
     #[test]
     fn growth_ends_before_culling_and_culling_before_quantization() {
         for iterations in [1, 2, 3, 10, 75, 600, 50_000] {
-            for training in [Training::fast(iterations), {
-                let mut paper = Training::paper();
-                paper.iterations = iterations;
-                paper
-            }] {
-                let plan = TrainingSchedule::new(&training, Precision::Packed);
-                let dones = 1..=iterations;
-                let growths: Vec<u32> =
-                    dones.clone().filter(|&done| plan.growths_left(done).is_some()).collect();
-                let culls: Vec<u32> =
-                    dones.filter(|&done| plan.culls_left(done).is_some()).collect();
-                assert!(growths.iter().all(|done| culls.iter().all(|cull| done <= cull)));
-                assert!(culls.iter().all(|&cull| cull <= plan.quantized_from));
-                assert!(plan.quantized_from < iterations);
-                // The last of each finishes the job.
-                if let Some(&last) = growths.last() {
-                    assert_eq!(plan.growths_left(last), Some(0));
+            for training in [Training::fast(iterations), paper(iterations)] {
+                let schedule = TrainingSchedule::new(&training, Precision::Packed);
+                let growths = growths(&schedule, iterations);
+                let culls = culls(&schedule, iterations);
+                // A single iteration leaves no time for either.
+                assert_eq!(growths.is_empty(), iterations == 1, "{training:?}");
+                assert_eq!(culls.is_empty(), iterations == 1, "{training:?}");
+                // Each counts down to 0, so that nothing is left to do after the last.
+                for events in [&growths, &culls] {
+                    let left = events.iter().map(|&(_, left)| left);
+                    assert!(left.eq((0..events.len() as u32).rev()), "{training:?}: {events:?}");
                 }
-                if let Some(&last) = culls.last() {
-                    assert_eq!(plan.culls_left(last), Some(0));
-                }
+                let last_growth = growths.last().map_or(0, |&(done, _)| done);
+                assert!(culls.iter().all(|&(done, _)| done >= last_growth), "{training:?}");
+                let last_cull = culls.last().map_or(0, |&(done, _)| done);
+                assert!(last_cull <= schedule.quantized_from, "{training:?}");
+                assert!(schedule.quantized_from < iterations, "{training:?}");
+                let settled = (0..iterations).find(|&iteration| schedule.is_settled(iteration));
+                assert_eq!(settled, Some(last_cull), "{training:?}");
             }
         }
+    }
+
+    #[test]
+    fn the_paper_grows_every_5000_iterations() {
+        let schedule = TrainingSchedule::new(&paper(50_000), Precision::Packed);
+        let expected: Vec<_> = (1..=9).map(|growth| (5_000 * growth, 9 - growth)).collect();
+        assert_eq!(growths(&schedule, 50_000), expected);
+        assert_eq!(culls(&schedule, 50_000), [(45_000, 0)]);
+        assert_eq!(schedule.quantized_from, 45_000);
+    }
+
+    #[test]
+    fn only_the_packed_precision_is_trained_with_quantization() {
+        let quantized_from =
+            |precision| TrainingSchedule::new(&Training::fast(600), precision).quantized_from;
+        assert_eq!(quantized_from(Precision::Packed), 390);
+        assert_eq!(quantized_from(Precision::Float), u32::MAX);
+        assert_eq!(quantized_from(Precision::Entropy), u32::MAX);
+    }
+
+    #[test]
+    fn growth_steps_are_at_equal_intervals() {
+        let schedule = TrainingSchedule::new(&Training::fast(600), Precision::Entropy);
+        let expected: Vec<_> = (1..=20).map(|growth| (15 * growth, 20 - growth)).collect();
+        assert_eq!(growths(&schedule, 600), expected);
+        let expected: Vec<_> = (0..=9).map(|cull| (300 + 10 * cull, 9 - cull)).collect();
+        assert_eq!(culls(&schedule, 600), expected);
     }
 }

@@ -1,207 +1,226 @@
-//! The constants of training, by name (paper, sections "Methodology" and "Experimental Setup").
+//! The constants of training (paper, sections "Methodology" and "Experimental Setup"; appendix,
+//! section "Implementation Details").
 
 use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
 
-/// How a picture is fitted.
+/// The constants of training: how Gaussians are fitted to a picture.
 ///
-/// [`Training::fast`] is what [`Encoder`](crate::Encoder) uses; [`Training::paper`] is
-/// GaussianImage++ as published, for study and comparison. Both are starting points: every field
-/// may be changed.
+/// [`Training::fast`] is what [`Encoder`](crate::Encoder) uses by default; [`Training::paper`] is
+/// GaussianImage++ as published, for study and comparison. Every field of either may be changed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Training {
-    /// Iterations in all, at least 1 (paper: 50,000).
+    /// Number of iterations, at least 1 (paper: 50,000).
     pub iterations: u32,
-    /// The kernel to fit with and to store (paper: [`Kernel::PAPER`]).
+    /// The kernel that is fitted and stored (paper: [`Kernel::PAPER`]). [`Precision::Entropy`]
+    /// needs [`Kernel::Quartic`].
+    ///
+    /// [`Precision::Entropy`]: crate::Precision::Entropy
     pub kernel: Kernel,
-    /// What is trained and stored of a shape (paper: [`Parameterization::Covariance`]; GaussianImage:
-    /// [`Parameterization::Cholesky`], [`Parameterization::RotationScale`]).
+    /// The shape values that are trained, and stored by the packed coding (paper:
+    /// [`Parameterization::Covariance`]; GaussianImage: [`Parameterization::Cholesky`] and
+    /// [`Parameterization::RotationScale`]).
     pub parameterization: Parameterization,
-    /// Distortion-driven densification (paper: D3).
+    /// Distortion-driven densification (D3 in the paper).
     pub densification: Densification,
-    /// The variance that a Gaussian is born with (paper: CAF).
+    /// The variance of new Gaussians (the content-aware Gaussian filter, CAF, in the paper).
     pub filter: GaussianFilter,
-    /// Learning rates and their schedule.
+    /// The optimizer with its learning rates and their schedule.
     pub optimizer: Optimizer,
-    /// Quantization-aware training.
+    /// Quantization-aware training (QAT), for [`Precision::Packed`](crate::Precision::Packed) only.
     pub quantization: Quantization,
 }
 
-/// When, where and how Gaussians are added and removed (paper, section "Distortion Driven
-/// Densification").
+/// Distortion-driven densification: when, where and how Gaussians are added and removed (paper,
+/// section "Distortion Driven Densification", D3).
+#[doc(alias = "D3")]
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Densification {
-    /// Gaussians at the start, as a share of the budget, in (0, 1] (paper: 0.5; 1 is no growth).
+    /// Number of Gaussians at the start, as a share of the budget, in (0, 1] (paper: 0.5).
     pub initial: f32,
-    /// How many times Gaussians are added, at equal intervals (paper: 9).
+    /// Number of growth steps, in which Gaussians are added. They are at equal intervals (paper:
+    /// 9).
     pub steps: u32,
-    /// Share of the iterations after which none are added any more, in (0, 1] (paper: 0.9).
+    /// The last growth step, as a share of the iterations, in (0, 1] (paper: 0.9).
     pub end: f32,
-    /// How many are added each time.
+    /// How many Gaussians a growth step adds.
     pub portion: Portion,
-    /// What growth adds beyond the budget, as a share of it (paper: 0). The least important
-    /// Gaussians go again, so what stays has stood the test.
+    /// The surplus: how many Gaussians growth adds beyond the budget, as a share of it, at least 0
+    /// (paper: 0). Afterwards, as many Gaussians are culled, the least important ones.
     pub surplus: f32,
-    /// Share of the iterations by which the surplus is gone, at least `end`, at most 1.
+    /// The end of culling, as a share of the iterations, from `end` to 1 (paper: no culling).
     pub culled: f32,
-    /// Share of the Gaussians, the least important, that each growth step replaces by new ones
-    /// elsewhere, in [0, 1) (paper: 0).
+    /// The share of the Gaussians, the least important ones, that each growth step replaces by new
+    /// ones at other positions, in [0, 1) (paper: 0).
     pub replaced: f32,
-    /// What is measured at each pixel.
+    /// The measure of the distortion at a pixel.
     pub distortion: Distortion,
-    /// Which pixels are chosen.
+    /// How the pixels for new Gaussians are chosen by their distortion.
     pub placement: Placement,
     /// The colour of a new Gaussian.
     pub color: NewColor,
-    /// The shape of a new Gaussian, before the filter.
+    /// The shape of a new Gaussian, before the filter's variance is added.
     pub shape: NewShape,
-    /// Iterations between two prunings of invalid and useless Gaussians (paper: 100).
+    /// Iterations from one pruning to the next, at least 1 (paper: 100). Pruning removes Gaussians
+    /// that are invalid, outside the picture, or nearly without colour.
     pub prune_interval: u32,
 }
 
-/// How many Gaussians a growth step adds, given how many are missing.
+/// How many Gaussians a growth step adds, out of those that are missing from the budget and the
+/// surplus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Portion {
-    /// The same share at every step.
+    /// The same number at every remaining step.
     Even,
-    /// Half of what is missing, all of it at the last step (the paper's text).
+    /// Half of those that are missing, and all of them at the last step (the paper's text).
     Half,
-    /// This many, all of what is missing at the last step (the paper's released code: 1,000).
+    /// This many, at least 1, and all that are missing at the last step (the paper's released code:
+    /// 1,000).
     Fixed(u32),
 }
 
-/// The distortion of a pixel, from its residuals by channel.
+/// The measure of the distortion at a pixel, from the residuals of its channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Distortion {
     /// The sum of absolute residuals (paper).
     L1,
-    /// The cube of the residuals' Euclidean length.
+    /// The cube of the Euclidean length of the residuals.
     L3,
 }
 
-/// Which pixels new Gaussians are put on.
+/// How the pixels for new Gaussians are chosen by their distortion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Placement {
-    /// Those of largest distortion (paper). They come in clusters.
+    /// The pixels of largest distortion (paper). They form clusters.
     Top,
-    /// As many everywhere as the distortion has its share there, evenly spread, and born the smaller
-    /// the more they are.
+    /// Pixels evenly spread, with a density proportional to the distortion. The denser the new
+    /// Gaussians are, the less variance they have.
     Spread,
 }
 
-/// The colour that a new Gaussian starts with.
+/// The initial colour of a new Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum NewColor {
-    /// No colour (the paper's released code, and its first Gaussians).
+    /// 0 in all channels (the paper's released code; its text for the first Gaussians).
     Zero,
-    /// The colour of the source there (the paper's text).
+    /// The colour of the source at the pixel (the paper's text for the others).
     Source,
-    /// This share of what is missing there.
+    /// This share of source minus rendering at the pixel.
     Residual(f32),
 }
 
-/// The shape that a new Gaussian starts with, before the filter's variance is added.
+/// The initial shape of a new Gaussian, before the filter's variance is added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NewShape {
-    /// A point: the filter alone gives it its size.
+    /// A point, so that the shape is a circle of the filter's variance.
     Point,
-    /// The three values of the parameterization drawn from [0, 1), the two that must be positive
-    /// plus 0.5 (paper).
+    /// The three shape values of the parameterization, drawn from [0, 1); 0.5 is added to the two
+    /// that must be positive (paper). An angle is drawn from [0, 2 pi).
     Random,
 }
 
-/// The variance, in square pixels, that is added to the covariance of a Gaussian when it is born
-/// and trained with it from then on (paper, section "Content Aware Gaussian Filters"; for the
-/// directly trained covariance this is the paper's filter exactly, as adding a constant to a
-/// trained parameter is the same as starting from the sum).
+/// The filter: a variance in square pixels that is added to both axes of a Gaussian's covariance
+/// when the Gaussian is added (paper, section "Content Aware Gaussian Filters", CAF).
+///
+/// The sum is trained from then on. For a directly trained covariance this is exactly the paper's
+/// filter: adding a constant to a trained value is the same as training from the sum.
+#[doc(alias = "CAF")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum GaussianFilter {
-    /// s = HW / (alpha N) with N Gaussians, the new ones included, and at most `cap`: large for
-    /// the first Gaussians, small for later ones.
+    /// HW / (alpha N), where HW is the number of pixels and N the number of Gaussians, the new ones
+    /// included; at most `cap`. It is large for the first Gaussians and small for later ones.
     ContentAware {
-        /// Paper: 9 pi, so that N discs of three standard deviations cover the picture once.
+        /// Positive (paper: 9 pi, with which N discs of three standard deviations have the area of
+        /// the picture).
         alpha: f32,
-        /// Paper's released code: 300 square pixels.
+        /// In square pixels, positive (the paper's released code: 300).
         cap: f32,
     },
-    /// The same for all (3D Gaussian splatting: 0.3; GaussianImage: 0.5).
+    /// The same variance for all Gaussians, in square pixels, at least 0 (3D Gaussian splatting:
+    /// 0.3; GaussianImage: 0.5).
     Constant(f32),
 }
 
-/// Adam and its learning rates.
+/// The optimizer, Adam, and its learning rates.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Optimizer {
-    /// What a learning rate of 1 means.
+    /// The units of the learning rates of centre and shape.
     pub units: Units,
-    /// Learning rate of the centre.
+    /// Learning rate of the centre, positive.
     pub center: f32,
-    /// Learning rate of the shape.
+    /// Learning rate of the shape, positive.
     pub shape: f32,
-    /// Learning rate of the colour, in full samples.
+    /// Learning rate of the colour, positive, where a full sample is 1.
     pub color: f32,
-    /// Decay of the mean of gradients (paper: 0.9).
+    /// Decay of the moving average of the gradient, in [0, 1) (paper: 0.9).
     pub beta1: f32,
-    /// Decay of the mean of squared gradients (paper: 0.999).
+    /// Decay of the moving average of the squared gradient, in [0, 1) (paper: 0.999).
     pub beta2: f32,
-    /// What is added to the root of the latter (paper: 1e-15).
+    /// What is added to the square root of the latter, at least 0 (paper: 1e-15).
     pub epsilon: f32,
-    /// How learning rates fall.
+    /// How the learning rates fall during training.
     pub schedule: LearningRateSchedule,
 }
 
-/// The units of the steps that centre and shape take.
+/// The units of the optimizer's steps of centre and shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Units {
     /// Pixels and the parameterization's own units (paper).
     Absolute,
-    /// The Gaussian's own frame: centre in standard deviations, shape relative to itself. One
-    /// rate serves all sizes.
+    /// The Gaussian's own frame: the centre in standard deviations, the shape relative to itself.
+    /// The same rate suits Gaussians of all sizes.
     Relative,
 }
 
-/// How learning rates fall over the iterations.
+/// How the learning rates fall during training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LearningRateSchedule {
-    /// Halved every so many iterations (paper: 20,000).
+    /// They are halved every so many iterations, at least 1 (paper: 20,000).
     Halving(u32),
-    /// Constant up to this share of the iterations, then linearly to zero.
+    /// They are constant for this share of the iterations, and then fall linearly to 0.
     Linear(f32),
 }
 
-/// Quantization-aware training with LSQ+ (paper, section "Compression Framework").
+/// Quantization-aware training (QAT) with LSQ+ (paper, section "Compression Framework").
+#[doc(alias = "QAT")]
+#[doc(alias = "LSQ+")]
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Quantization {
-    /// Share of the iterations that run before quantization, in (0, 1] (paper: 0.12).
+    /// The share of the iterations before quantization starts, in (0, 1] (paper: 0.12). It starts
+    /// after culling in any case.
     pub warm_up: f32,
-    /// Bit depth of each of the two coordinates, 1 to 16 (paper: 12).
+    /// Bit depth of each of the two coordinates of the centre, 1 to 16 (paper: 12).
     pub position_bits: u8,
     /// Bit depth of each of the three shape values, 1 to 16 (paper: 10).
     pub shape_bits: u8,
     /// Bit depth of each colour channel, 1 to 16 (paper: 6).
     pub color_bits: u8,
-    /// Learning rate of scales and offsets, relative to the scale (paper: 0.001, absolute).
+    /// Learning rate of scales and offsets, positive, relative to the scale (paper: 0.001,
+    /// absolute).
     pub learning_rate: f32,
 }
 
 impl Training {
-    /// Fast and good: growth early, often and beyond the budget, evenly spread where the error is,
-    /// culled by importance; steps in each Gaussian's own frame; learning rates down to zero.
+    /// The encoder's defaults, tuned for quality in few iterations. Growth is early, in many steps
+    /// and beyond the budget; new Gaussians are spread by the distortion, and the surplus is culled
+    /// by importance. The optimizer steps in each Gaussian's own frame, and the learning rates fall
+    /// to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
         let steps = (iterations / 30).clamp(20, 160);
-        // The longer the run, the more is left for settling.
+        // A long run gains more from iterations after growth.
         let (end, culled) = if iterations > 2_400 { (0.4, 0.5) } else { (0.5, 0.65) };
         Self {
             iterations,
@@ -226,7 +245,7 @@ impl Training {
                 units: Units::Relative,
                 center: 0.1,
                 shape: 0.1,
-                // A short run must get to its colours in fewer steps.
+                // In a short run, the colours have fewer steps to converge.
                 color: 0.015 * (300.0 / iterations.max(1) as f32).clamp(1.0, 4.0).sqrt(),
                 beta1: 0.9,
                 beta2: 0.99,
@@ -243,10 +262,10 @@ impl Training {
         }
     }
 
-    /// GaussianImage++ as published. Where the paper and its released code differ, this has what
-    /// measured better: learning rates of 0.18 and growth by half of what is missing (text; code:
-    /// 0.018 and 1,000 at a time), newcomers without colour and quantizers that round (code; text:
-    /// the source's colour, quantizers that truncate).
+    /// GaussianImage++ as published. Where the text and the released code differ, these are the
+    /// variants that gave the better results. From the text: learning rates of 0.18 (code: 0.018)
+    /// and growth by half of what is missing (code: 1,000 at a time). From the code: new Gaussians
+    /// without colour (text: the source's colour) and quantizers that round (text: that truncate).
     #[must_use]
     pub fn paper() -> Self {
         Self {
@@ -288,7 +307,7 @@ impl Training {
         }
     }
 
-    /// Says what is out of range, if anything is, and what is allowed.
+    /// Refuses constants that are out of range, with the rule that is broken.
     pub(crate) fn check(&self) -> Result<(), &'static str> {
         let share = |value: f32| value > 0.0 && value <= 1.0;
         let positive = |value: f32| value > 0.0 && value.is_finite();
@@ -343,21 +362,21 @@ impl GaussianFilter {
     /// The paper's filter with its released code's constants.
     pub const PAPER: Self = Self::ContentAware { alpha: 9.0 * core::f32::consts::PI, cap: 300.0 };
 
-    /// The variance for newcomers that make the number of Gaussians `count`; `None` if the
-    /// constants make no variance.
+    /// The variance for new Gaussians, with which there are `count`; `None` if the constants are
+    /// out of range.
     pub(crate) fn variance(self, pixels: usize, count: usize) -> Option<f32> {
-        let (variance, sound) = match self {
+        let (variance, is_valid) = match self {
             Self::ContentAware { alpha, cap } => {
                 ((pixels as f32 / (alpha * count as f32)).min(cap), alpha > 0.0 && cap > 0.0)
             }
             Self::Constant(variance) => (variance, variance >= 0.0),
         };
-        (sound && variance.is_finite()).then_some(variance)
+        (is_valid && variance.is_finite()).then_some(variance)
     }
 }
 
 impl LearningRateSchedule {
-    /// The factor on all learning rates at an iteration.
+    /// The factor on all learning rates at an iteration out of `iterations`.
     pub(crate) fn factor(self, iteration: u32, iterations: u32) -> f32 {
         match self {
             Self::Halving(interval) => 0.5_f32.powi((iteration / interval) as i32),

@@ -1,12 +1,12 @@
-//! The last stage of coder 1: whole codes chosen by what they do to the picture and what they
-//! cost, one Gaussian after the other (rate-distortion optimisation by coordinate descent on the
-//! lattice).
+//! Coordinate descent on the lattice: for one Gaussian after the other, the code with the least
+//! Lagrangian cost D + lambda R is chosen, where D is the squared error of the picture and R the
+//! rate in bits.
 
 use rayon::prelude::*;
 
 use super::quadratic_model::GeometryChange;
 use super::residuals::Residuals;
-use super::window::{ErrorChange, Slopes, Window};
+use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_CLASS, SymbolCosts};
 use crate::color::ColorModel;
 use crate::encode::error::EncodeError;
@@ -14,51 +14,56 @@ use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 
-/// Side of the blocks by which Gaussians that do not touch are told apart, in pixels.
+/// Side in pixels of the blocks of the picture. Windows overlap only if they have a block in
+/// common.
 const BLOCK: usize = 16;
-/// Gaussians between two polls.
+/// Gaussians from one poll of the observer to the next.
 const POLL_INTERVAL: usize = 256;
 
-/// How far the best way along the slopes is followed.
-const REACH: f32 = 0.5;
-/// Most candidates that are tried.
-const MOST_TRIED: usize = 3;
+/// The trust region of the quadratic model: the largest change of each component of the geometry in
+/// a step to the model's minimum.
+const TRUST_REGION: f32 = 0.5;
+/// Most candidates whose error is computed exactly.
+const MAX_CANDIDATES: usize = 3;
 
-/// What codes are chosen by.
+/// What the cost of a code depends on, besides its error.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CoordinateDescent<'a> {
     pub(crate) coder: LayerCoder<'a>,
     pub(crate) model: ColorModel,
-    /// Bits of the tree of cells for each Gaussian.
-    pub(crate) tree: f32,
-    /// Bits that a tile of the decoder is worth, for the time that it takes.
-    pub(crate) tile: f32,
-    /// Squared error that a bit is worth.
+    /// Bits that the tree of cells takes per Gaussian.
+    pub(crate) tree_bits: f32,
+    /// The penalty in bits for each tile of the decoder that a Gaussian touches.
+    pub(crate) tile_bits: f32,
+    /// The Lagrange multiplier: squared error per bit.
     pub(crate) lambda: f32,
 }
 
-/// Where in a file a code stands, as far as that decides what it costs.
+/// The context of a code in its file, which determines its rate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CodeContext<'a> {
-    /// Of the code's cell.
+    /// The level of the code's cell (spec, section 7.4).
     pub(crate) level: u32,
-    /// Of the symbols in the code's layer.
+    /// The costs of the symbols in the code's layer.
     pub(crate) costs: &'a SymbolCosts,
 }
 
-/// A Gaussian's best code, and the change of error and rate against leaving it out.
+/// A code for a Gaussian with its Lagrangian cost, relative to that of removing the Gaussian.
 #[derive(Clone, Copy, Debug)]
-struct Choice {
+struct Candidate {
     code: Code,
-    value: f32,
+    cost: f32,
 }
 
 impl CoordinateDescent<'_> {
-    /// Looks at every Gaussian once, by `residuals`, and improves or removes it. The `contexts` are
-    /// those of the codes. How many were changed.
+    /// One pass: improves or removes every Gaussian, and returns how many changed. `contexts` are
+    /// those of the codes, and `residuals` those of their rendering, which are updated.
     ///
-    /// Gaussians that do not touch are looked at side by side; the outcome is that of one after
-    /// the other.
+    /// Gaussians whose windows do not overlap are processed in parallel; the result is that of one
+    /// after the other.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn pass(
         &self,
         residuals: &mut Residuals,
@@ -69,8 +74,8 @@ impl CoordinateDescent<'_> {
         let mut kept = vec![true; codes.len()];
         let mut changed = 0;
         observer.poll()?;
-        for round in self.rounds(residuals, codes) {
-            for part in round.chunks(POLL_INTERVAL) {
+        for batch in self.independent_batches(residuals, codes) {
+            for part in batch.chunks(POLL_INTERVAL) {
                 observer.poll()?;
                 let shared = &*residuals;
                 let chosen: Vec<Option<Code>> = part
@@ -107,18 +112,19 @@ impl CoordinateDescent<'_> {
         lattice.gaussian(code, &lattice.shape(code), grid, self.model)
     }
 
-    /// Indices in rounds: within one, no two windows touch.
+    /// The indices of all codes in batches. Within a batch, no two windows have a block in common.
     ///
-    /// Large ones, which touch many, come first. Neighbours in the order of the codes are mostly
-    /// neighbours in the picture, so the others are taken far from each other.
-    fn rounds(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
+    /// Large windows, which overlap many others, come first. Neighbours in the order of the codes
+    /// are mostly neighbours in the picture; windows of about the same size are therefore taken in
+    /// bit-reversed order.
+    fn independent_batches(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
         let columns = residuals.width().div_ceil(BLOCK);
         let mut windows: Vec<_> = (codes.iter().enumerate())
             .map(|(index, code)| {
                 let blocks = residuals
-                    .bounds(&self.gaussian(code))
+                    .window(&self.gaussian(code))
                     .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
-                // Those that are not seen at all go into the first round, to be removed.
+                // Gaussians outside the picture go into the first batch, and will be removed.
                 let [x, y] = blocks.unwrap_or_default();
                 let area = (x.len() * y.len()) as u32;
                 (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
@@ -126,20 +132,21 @@ impl CoordinateDescent<'_> {
             .collect();
         windows.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
         let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
-        let mut rounds: Vec<Vec<usize>> = Vec::new();
+        let mut batches: Vec<Vec<usize>> = Vec::new();
         for (_, order, x, y) in windows {
             let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
-            let round = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
-            blocks.for_each(|block| next[block] = round + 1);
-            if round == rounds.len() {
-                rounds.push(Vec::new());
+            let batch = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
+            blocks.for_each(|block| next[block] = batch + 1);
+            if batch == batches.len() {
+                batches.push(Vec::new());
             }
-            rounds[round].push(order.reverse_bits() as usize);
+            batches[batch].push(order.reverse_bits() as usize);
         }
-        rounds
+        batches
     }
 
-    /// The best of a code and its neighbours; `None` if the picture is better off without.
+    /// The code of least cost among a code and its candidates; `None` if it costs less to remove
+    /// the Gaussian.
     fn choose(
         &self,
         residuals: &Residuals,
@@ -147,121 +154,132 @@ impl CoordinateDescent<'_> {
         code: Code,
         context: CodeContext<'_>,
     ) -> Option<Code> {
-        let here = self.gaussian(&code);
-        window.load(residuals, &here).then_some(())?;
-        let slopes = window.slopes(&here, self.model);
-        let present = slopes.change.error + self.lambda * self.bits(code, context);
-        let promising = self.promising(&slopes, code, &here, context, present);
-        if promising.is_empty() && present < 0.0 {
+        let gaussian = self.gaussian(&code);
+        window.load(residuals, &gaussian).then_some(())?;
+        let gradient = window.gradient(&gaussian, self.model);
+        let present_cost = gradient.change.error + self.lambda * self.bits(code, context);
+        let candidates = self.candidates(&gradient, code, &gaussian, context, present_cost);
+        if candidates.is_empty() && present_cost < 0.0 {
             return Some(code);
         }
-        window.remove(&here);
-        let mut best = self.judged(window, code, context);
-        for candidate in promising {
-            if let Some(other) = self.recolored(window, candidate, context)
-                && other.value < best.value
+        window.remove(&gaussian);
+        let mut best = self.evaluate(window, code, context);
+        for candidate in candidates {
+            if let Some(other) = self.evaluate_recolored(window, candidate, context)
+                && other.cost < best.cost
             {
                 best = other;
             }
         }
-        (best.value < 0.0).then_some(best.code)
+        (best.cost < 0.0).then_some(best.code)
     }
 
-    /// The neighbours that may well be better than the code as it is, by what its slopes say.
-    fn promising(
+    /// Codes that cost less than the present one by the quadratic model of the error, cheapest
+    /// first.
+    fn candidates(
         &self,
-        slopes: &Slopes,
+        gradient: &ErrorGradient,
         code: Code,
-        here: &Gaussian,
+        gaussian: &Gaussian,
         context: CodeContext<'_>,
-        present: f32,
+        present_cost: f32,
     ) -> Vec<Code> {
         let (lattice, model) = (self.coder.lattice, self.model);
-        let [_, l21, l22] = here.cholesky;
+        let [_, l21, l22] = gaussian.cholesky;
         let slant = l21 / l22;
         let amplitudes = code.color.iter().zip(&lattice.color);
-        let strength: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
-        let recolored = self.with_best_colors(&slopes.change, code, context.costs);
-        let error = slopes.change.with(recolored.color, lattice.color_units(&recolored));
+        let squared_strength: f32 =
+            amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
+        let recolored = self.with_best_colors(&gradient.change, code, context.costs);
+        let error = gradient.change.with_color(recolored.color, lattice.color_units(&recolored));
         let mut found = Vec::new();
         if recolored != code {
             found.push((error + self.lambda * self.bits(recolored, context), recolored));
         }
-        if strength > 0.0 {
-            let best = slopes.by_geometry.best(slant, strength, REACH);
-            let target = best.applied(&self.gaussian(&recolored));
+        if squared_strength > 0.0 {
+            let step = gradient.by_geometry.minimizer(slant, squared_strength, TRUST_REGION);
+            let target = step.applied(&self.gaussian(&recolored));
             let classes = code.class.saturating_sub(1)..=(code.class + 1).min(MAX_CLASS);
-            let targeted =
+            let rounded =
                 classes.map(|class| lattice.code(&target, class, &self.coder.grid, model));
-            for candidate in self.steps(recolored).chain(targeted) {
-                let way = GeometryChange::between(here, &self.gaussian(&candidate));
-                let change = slopes.by_geometry.change(&way, slant, strength);
+            for candidate in self.neighbours(recolored).chain(rounded) {
+                let step = GeometryChange::between(gaussian, &self.gaussian(&candidate));
+                let change = gradient.by_geometry.error_change(&step, slant, squared_strength);
                 found.push((
                     error + change + self.lambda * self.bits(candidate, context),
                     candidate,
                 ));
             }
         }
-        found.retain(|(value, _)| *value < present);
+        found.retain(|(cost, _)| *cost < present_cost);
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found.truncate(MOST_TRIED);
+        found.truncate(MAX_CANDIDATES);
         found.into_iter().map(|(_, code)| code).collect()
     }
 
-    /// What a code is worth as it is.
-    fn judged(&self, window: &Window, code: Code, context: CodeContext<'_>) -> Choice {
+    /// A code with its exact cost. The Gaussian is not part of the window's rendering.
+    fn evaluate(&self, window: &Window, code: Code, context: CodeContext<'_>) -> Candidate {
         let change = window.change(&self.gaussian(&code), self.model);
-        Choice { code, value: change.error + self.lambda * self.bits(code, context) }
+        Candidate { code, cost: change.error + self.lambda * self.bits(code, context) }
     }
 
-    /// What a code is worth with the best colours for its geometry.
-    fn recolored(&self, window: &Window, code: Code, context: CodeContext<'_>) -> Option<Choice> {
+    /// A code, with the best colours for its geometry, and its exact cost. `None` if the Gaussian
+    /// has no weight in the picture.
+    fn evaluate_recolored(
+        &self,
+        window: &Window,
+        code: Code,
+        context: CodeContext<'_>,
+    ) -> Option<Candidate> {
         let change = window.change(&self.gaussian(&code), self.model);
-        if change.weight <= 0.0 {
+        if change.squared_weights <= 0.0 {
             return None;
         }
         let code = self.with_best_colors(&change, code, context.costs);
         if window.is_clamped() {
-            return Some(self.judged(window, code, context));
+            return Some(self.evaluate(window, code, context));
         }
-        let error = change.with(code.color, self.coder.lattice.color_units(&code));
-        Some(Choice { code, value: error + self.lambda * self.bits(code, context) })
+        let error = change.with_color(code.color, self.coder.lattice.color_units(&code));
+        Some(Candidate { code, cost: error + self.lambda * self.bits(code, context) })
     }
 
-    /// A code with the best colours for its geometry, one axis after the other.
+    /// A code with the colours of least cost for its geometry, chosen for one colour axis after the
+    /// other.
     fn with_best_colors(&self, change: &ErrorChange, mut code: Code, costs: &SymbolCosts) -> Code {
         let units = self.coder.lattice.color_units(&code);
         for (axis, &unit) in units.iter().enumerate().take(self.coder.channels) {
-            // By what the error grows for a unit beside the best value.
-            let growth = change.weight * unit * unit;
-            if growth <= 0.0 {
+            // The increase of the error when the code is 1 away from its minimum.
+            let curvature = change.squared_weights * unit * unit;
+            if curvature <= 0.0 {
                 continue;
             }
             let present = code.color[axis];
-            let best = present as f32 - change.by_axis[axis] * unit / growth;
+            let best = present as f32 - change.by_axis[axis] * unit / curvature;
             let best = best.clamp(-30_000.0, 30_000.0);
             let rounded = best.round() as i32;
-            let nearer = rounded - rounded.signum();
-            let candidates = [rounded, nearer, rounded + 1, rounded - 1, present, 0];
-            let values = candidates.map(|value| {
-                code.color[axis] = value;
-                let off = value as f32 - best;
-                growth * off * off + self.lambda * self.coder.color_cost(&code, costs)
+            let towards_zero = rounded - rounded.signum();
+            let candidates = [rounded, towards_zero, rounded + 1, rounded - 1, present, 0];
+            let lagrangian = candidates.map(|candidate| {
+                code.color[axis] = candidate;
+                let distance = candidate as f32 - best;
+                curvature * distance * distance + self.lambda * self.coder.color_cost(&code, costs)
             });
-            let least = (0..values.len()).min_by(|&a, &b| values[a].total_cmp(&values[b]));
-            code.color[axis] = candidates[least.expect("there are some")];
+            let least =
+                (0..lagrangian.len()).min_by(|&a, &b| lagrangian[a].total_cmp(&lagrangian[b]));
+            code.color[axis] = candidates[least.expect("there are candidates")];
         }
         code
     }
 
+    /// The rate of a code in bits, with the penalty for the tiles that it touches.
     fn bits(&self, code: Code, context: CodeContext<'_>) -> f32 {
         let shape = self.coder.lattice.shape(&code);
-        let own = self.coder.cost(code, &shape, context.level, context.costs);
-        self.tree + own + self.tile * tiles(shape.cholesky)
+        let attribute_bits = self.coder.cost(code, &shape, context.level, context.costs);
+        self.tree_bits + attribute_bits + self.tile_bits * touched_tiles(shape.cholesky)
     }
 
-    /// A step up and down in each component of the geometry.
-    fn steps(&self, code: Code) -> impl Iterator<Item = Code> {
+    /// The codes that are one step up or down in one component of the geometry.
+    fn neighbours(&self, code: Code) -> impl Iterator<Item = Code> {
         let (lattice, grid) = (self.coder.lattice, self.coder.grid);
         let center = grid.center(code.center);
         let shapes = [-1, 1].into_iter().flat_map(move |step| {
@@ -284,9 +302,9 @@ impl CoordinateDescent<'_> {
     }
 }
 
-/// About how many tiles of 8 x 8 pixels a Gaussian touches, those of its bounding box: a model of the
-/// time that decoders take, which count work in such tiles (spec, section 10).
-pub(super) fn tiles([l11, l21, l22]: [f32; 3]) -> f32 {
+/// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time
+/// that a decoder takes, whose work the spec counts in such tiles (section 10).
+pub(super) fn touched_tiles([l11, l21, l22]: [f32; 3]) -> f32 {
     const SIDE: f32 = 8.0;
     let along = |sigma: f32| 2.0 * QUARTIC_RADIUS * sigma / SIDE + 1.0;
     along(l11) * along((l21 * l21 + l22 * l22).sqrt())

@@ -1,7 +1,13 @@
-//! Rate-distortion optimisation: Gaussians to codes of the entropy coding that meet a target.
+//! Rate-distortion optimization: turns Gaussians into codes of the entropy coding that meet a
+//! target.
+//!
+//! `target_search` searches for the quantization step and the Lagrange multiplier with which a file
+//! meets its target. `code_optimizer` rounds Gaussians to the lattice of a step and improves their
+//! codes by passes of coordinate descent.
 
 mod code_optimizer;
 mod coordinate_descent;
+mod kernel_weights;
 mod quadratic_model;
 mod residuals;
 mod step_search;

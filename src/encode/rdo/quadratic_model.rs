@@ -1,34 +1,35 @@
-//! What a small change of a Gaussian's geometry does to the error, to second order.
+//! A quadratic model of the squared error as a function of a small change of a Gaussian's geometry.
 //!
-//! Everything is measured in the frame of the Gaussian itself, with its factor L and its centre m:
-//! the place (u, v) of a point p is L^-1 (p - m), and q = u^2 + v^2. Where a Gaussian grows, its
-//! colour is understood to shrink so that colour times the root of its area stays: that is how
-//! codes have it, and what leaves the sum of its squares alone.
+//! Changes are measured in the Gaussian's own frame: with its Cholesky factor L and its centre m, a
+//! point p has the coordinates (u, v) = L^-1 (p - m), and q = u^2 + v^2. When the area of a
+//! Gaussian changes, its colour changes too, such that its strength, colour times the square root
+//! of the area, and with it the sum of its squares, remains the same. That is how the codes store
+//! colours.
 
 use crate::gaussian::Gaussian;
 
-/// Half of the second derivatives of a Gaussian's squared error, for one whose colour times the
-/// root of its area is 1: integrals of the quartic kernel (1 - q/4)^2.
+/// Half of the second derivatives of the squared error by the components of a [`GeometryChange`],
+/// for a Gaussian of strength 1: integrals of the derivatives of the quartic kernel (1 - q/4)^2.
 const POSITION: f32 = 2.094_395;
 const SIZE: f32 = 4.188_79;
 const RATIO: f32 = 3.351_032;
 const SLANT: f32 = 0.837_758;
 
-/// From one Gaussian to another, or a slope along that way.
+/// A change of a Gaussian's geometry, or a gradient by its components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct GeometryChange {
-    /// Of the centre, in the first one's frame.
+    /// The change of the centre, in the Gaussian's frame before.
     pub(crate) center: [f32; 2],
-    /// Of the logarithm of the root of l11 l22.
+    /// The change of ln(l11 l22) / 2.
     pub(crate) size: f32,
-    /// Of the logarithm of the root of l11 / l22.
+    /// The change of ln(l11 / l22) / 2.
     pub(crate) ratio: f32,
-    /// Of l21 / l22.
+    /// The change of l21 / l22.
     pub(crate) slant: f32,
 }
 
 impl GeometryChange {
-    /// From one Gaussian's centre and factor to those of another.
+    /// The change from one Gaussian's geometry to that of another.
     pub(crate) fn between(from: &Gaussian, to: &Gaussian) -> Self {
         let [l11, l21, l22] = from.cholesky;
         let [m11, m21, m22] = to.cholesky;
@@ -43,7 +44,7 @@ impl GeometryChange {
         }
     }
 
-    /// The Gaussian that lies this far from another.
+    /// A Gaussian after this change, with the same strength.
     pub(crate) fn applied(&self, gaussian: &Gaussian) -> Gaussian {
         let [l11, l21, l22] = gaussian.cholesky;
         let [u, v] = self.center;
@@ -56,59 +57,61 @@ impl GeometryChange {
         }
     }
 
-    /// The change of squared error along these slopes, for a Gaussian of a slant (l21 / l22) and
-    /// of a squared strength: its squared colour times its area.
-    pub(crate) fn change(&self, way: &Self, slant: f32, strength: f32) -> f32 {
-        let linear = self.center[0] * way.center[0]
-            + self.center[1] * way.center[1]
-            + self.size * way.size
-            + self.ratio * way.ratio
-            + self.slant * way.slant;
-        // What the ratio does to the slanted axis, the slant undoes.
-        let sheared = way.slant - 2.0 * slant * way.ratio;
-        let [u, v] = way.center;
+    /// The change of the squared error by a change of geometry, where `self` is the gradient. The
+    /// Gaussian has this slant, l21 / l22, and this squared strength: the sum of its squared colour
+    /// times its area.
+    pub(crate) fn error_change(&self, change: &Self, slant: f32, squared_strength: f32) -> f32 {
+        let linear = self.center[0] * change.center[0]
+            + self.center[1] * change.center[1]
+            + self.size * change.size
+            + self.ratio * change.ratio
+            + self.slant * change.slant;
+        // A change of the ratio also shears a slanted Gaussian, unless the slant makes up for it.
+        let shear = change.slant - 2.0 * slant * change.ratio;
+        let [u, v] = change.center;
         let quadratic = POSITION * (u * u + v * v)
-            + SIZE * way.size * way.size
-            + RATIO * way.ratio * way.ratio
-            + SLANT * sheared * sheared;
-        linear + strength * quadratic
+            + SIZE * change.size * change.size
+            + RATIO * change.ratio * change.ratio
+            + SLANT * shear * shear;
+        linear + squared_strength * quadratic
     }
 
-    /// The way along these slopes that lowers the error most, no longer than `reach` in any
-    /// component.
-    pub(crate) fn best(&self, slant: f32, strength: f32, reach: f32) -> Self {
-        let way = |slope: f32, curvature: f32| {
-            (-slope / (2.0 * curvature * strength)).clamp(-reach, reach)
+    /// The change of geometry with the least error, where `self` is the gradient. Every component
+    /// is clamped to `max_change`.
+    pub(crate) fn minimizer(&self, slant: f32, squared_strength: f32, max_change: f32) -> Self {
+        let component = |derivative: f32, curvature: f32| {
+            (-derivative / (2.0 * curvature * squared_strength)).clamp(-max_change, max_change)
         };
-        let ratio = way(self.ratio + 2.0 * slant * self.slant, RATIO);
+        let ratio = component(self.ratio + 2.0 * slant * self.slant, RATIO);
         Self {
-            center: self.center.map(|slope| way(slope, POSITION)),
-            size: way(self.size, SIZE),
+            center: self.center.map(|derivative| component(derivative, POSITION)),
+            size: component(self.size, SIZE),
             ratio,
-            slant: way(self.slant, SLANT) + 2.0 * slant * ratio,
+            slant: component(self.slant, SLANT) + 2.0 * slant * ratio,
         }
     }
 }
 
-/// Sums over the pixels of a Gaussian: its colour times the error, with t = 1 - q/4 and its place.
+/// The sums over pixels from which the gradient by a Gaussian's geometry follows. In them, e is the
+/// scalar product of the Gaussian's colour and the residual at a pixel, and t = 1 - q/4.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeometryErrorSums {
-    /// With t u and t v.
+    /// The sums of e t u and e t v.
     pub(crate) first: [f32; 2],
-    /// With t u^2, t u v and t v^2.
+    /// The sums of e t u^2, e t u v and e t v^2.
     pub(crate) second: [f32; 3],
-    /// With t^2.
-    pub(crate) along: f32,
+    /// The sum of e t^2.
+    pub(crate) weighted: f32,
 }
 
 impl GeometryErrorSums {
-    /// The derivatives of the squared error.
-    pub(crate) fn slopes(&self, gaussian: &Gaussian) -> GeometryChange {
+    /// The gradient of the squared error by the geometry of `gaussian`.
+    pub(crate) fn gradient(&self, gaussian: &Gaussian) -> GeometryChange {
         let [_, l21, l22] = gaussian.cholesky;
         let [uu, uv, vv] = self.second;
         GeometryChange {
             center: self.first.map(|sum| 2.0 * sum),
-            size: 2.0 * (uu + vv - self.along),
+            size: 2.0 * (uu + vv - self.weighted),
             ratio: 2.0 * (uu - vv - 2.0 * l21 / l22 * uv),
             slant: 2.0 * uv,
         }
@@ -119,28 +122,28 @@ impl GeometryErrorSums {
 mod tests {
     use super::*;
 
-    /// The quartic kernel of a Gaussian at a point.
-    fn shown(gaussian: &Gaussian, x: f64, y: f64) -> f64 {
+    /// What a Gaussian adds to the first channel at a point.
+    fn value(gaussian: &Gaussian, x: f64, y: f64) -> f64 {
         let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
         let u = (x - f64::from(gaussian.center[0])) / l11;
         let v = (y - f64::from(gaussian.center[1]) - l21 * u) / l22;
         f64::from(gaussian.color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
     }
 
-    /// The squared difference of two Gaussians and of a third from the first, over fine pixels.
+    /// The integral of the squared difference of two Gaussians, as a sum over fine pixels.
     fn difference(first: &Gaussian, second: &Gaussian) -> f64 {
         let steps = 400;
         let at = |step: i32| f64::from(step) / f64::from(steps) * 30.0 - 15.0;
         let pixel = (30.0 / f64::from(steps)).powi(2);
-        let places = (0..steps).flat_map(|row| (0..steps).map(move |column| (at(column), at(row))));
-        places.map(|(x, y)| (shown(first, x, y) - shown(second, x, y)).powi(2) * pixel).sum()
+        let points = (0..steps).flat_map(|row| (0..steps).map(move |column| (at(column), at(row))));
+        points.map(|(x, y)| (value(first, x, y) - value(second, x, y)).powi(2) * pixel).sum()
     }
 
     fn gaussian() -> Gaussian {
         Gaussian { center: [0.3, -0.2], cholesky: [2.0, 0.9, 1.5], color: [0.5, 0.0, 0.0, 0.0] }
     }
 
-    fn ways() -> [GeometryChange; 7] {
+    fn changes() -> [GeometryChange; 7] {
         let none = GeometryChange::default();
         let small = 0.02;
         [
@@ -160,15 +163,14 @@ mod tests {
     }
 
     #[test]
-    fn there_and_back_is_nowhere() {
-        for way in ways() {
-            let there = way.applied(&gaussian());
-            let found = GeometryChange::between(&gaussian(), &there);
-            let off = GeometryChange { size: found.size - way.size, ..found };
-            assert!(off.size.abs() < 1e-6 && (found.ratio - way.ratio).abs() < 1e-6, "{found:?}");
-            assert!((found.slant - way.slant).abs() < 1e-6, "{found:?}");
-            assert!((found.center[0] - way.center[0]).abs() < 1e-6, "{found:?}");
-            assert!((found.center[1] - way.center[1]).abs() < 1e-6, "{found:?}");
+    fn an_applied_change_is_found_again() {
+        for change in changes() {
+            let found = GeometryChange::between(&gaussian(), &change.applied(&gaussian()));
+            assert!((found.size - change.size).abs() < 1e-6, "{found:?}");
+            assert!((found.ratio - change.ratio).abs() < 1e-6, "{found:?}");
+            assert!((found.slant - change.slant).abs() < 1e-6, "{found:?}");
+            assert!((found.center[0] - change.center[0]).abs() < 1e-6, "{found:?}");
+            assert!((found.center[1] - change.center[1]).abs() < 1e-6, "{found:?}");
         }
     }
 
@@ -176,28 +178,29 @@ mod tests {
     fn curvatures_are_those_of_the_kernel() {
         let gaussian = gaussian();
         let [l11, l21, l22] = gaussian.cholesky;
-        let strength = gaussian.color[0] * gaussian.color[0] * l11 * l22;
-        for way in ways() {
-            let seen = difference(&gaussian, &way.applied(&gaussian));
-            let said = f64::from(GeometryChange::default().change(&way, l21 / l22, strength));
-            assert!((said / seen - 1.0).abs() < 0.05, "{way:?}: {said:e}, seen {seen:e}");
+        let squared_strength = gaussian.color[0] * gaussian.color[0] * l11 * l22;
+        let gradient = GeometryChange::default();
+        for change in changes() {
+            let expected = difference(&gaussian, &change.applied(&gaussian));
+            let found = f64::from(gradient.error_change(&change, l21 / l22, squared_strength));
+            assert!((found / expected - 1.0).abs() < 0.05, "{change:?}: {found:e}, {expected:e}");
         }
     }
 
     #[test]
-    fn the_best_way_is_where_the_slope_ends() {
-        let slopes = GeometryChange { center: [0.2, -0.1], size: 0.3, ratio: -0.2, slant: 0.1 };
-        let best = slopes.best(0.6, 2.0, 1.0);
-        let least = slopes.change(&best, 0.6, 2.0);
-        for way in ways() {
+    fn the_minimizer_has_the_least_error() {
+        let gradient = GeometryChange { center: [0.2, -0.1], size: 0.3, ratio: -0.2, slant: 0.1 };
+        let best = gradient.minimizer(0.6, 2.0, 1.0);
+        let least = gradient.error_change(&best, 0.6, 2.0);
+        for change in changes() {
             for sign in [-1.0, 1.0] {
                 let near = GeometryChange {
-                    center: [0, 1].map(|axis| best.center[axis] + sign * way.center[axis]),
-                    size: best.size + sign * way.size,
-                    ratio: best.ratio + sign * way.ratio,
-                    slant: best.slant + sign * way.slant,
+                    center: [0, 1].map(|axis| best.center[axis] + sign * change.center[axis]),
+                    size: best.size + sign * change.size,
+                    ratio: best.ratio + sign * change.ratio,
+                    slant: best.slant + sign * change.slant,
                 };
-                assert!(slopes.change(&near, 0.6, 2.0) > least, "{way:?}");
+                assert!(gradient.error_change(&near, 0.6, 2.0) > least, "{change:?}");
             }
         }
     }

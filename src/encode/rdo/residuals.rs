@@ -1,105 +1,108 @@
-//! How far a rendering is from its source at every sample, and what Gaussians change there.
+//! The residuals of a rendering at every sample, and their change when Gaussians are added or
+//! removed.
 
 use core::ops::Range;
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
 use rayon::prelude::*;
 
-use crate::encode::raster::{Raster, centers};
-use crate::gaussian::{Gaussian, inverse_cholesky};
+use super::kernel_weights::{KernelWeights, LANES, Lanes};
+use crate::encode::raster::Raster;
+use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
-use crate::render::simd_kernel::Quartic;
 
-pub(crate) const LANES: usize = 16;
-pub(crate) type Lanes = [f32; LANES];
-/// Rows that one thread changes at a time.
+/// Rows that one task changes.
 const BAND: usize = 64;
-/// How much larger than its Gaussian a window is, for candidates to lie within, and in pixels.
+/// The margin of a window around its Gaussian, for candidates that are larger or elsewhere: a
+/// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
 
-/// Rendering minus source, before clamping.
+/// The residuals of a picture, rendering minus source, before the rendering is clamped.
 #[derive(Debug)]
 pub(crate) struct Residuals {
     width: usize,
     height: usize,
     channels: usize,
-    /// Rendering minus source, row after row, in each channel after channel; padded for whole
-    /// vectors.
-    errors: Vec<f32>,
-    /// Which errors are clamped; in the layout of `errors`.
-    marks: Vec<u8>,
+    /// Row by row, and in each row channel by channel; every line is padded to whole vectors.
+    residuals: Vec<f32>,
+    /// Whether positive or negative residuals are ignored, because the output is clamped; in the
+    /// layout of `residuals`.
+    ignored: Vec<u8>,
     stride: usize,
     level: Level,
 }
 
-/// Bits of samples whose errors count on one side only, or not at all.
-const NOT_BELOW: u8 = 1;
-const NOT_ABOVE: u8 = 2;
+/// Bits of [`Residuals::ignored`]: for samples that are black, that are white, and both for
+/// padding.
+const IGNORE_NEGATIVE: u8 = 1;
+const IGNORE_POSITIVE: u8 = 2;
 
-/// The same for sixteen samples, a bit for each.
+/// The ignored residuals of sixteen samples, one bit for each.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Marks {
-    not_below: u16,
-    not_above: u16,
+pub(crate) struct ClampMask {
+    negative: u16,
+    positive: u16,
 }
 
-impl Marks {
-    pub(crate) fn new(marks: &[u8; LANES]) -> Self {
+impl ClampMask {
+    pub(crate) fn new(ignored: &[u8; LANES]) -> Self {
         let bits = |bit: u8| {
-            let lanes = (0..).zip(marks);
-            lanes.map(|(lane, mark)| u16::from(mark & bit != 0) << lane).sum()
+            let lanes = (0..).zip(ignored);
+            lanes.map(|(lane, ignored)| u16::from(ignored & bit != 0) << lane).sum()
         };
-        Self { not_below: bits(NOT_BELOW), not_above: bits(NOT_ABOVE) }
+        Self { negative: bits(IGNORE_NEGATIVE), positive: bits(IGNORE_POSITIVE) }
     }
 
-    /// What errors count as.
+    /// The residuals, with 0 for those that are ignored.
     #[inline(always)]
-    pub(crate) fn clamped<S: Simd>(self, simd: S, errors: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn clamped<S: Simd>(self, simd: S, residuals: f32x16<S>) -> f32x16<S> {
         let mask = |bits: u16| mask32x16::from_bitmask(simd, bits.into());
-        let errors = mask(self.not_below).select(errors.max(0.0), errors);
-        mask(self.not_above).select(errors.min(0.0), errors)
+        let residuals = mask(self.negative).select(residuals.max(0.0), residuals);
+        mask(self.positive).select(residuals.min(0.0), residuals)
     }
 }
 
 impl Residuals {
-    /// Of nothing, until lines are set.
+    /// Residuals of 0, until [`Residuals::set`] sets them.
     pub(crate) fn new(raster: &Raster) -> Self {
         let (width, height, channels) = (raster.width, raster.height, raster.channels);
         let stride = width + LANES;
-        let mut marks = vec![NOT_BELOW | NOT_ABOVE; stride * height * channels];
-        marks.par_chunks_mut(stride).enumerate().for_each(|(line, marks)| {
+        let mut ignored = vec![IGNORE_NEGATIVE | IGNORE_POSITIVE; stride * height * channels];
+        ignored.par_chunks_mut(stride).enumerate().for_each(|(line, ignored)| {
             let samples = raster.line(line / channels, line % channels);
-            for (mark, sample) in marks.iter_mut().zip(samples) {
-                // Output is clamped: beyond white or black where the source is so, all is well.
-                *mark = if sample <= 0.0 {
-                    NOT_BELOW
+            for (ignored, sample) in ignored.iter_mut().zip(samples) {
+                // The output is clamped: where the source is black, a rendering below black is no
+                // error, and above white where the source is white.
+                *ignored = if sample <= 0.0 {
+                    IGNORE_NEGATIVE
                 } else if sample >= 1.0 {
-                    NOT_ABOVE
+                    IGNORE_POSITIVE
                 } else {
                     0
                 };
             }
         });
-        let errors = vec![0.0; marks.len()];
-        Self { width, height, channels, errors, marks, stride, level: Level::new() }
+        let residuals = vec![0.0; ignored.len()];
+        Self { width, height, channels, residuals, ignored, stride, level: Level::new() }
     }
 
-    /// Sets rows from `first` on to a rendering, plane after plane.
+    /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
     pub(crate) fn set(&mut self, raster: &Raster, first: usize, rendering: &[f32]) {
         let (width, channels) = (self.width, self.channels);
         let rows = rendering.len() / (width * channels);
-        let lines = self.errors.par_chunks_mut(self.stride).skip(first * channels);
-        lines.take(rows * channels).enumerate().for_each(|(line, errors)| {
+        let lines = self.residuals.par_chunks_mut(self.stride).skip(first * channels);
+        lines.take(rows * channels).enumerate().for_each(|(line, residuals)| {
             let (row, channel) = (line / channels, line % channels);
             let rendered = &rendering[(channel * rows + row) * width..][..width];
             let samples = raster.line(first + row, channel);
-            for ((error, value), sample) in errors.iter_mut().zip(rendered).zip(samples) {
-                *error = value - sample;
+            for ((residual, value), sample) in residuals.iter_mut().zip(rendered).zip(samples) {
+                *residual = value - sample;
             }
         });
     }
 
-    /// Bytes that the residuals of a source take, with windows that do not touch.
+    /// Size in bytes of the residuals of a source, and of the windows of one batch of Gaussians,
+    /// which do not overlap.
     pub(crate) fn memory(raster: &Raster) -> usize {
         let samples = (raster.width + LANES) * raster.height * raster.channels;
         samples * (2 * size_of::<f32>() + size_of::<u8>())
@@ -113,47 +116,48 @@ impl Residuals {
         self.height
     }
 
-    /// The columns and rows in which a Gaussian and its like may show; `None` outside the picture.
-    pub(crate) fn bounds(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
+    /// The columns and rows of the window of a Gaussian: the bounding box of where it is visible,
+    /// with a margin. `None` if that is outside the picture.
+    pub(crate) fn window(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
         let [l11, l21, l22] = gaussian.cholesky;
         let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
-        let mut bounds = [0..0, 0..0];
+        let mut window = [0..0, 0..0];
         for (axis, length) in [self.width, self.height].into_iter().enumerate() {
             let reach = QUARTIC_RADIUS * (MARGIN.0 * extents[axis]) + MARGIN.1;
             // Casts saturate.
             let first = (gaussian.center[axis] - reach - 0.5).ceil().max(0.0) as usize;
             let end = (gaussian.center[axis] + reach + 0.5).floor().max(0.0) as usize;
-            bounds[axis] = first..end.min(length);
-            if bounds[axis].is_empty() {
+            window[axis] = first..end.min(length);
+            if window[axis].is_empty() {
                 return None;
             }
         }
-        Some(bounds)
+        Some(window)
     }
 
-    /// Adds Gaussians to the rendering, each as often as its factor says.
+    /// Adds Gaussians to the rendering, each times its factor: 1 to add it, -1 to remove it.
     pub(crate) fn add(&mut self, gaussians: &[(Gaussian, f32)]) {
         let (level, stride, channels) = (self.level, self.stride, self.channels);
         let added: Vec<_> = gaussians
             .iter()
             .filter_map(|(gaussian, factor)| {
                 let color = gaussian.color.map(|color| color * factor);
-                self.bounds(gaussian).map(|bounds| (PlacedKernel::new(gaussian), color, bounds))
+                self.window(gaussian).map(|window| (KernelWeights::new(gaussian), color, window))
             })
             .collect();
-        // Whatever thread takes a band, everything comes in the same order.
-        let bands = self.errors.par_chunks_mut(stride * channels * BAND);
-        bands.enumerate().for_each(|(band, errors)| {
+        // In every band the Gaussians are added in the same order, whichever thread does it.
+        let bands = self.residuals.par_chunks_mut(stride * channels * BAND);
+        bands.enumerate().for_each(|(band, residuals)| {
             for (weights, color, [columns, rows]) in &added {
                 let first = band * BAND;
                 let rows = rows.start.max(first)..rows.end.min(first + BAND);
                 for y in rows {
-                    let rows = errors.chunks_exact_mut(stride).skip((y - first) * channels);
+                    let rows = residuals.chunks_exact_mut(stride).skip((y - first) * channels);
                     let start = columns.start;
                     let span = weights.span(start, y, columns.len().div_ceil(LANES));
                     for (row, &color) in rows.take(channels).zip(color) {
                         let span = span.clone();
-                        dispatch!(level, simd => weights.draw(simd, color, start, y, span, row));
+                        dispatch!(level, simd => draw(simd, weights, color, start, y, span, row));
                     }
                 }
             }
@@ -168,96 +172,34 @@ impl Residuals {
         self.level
     }
 
-    /// The errors of sixteen samples of a row from one inside the picture on, and their marks. Of
-    /// the padding, one vector lies beyond the last column at most.
+    /// The residuals of sixteen samples of a row from column x on, and which of them are ignored.
+    /// The column is inside the picture, so the padding suffices.
     pub(crate) fn vector(&self, x: usize, y: usize, channel: usize) -> (&Lanes, &[u8; LANES]) {
         let at = (y * self.channels + channel) * self.stride + x;
-        let errors = self.errors[at..at + LANES].try_into();
-        let marks = self.marks[at..at + LANES].try_into();
-        (errors.expect("whole vectors"), marks.expect("whole vectors"))
+        let residuals = self.residuals[at..at + LANES].try_into();
+        let ignored = self.ignored[at..at + LANES].try_into();
+        (residuals.expect("whole vectors"), ignored.expect("whole vectors"))
     }
 }
 
-/// Where a Gaussian shows, and how strongly.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PlacedKernel {
-    center: [f32; 2],
-    inverse: [f32; 3],
-    /// Of a row by its distance from the centre: how far its middle is moved along x for every
-    /// pixel, the squared half of its length at the centre, and how that falls with the squared
-    /// distance.
-    middle: f32,
-    half: f32,
-    fall: f32,
-}
-
-impl PlacedKernel {
-    pub(crate) fn new(gaussian: &Gaussian) -> Self {
-        let inverse = inverse_cholesky(gaussian.cholesky);
-        let [i11, w, i22] = inverse;
-        let a = i11 * i11 + w * w;
-        let ratio = i11 * i22 / a;
-        Self {
-            center: gaussian.center,
-            inverse,
-            middle: -w * i22 / a,
-            half: QUARTIC_RADIUS * QUARTIC_RADIUS / a,
-            fall: ratio * ratio,
-        }
-    }
-
-    /// The vectors of a row, counted from a column, that the Gaussian shows in.
-    #[inline(always)]
-    pub(crate) fn span(&self, corner: usize, y: usize, vectors: usize) -> Range<usize> {
-        let dy = y as f32 + 0.5 - self.center[1];
-        let squared = self.half - self.fall * dy * dy;
-        if squared <= 0.0 {
-            return 0..0;
-        }
-        let half = squared.sqrt();
-        let middle = self.center[0] + self.middle * dy - 0.5 - corner as f32;
-        // Casts saturate.
-        let first = ((middle - half) * (1.0 / LANES as f32)) as usize;
-        let last = ((middle + half) * (1.0 / LANES as f32)) as usize;
-        first..(last + 1).min(vectors)
-    }
-
-    /// Adds a colour to a part of a row of one channel.
-    #[inline(always)]
-    fn draw<S: Simd>(
-        &self,
-        simd: S,
-        color: f32,
-        start: usize,
-        y: usize,
-        span: Range<usize>,
-        errors: &mut [f32],
-    ) {
-        for vector in span {
-            let x = start + vector * LANES;
-            let weight = weight(root(simd, self.place(simd, x, y)));
-            // The padding takes what lies beyond the last column.
-            let errors: &mut Lanes = (&mut errors[x..x + LANES]).try_into().expect("whole vectors");
-            (f32x16::load_array_ref(simd, errors) + weight * color).store_array(errors);
-        }
-    }
-
-    /// The place of sixteen pixels from (x, y) on in the Gaussian's own frame.
-    #[inline(always)]
-    pub(crate) fn place<S: Simd>(&self, simd: S, x: usize, y: usize) -> [f32x16<S>; 2] {
-        let [i11, w, i22] = self.inverse;
-        let dx = centers(simd, x as u32) - self.center[0];
-        [dx * i11, dx * w + i22 * (y as f32 + 0.5 - self.center[1])]
-    }
-}
-
-/// The root of the quartic kernel at a point of its own frame.
+/// Adds a Gaussian of one colour to the vectors of a span of a row of one channel. The span is
+/// counted from the column `start`.
 #[inline(always)]
-pub(crate) fn root<S: Simd>(simd: S, [u, v]: [f32x16<S>; 2]) -> f32x16<S> {
-    Quartic.root(simd, u * u + v * v)
-}
-
-#[inline(always)]
-pub(crate) fn weight<S: Simd>(root: f32x16<S>) -> f32x16<S> {
-    root * root
+fn draw<S: Simd>(
+    simd: S,
+    weights: &KernelWeights,
+    color: f32,
+    start: usize,
+    y: usize,
+    span: Range<usize>,
+    residuals: &mut [f32],
+) {
+    for vector in span {
+        let x = start + vector * LANES;
+        let weight = weights.at(simd, x, y);
+        // The last vector may reach into the padding.
+        let residuals: &mut Lanes =
+            (&mut residuals[x..x + LANES]).try_into().expect("whole vectors");
+        (f32x16::load_array_ref(simd, residuals) + weight * color).store_array(residuals);
+    }
 }

@@ -1,46 +1,50 @@
-//! How a file is steered to its target.
+//! The search for the quantization step with which a file meets its target.
 
 use crate::encode::options::Target;
 
-/// What is aimed at: this share of a size, and beyond a PSNR, in dB.
-const SIZE_AIMED: f64 = 0.997;
-const PSNR_AIMED: f64 = 0.02;
-/// How much worse it is to miss a target on the wrong side.
-const WRONG: f64 = 1e3;
+/// The share of a target size that is aimed at.
+const AIMED_SHARE_OF_SIZE: f64 = 0.997;
+/// By how many dB the PSNR that is aimed at exceeds the target.
+const AIMED_PSNR_EXCESS: f64 = 0.02;
+/// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
+/// right side is preferred.
+const WRONG_SIDE_PENALTY: f64 = 1e3;
 
-/// What the codes are steered to. How far they are from it is a logarithm to base 2.
+/// The size or PSNR that is aimed at, inside the tolerance of the target.
+///
+/// The *deviation* of a file is the base-2 logarithm of its size, or of its squared error, divided
+/// by the one that is aimed at. It is positive for files that are too large or too distorted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Aim {
-    /// Most bytes of the file.
+    /// A size in bytes.
     Size { most: f64 },
-    /// PSNR of the decoded file in dB.
+    /// A PSNR of the decoded file in dB.
     Psnr(f64),
 }
 
 impl Aim {
-    /// Aims within what is allowed, for there is some play.
+    /// The aim for a target; `None` if the target is neither a size nor a PSNR.
     pub(crate) fn new(target: Target, pixels: usize) -> Option<Self> {
         if let Target::Psnr(psnr) = target {
-            return Some(Self::Psnr(psnr + PSNR_AIMED));
+            return Some(Self::Psnr(psnr + AIMED_PSNR_EXCESS));
         }
-        target.bytes(pixels).map(|bytes| Self::Size { most: SIZE_AIMED * bytes as f64 })
+        target.bytes(pixels).map(|bytes| Self::Size { most: AIMED_SHARE_OF_SIZE * bytes as f64 })
     }
 
-    /// By how much something is off that misses its target, and 0 for what meets it.
-    pub(crate) fn miss(self, off: f64) -> f64 {
+    /// How badly a file with this deviation misses its target: 0 if it meets the target.
+    pub(crate) fn miss(self, deviation: f64) -> f64 {
         let (below, above) = match self {
-            // What is a little too long will be shortened.
+            // A file that is a little too large will be shortened.
             Self::Size { .. } => (-0.009, 0.011),
             Self::Psnr(_) => (-0.009, 0.006),
         };
-        if off > above {
-            // What is on the wrong side counts for more than anything on the right one.
-            return WRONG + off;
+        if deviation > above {
+            return WRONG_SIDE_PENALTY + deviation;
         }
-        (below - off).max(0.0)
+        (below - deviation).max(0.0)
     }
 
-    /// By how much `off` changes when all steps double.
+    /// By how much the deviation changes when all steps double.
     pub(crate) fn by_step(self) -> f64 {
         match self {
             Self::Size { .. } => -0.38,
@@ -48,7 +52,7 @@ impl Aim {
         }
     }
 
-    /// By how much `off` changes when what a bit is worth doubles.
+    /// By how much the deviation changes when the Lagrange multiplier doubles.
     pub(crate) fn by_lambda(self) -> f64 {
         match self {
             Self::Size { .. } => -0.04,
@@ -57,16 +61,17 @@ impl Aim {
     }
 }
 
-/// The search for the step with which nothing is off, by secants within brackets.
+/// The search for the step with a deviation of 0: a secant method that keeps a bracket.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StepSearch {
-    /// The step to try next, as a logarithm to base 2.
+    /// The step to try next, as a base-2 logarithm.
     pub(crate) at: f64,
-    /// By how much what is off changes with the step.
+    /// The expected derivative of the deviation by the step.
     slope: f64,
     /// The finest step that is tried.
     finest: f64,
-    /// The nearest steps with which too much, and too little, is off, and by how much.
+    /// The last steps with a positive deviation, and with one that is not positive; each with its
+    /// deviation.
     bracket: [Option<(f64, f64)>; 2],
 }
 
@@ -75,22 +80,21 @@ impl StepSearch {
         Self { at, slope, finest, bracket: [None; 2] }
     }
 
-    /// Whether a finer step is needed than the finest, if so much is off with the present one.
-    pub(crate) fn is_exhausted(&self, off: f64) -> bool {
-        self.at <= self.finest && off / self.slope > 0.0
+    /// Whether the deviation with the present step asks for a finer one than the finest.
+    pub(crate) fn is_exhausted(&self, deviation: f64) -> bool {
+        self.at <= self.finest && deviation / self.slope > 0.0
     }
 
-    /// Goes on from how much is off with the present step.
-    pub(crate) fn tell(&mut self, off: f64) {
-        let told = (self.at, off);
-        let other = self.bracket[usize::from(off > 0.0)];
-        self.bracket[usize::from(off <= 0.0)] = Some(told);
+    /// Moves to the next step, given the deviation with the present one.
+    pub(crate) fn tell(&mut self, deviation: f64) {
+        let other = self.bracket[usize::from(deviation > 0.0)];
+        self.bracket[usize::from(deviation <= 0.0)] = Some((self.at, deviation));
         self.at = match other {
-            Some((at, there)) => {
-                let share = (off / (off - there)).clamp(0.1, 0.9);
-                self.at + share * (at - self.at)
+            Some((other_step, other_deviation)) => {
+                let share = (deviation / (deviation - other_deviation)).clamp(0.1, 0.9);
+                self.at + share * (other_step - self.at)
             }
-            None => self.at - (off / self.slope).clamp(-2.0, 2.0),
+            None => self.at - (deviation / self.slope).clamp(-2.0, 2.0),
         };
         self.at = self.at.max(self.finest);
     }
@@ -102,18 +106,18 @@ mod tests {
     use crate::encode::options::{PSNR_TOLERANCE, SIZE_TOLERANCE};
 
     #[test]
-    fn what_is_aimed_at_meets_the_target() {
+    fn a_file_that_misses_by_0_meets_its_target() {
         let size = Aim::new(Target::Bytes(5000), 100).expect("a target");
         let psnr = Aim::new(Target::Psnr(30.0), 100).expect("a target");
         assert!(Aim::new(Target::Gaussians(5), 100).is_none());
-        for off in (-40..40).map(|step| f64::from(step) * 1e-3) {
-            let bytes = SIZE_AIMED * 5000.0 * off.exp2();
-            // A little too long is shortened.
-            if size.miss(off) == 0.0 {
+        for deviation in (-40..40).map(|step| f64::from(step) * 1e-3) {
+            let bytes = AIMED_SHARE_OF_SIZE * 5000.0 * deviation.exp2();
+            // A file that is a little too large is shortened.
+            if size.miss(deviation) == 0.0 {
                 assert!((SIZE_TOLERANCE * 5000.0..5025.0).contains(&bytes), "{bytes}");
             }
-            let reached = 30.0 + PSNR_AIMED - off * 10.0 * 2_f64.log10();
-            if psnr.miss(off) == 0.0 {
+            let reached = 30.0 + AIMED_PSNR_EXCESS - deviation * 10.0 * 2_f64.log10();
+            if psnr.miss(deviation) == 0.0 {
                 assert!((30.0..30.0 + PSNR_TOLERANCE).contains(&reached), "{reached}");
             }
         }
@@ -124,15 +128,16 @@ mod tests {
     }
 
     #[test]
-    fn a_search_finds_steps_however_steep() {
+    fn a_search_finds_the_step_at_any_slope() {
         for steepness in [0.05, 0.3, 0.7, 3.0] {
             for sign in [-1.0, 1.0] {
-                let off = |at: f64| sign * steepness * ((at + 3.7) + 0.1 * (at + 3.7).powi(3));
+                let deviation =
+                    |at: f64| sign * steepness * ((at + 3.7) + 0.1 * (at + 3.7).powi(3));
                 let mut search = StepSearch::new(1.0, sign * 0.37, f64::NEG_INFINITY);
                 for _ in 0..40 {
-                    search.tell(off(search.at));
+                    search.tell(deviation(search.at));
                 }
-                assert!(off(search.at).abs() < 0.01, "{steepness} {sign}: {search:?}");
+                assert!(deviation(search.at).abs() < 0.01, "{steepness} {sign}: {search:?}");
             }
         }
     }
@@ -140,11 +145,11 @@ mod tests {
     #[test]
     fn a_search_for_what_no_step_gives_ends_at_the_finest() {
         // A PSNR that stays out of reach: finer steps bring ever less.
-        let off = |at: f64| 1.0 + at.exp2();
+        let deviation = |at: f64| 1.0 + at.exp2();
         let mut search = StepSearch::new(0.0, 0.36, -4.0);
         let mut told = 0;
-        while !search.is_exhausted(off(search.at)) {
-            search.tell(off(search.at));
+        while !search.is_exhausted(deviation(search.at)) {
+            search.tell(deviation(search.at));
             told += 1;
         }
         assert_eq!((search.at, told), (-4.0, 2));

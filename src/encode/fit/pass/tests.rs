@@ -1,0 +1,227 @@
+//! Tests of the pass against formulas in f64, and of its SIMD code.
+
+use core::ops::ControlFlow;
+
+use glam::Vec3;
+
+use super::*;
+use crate::color::ColorModel;
+use crate::encode::fit::parameterization;
+use crate::encode::source::Source;
+use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::testing::simd_levels;
+
+const WIDTH: u32 = 37;
+const HEIGHT: u32 = 21;
+const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
+const PARAMETERIZATIONS: [Parameterization; 3] =
+    [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
+
+/// Runs a pass with an observer that never cancels.
+fn run(pass: &mut Pass, raster: &Raster, splats: &[Splat], kernel: Kernel, base: [f32; 4]) -> f64 {
+    let mut silent = |_: &_| ControlFlow::Continue(());
+    let mut observer = Observer::new(&mut silent, 0);
+    pass.bin(raster, splats, kernel);
+    pass.run(raster, splats, kernel, base, &mut observer).expect("not cancelled")
+}
+
+/// Half the sum of squared residuals in f64, directly from the formulas of the paper.
+fn loss(
+    rows: &[[f64; MAX_COMPONENTS]],
+    parameterization: Parameterization,
+    kernel: Kernel,
+    source: &Source<'_>,
+) -> f64 {
+    let channels = source.color().channels();
+    let mut loss = 0.0;
+    for y in 0..HEIGHT {
+        for x in 0..WIDTH {
+            let mut sums = BASE.map(f64::from);
+            for row in rows {
+                let [a, b, c] = [row[2], row[3], row[4]];
+                let (xx, xy, yy) = match parameterization {
+                    Parameterization::Covariance => (a, b, c),
+                    Parameterization::Cholesky => (a * a, a * b, b * b + c * c),
+                    Parameterization::RotationScale => {
+                        let (sin, cos) = c.sin_cos();
+                        let (a, b) = (a * a, b * b);
+                        (
+                            cos * cos * a + sin * sin * b,
+                            cos * sin * (a - b),
+                            sin * sin * a + cos * cos * b,
+                        )
+                    }
+                };
+                let (dx, dy) = (f64::from(x) + 0.5 - row[0], f64::from(y) + 0.5 - row[1]);
+                let determinant = xx * yy - xy * xy;
+                let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+                let weight = match kernel {
+                    Kernel::Quartic => (1.0 - q / 4.0).max(0.0).powi(2),
+                    Kernel::Exponential { cutoff } if q <= f64::from(cutoff) => (-q / 2.0).exp(),
+                    Kernel::Exponential { .. } => 0.0,
+                };
+                for (sum, color) in sums.iter_mut().zip(&row[5..]) {
+                    *sum += color * weight;
+                }
+            }
+            for (channel, sum) in sums[..channels].iter().enumerate() {
+                let index = (y * WIDTH + x) as usize * channels + channel;
+                let sample = f64::from(source.wide_sample(index)) / 65535.0;
+                loss += 0.5 * (sum - sample).powi(2);
+            }
+        }
+    }
+    loss
+}
+
+/// Gaussians of many shapes: round, rotated, very elongated, and across the border of the picture.
+fn scene(
+    parameterization: Parameterization,
+    channels: usize,
+    rng: &mut fastrand::Rng,
+) -> Vec<[f32; MAX_COMPONENTS]> {
+    (0..12)
+        .map(|index| {
+            let (s1, s2) = match index % 3 {
+                0 => (2.0 + 3.0 * rng.f32(), 2.0 + 3.0 * rng.f32()),
+                1 => (6.0, 1.0 + rng.f32()),
+                _ => (12.0, 0.8),
+            };
+            let angle = rng.f32() * 6.0 - 3.0;
+            let factor = Parameterization::RotationScale.to_cholesky([s1, s2, angle]);
+            let shape = match parameterization {
+                Parameterization::RotationScale => Vec3::new(s1, s2, angle),
+                _ => parameterization::from_cholesky(parameterization, factor),
+            };
+            let mut row = [0.0; MAX_COMPONENTS];
+            row[0] = rng.f32() * 45.0 - 4.0;
+            row[1] = rng.f32() * 27.0 - 3.0;
+            row[2..5].copy_from_slice(&shape.to_array());
+            for value in &mut row[5..5 + channels] {
+                *value = rng.f32() * 0.4 - 0.2;
+            }
+            row
+        })
+        .collect()
+}
+
+fn gradients(
+    rows: &[[f32; MAX_COMPONENTS]],
+    parameterization: Parameterization,
+    kernel: Kernel,
+    raster: &Raster,
+) -> Vec<[f32; MAX_COMPONENTS]> {
+    let splats: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            let gaussian = Gaussian::from_components(&row[..5 + raster.channels], parameterization);
+            Splat::new(&gaussian).expect("the scene is valid")
+        })
+        .collect();
+    let mut pass = Pass::new(raster);
+    run(&mut pass, raster, &splats, kernel, BASE);
+    let by_row = rows.iter().enumerate().map(|(index, row)| {
+        let gradient = pass.gradient(index, raster.channels);
+        let (center, shape) =
+            gradient.geometry.gradients(parameterization, Vec3::from_slice(&row[2..5]));
+        let mut out = [0.0; MAX_COMPONENTS];
+        out[..2].copy_from_slice(&center.to_array());
+        out[2..5].copy_from_slice(&shape.to_array());
+        out[5..].copy_from_slice(&gradient.color);
+        out
+    });
+    by_row.collect()
+}
+
+#[test]
+fn every_gradient_equals_its_finite_difference() {
+    let mut rng = fastrand::Rng::with_seed(1);
+    // Without black and white samples, where the residual is clamped. The cut-off is so far out
+    // that the discontinuity there is below the resolution of f32.
+    let kernels = [Kernel::Quartic, Kernel::Exponential { cutoff: 40.0 }];
+    let colors = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+    for (parameterization, kernel) in
+        PARAMETERIZATIONS.into_iter().flat_map(|c| kernels.map(|k| (c, k)))
+    {
+        for color in colors {
+            let channels = color.channels();
+            let samples: Vec<u8> =
+                (0..WIDTH as usize * HEIGHT as usize * channels).map(|_| rng.u8(1..255)).collect();
+            let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
+            let rows = scene(parameterization, channels, &mut rng);
+            let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
+            let found = gradients(&rows, parameterization, kernel, &Raster::new(&source));
+            for (index, found) in found.iter().enumerate() {
+                for component in 0..5 + channels {
+                    let step = 1e-5 * exact[index][component].abs().max(1.0);
+                    let moved = |by: f64| {
+                        let mut rows = exact.clone();
+                        rows[index][component] += by;
+                        loss(&rows, parameterization, kernel, &source)
+                    };
+                    let expected = (moved(step) - moved(-step)) / (2.0 * step);
+                    let error = (f64::from(found[component]) - expected).abs();
+                    // Relative, except for gradients near 0, which are sums of terms that cancel.
+                    let error = error / (expected.abs() + 0.1);
+                    assert!(
+                        error <= 2e-3,
+                        "{parameterization:?} {kernel:?} {color:?}, Gaussian {index}, component \
+                         {component}: {} against {expected}",
+                        found[component]
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_simd_level_gives_the_same_bits() {
+    let mut rng = fastrand::Rng::with_seed(2);
+    let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+    let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+    let raster = Raster::new(&source);
+    let rows = scene(Parameterization::Cholesky, 3, &mut rng);
+    let splats: Vec<_> = rows
+        .iter()
+        .filter_map(|row| {
+            Splat::new(&Gaussian::from_components(&row[..8], Parameterization::Cholesky))
+        })
+        .collect();
+    let run = |level| {
+        let mut pass = Pass { level, ..Pass::new(&raster) };
+        let error = run(&mut pass, &raster, &splats, Kernel::Quartic, BASE);
+        let gradients = (0..splats.len()).map(|splat| pass.gradient(splat, 3));
+        (error, gradients.collect())
+    };
+    let bits = |(error, gradients): (f64, Vec<SplatGradient>)| -> Vec<u64> {
+        let gradients = gradients.iter().flat_map(|gradient| {
+            let GeometrySums { first, second } = gradient.geometry;
+            first.into_iter().chain(second).chain(gradient.color).map(f32::to_bits)
+        });
+        gradients.map(u64::from).chain([error.to_bits()]).collect()
+    };
+    let expected = run(Level::baseline());
+    assert!(expected.0 > 0.0);
+    let expected = bits(expected);
+    for (name, level) in simd_levels() {
+        let found = bits(run(level));
+        assert_eq!(found.len(), expected.len(), "{name}");
+        let differing = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(differing, 0, "{name}: of {} values", expected.len());
+    }
+}
+
+#[test]
+fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
+    let white = [255; 5 * 3 * 3];
+    let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
+    let raster = Raster::new(&source);
+    let gaussian =
+        Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
+    let splat = Splat::new(&gaussian).expect("it is valid");
+    let mut pass = Pass::new(&raster);
+    let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
+    assert_eq!(error, 0.0);
+    assert_eq!(pass.gradient(0, 3), SplatGradient::default());
+}

@@ -1,0 +1,60 @@
+//! The trained values of one Gaussian, and the bounds that they are clamped to.
+
+use glam::{Vec2, Vec3};
+
+use super::parameterization;
+use crate::gaussian::{MAX_COMPONENTS, Parameterization};
+
+/// The components of a Gaussian in the order of the file: centre, shape, colour. Absent channels
+/// are 0.
+pub(crate) type Row = [f32; MAX_COMPONENTS];
+
+/// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
+/// depends on rounding errors.
+const MAX_COLOR: f32 = 8.0;
+
+/// The shape components of a row.
+pub(crate) fn shape_of(row: &Row) -> Vec3 {
+    Vec3::from_slice(&row[2..5])
+}
+
+/// The layout of the rows of a picture, and the bounds of their values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowBounds {
+    pub(crate) parameterization: Parameterization,
+    pub(crate) channels: usize,
+    /// Width and height of the picture in pixels.
+    pub(crate) size: Vec2,
+}
+
+impl RowBounds {
+    /// Largest standard deviation that is trained, in pixels: twice the longer side of the picture.
+    fn max_deviation(self) -> f32 {
+        2.0 * self.size.max_element()
+    }
+
+    /// The row with all values clamped, so that the shape is valid.
+    pub(crate) fn clamped(self, mut row: Row) -> Row {
+        let shape =
+            parameterization::clamped(self.parameterization, shape_of(&row), self.max_deviation());
+        row[2..5].copy_from_slice(&shape.to_array());
+        self.clamp_position_and_color(&mut row);
+        row
+    }
+
+    /// Clamps everything but the shape.
+    pub(crate) fn clamp_position_and_color(self, row: &mut Row) {
+        // A centre farther outside would widen the range over which positions are quantized, for a
+        // Gaussian of which little is visible.
+        let margin = 8.0 + 0.05 * self.size;
+        for (value, (low, high)) in row[..2]
+            .iter_mut()
+            .zip([(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)])
+        {
+            *value = value.clamp(low, high);
+        }
+        for value in &mut row[5..] {
+            *value = value.clamp(-MAX_COLOR, MAX_COLOR);
+        }
+    }
+}
