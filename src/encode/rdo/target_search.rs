@@ -13,38 +13,40 @@ use crate::encode::source::Source;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
 
-/// How often steps are tried at most: by rounding alone, with a few passes over the codes, with all.
-const MOST_ROUNDINGS: u32 = 8;
-const MOST_SCOUTINGS: u32 = 4;
+/// Most steps that are tried: by rounding alone, after the first passes of coordinate descent, and after
+/// all passes.
+const MOST_ROUNDING_TRIES: u32 = 8;
+const MOST_FIRST_TRIES: u32 = 4;
 const MOST_TRIES: u32 = 4;
-/// How near is near enough for more passes, as a logarithm to base 2.
+/// With at most this deviation, a base-2 logarithm, a step is worth more passes.
 const CLOSE: f64 = 0.02;
-/// How much less the size becomes after rounding, and size and error after the first pass, as
-/// logarithms to base 2.
+/// By how much the size falls between rounding and the last pass, and size and error between the first
+/// pass and the last, as base-2 logarithms.
 const SETTLING_OF_ROUNDED: f64 = 0.12;
 const SETTLING: f64 = 0.045;
-/// More than anything is off, as a logarithm to base 2.
-const LARGEST_OFF: f64 = 10.0;
-/// How far what a bit is worth may change, as a logarithm to base 2.
-const STEERED_BY: f64 = 1.0;
-/// Most passes until a target is met.
+/// The deviation of a file that decodes to an exact copy, which has no finite PSNR.
+const LARGEST_DEVIATION: f64 = 10.0;
+/// By how much lambda may change to meet a target, as a base-2 logarithm.
+const MOST_LAMBDA_CHANGE: f64 = 1.0;
+/// Most passes of coordinate descent until a target is met.
 const MOST_PASSES: u32 = 12;
-/// By how much finer steps are taken where nothing else gives the PSNR, as logarithms to base 2.
+/// Refinements of the step, one after the other, where the search does not reach the PSNR; base-2
+/// logarithms.
 const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
-/// The finest step that is tried, as a logarithm to base 2 of its ratio to the step that suits the
-/// fit's error: there, rounding adds a 256th of what it adds with that step, and a finer one would only
+/// The finest step that is tried, as the base-2 logarithm of its ratio to the step that suits the fit's
+/// error. There, rounding adds a 256th of the error that it adds with that step: a finer one would only
 /// make the file larger.
 const FINEST: f64 = -4.0;
-/// How often it is tried to do without some Gaussians.
+/// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
 
-/// What fitted Gaussians are coded for.
+/// Rate-distortion optimisation of a fit's codes for a target.
 #[derive(Debug)]
 pub(crate) struct TargetSearch<'a> {
     source: &'a Source<'a>,
     raster: &'a Raster,
     layout: &'a FileLayout<'a>,
-    /// How often every code is looked at, or a little more for a target.
+    /// Passes of coordinate descent; for a target there may be a few more.
     passes: u32,
     codes: CodeOptimizer<'a>,
 }
@@ -59,7 +61,7 @@ impl<'a> TargetSearch<'a> {
         Self { source, raster, layout, passes, codes: CodeOptimizer::new(raster, layout) }
     }
 
-    /// Codes `gaussians`, whose picture has the squared error `error`, for a target.
+    /// The codes of `gaussians`, whose rendering has the squared error `error`, for a target.
     pub(crate) fn run(
         &self,
         gaussians: &[Gaussian],
@@ -75,27 +77,28 @@ impl<'a> TargetSearch<'a> {
         };
         let finest = step + FINEST;
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
-        let (mut coded, mut off, step) = self.aimed(gaussians, step, finest, aim, observer)?;
+        let (mut coded, mut deviation, step) =
+            self.aimed(gaussians, step, finest, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
             self.shorten(&mut coded, bytes, observer)?;
             return Ok(coded);
         }
-        if aim.miss(off) > 0.0 {
-            // A few Gaussians are hard to steer, but finer steps are always better in the end.
+        if aim.miss(deviation) > 0.0 {
+            // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
             let mut finer = step;
             for change in FINER {
                 finer -= change;
-                if off <= 0.0 || finer < finest {
+                if deviation <= 0.0 || finer < finest {
                     break;
                 }
-                (coded, off) = self.passed(gaussians, finer, self.passes, aim, observer)?;
+                (coded, deviation) = self.passed(gaussians, finer, self.passes, aim, observer)?;
             }
         }
-        self.trim(coded, off, aim, observer)
+        self.trim(coded, deviation, aim, observer)
     }
 
-    /// The codes that come nearest to an aim, how far from it they are, and the step that would be
-    /// tried next; `step` is the first.
+    /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
+    /// next; `step` is the first.
     fn aimed(
         &self,
         gaussians: &[Gaussian],
@@ -104,46 +107,47 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(LatticeCodes, f64, f64), EncodeError> {
-        let passes = self.scouting_passes();
+        let passes = self.first_passes();
         let mut settling = SETTLING / f64::from(passes);
         let mut search = StepSearch::new(step, aim.by_step(), finest);
-        let mut scouted = self.passed(gaussians, search.at, passes, aim, observer)?;
-        for _ in 1..MOST_SCOUTINGS {
-            let expected = scouted.1 - settling;
+        let mut first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
+        for _ in 1..MOST_FIRST_TRIES {
+            let expected = first_try.1 - settling;
             if expected.abs() < CLOSE || search.is_exhausted(expected) {
                 break;
             }
             search.tell(expected);
-            scouted = self.passed(gaussians, search.at, passes, aim, observer)?;
+            first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
         }
         let mut search = StepSearch::new(search.at, aim.by_step(), finest);
-        let mut scouted = Some(scouted);
+        let mut first_try = Some(first_try);
         let mut best: Option<(LatticeCodes, f64)> = None;
         for _ in 0..MOST_TRIES {
-            let (mut coded, before) = match scouted.take() {
-                Some(scouted) => scouted,
+            let (mut coded, before) = match first_try.take() {
+                Some(first_try) => first_try,
                 None => self.passed(gaussians, search.at, passes, aim, observer)?,
             };
-            // What is out of reach gets no more passes than what is not aimed at.
+            // A target that is out of reach gets no more passes than an encoding without target.
             let exhausted = search.is_exhausted(before - settling);
             let most = if exhausted { self.passes } else { MOST_PASSES };
-            let (off, lambda) = self.steer(&mut coded, before, settling, most, aim, observer)?;
-            if best.as_ref().is_none_or(|(_, least)| aim.miss(off) < aim.miss(*least)) {
-                best = Some((coded, off));
+            let (deviation, lambda) =
+                self.adjust_lambda(&mut coded, before, settling, most, aim, observer)?;
+            if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
+                best = Some((coded, deviation));
             }
-            if aim.miss(off) == 0.0 || exhausted {
+            if aim.miss(deviation) == 0.0 || exhausted {
                 break;
             }
-            // Now it is known how much happens after scouting.
-            let unsteered = off - lambda * aim.by_lambda();
-            settling = before - unsteered;
-            search.tell(unsteered);
+            // Now it is known by how much the deviation falls after the first passes.
+            let with_usual_lambda = deviation - lambda * aim.by_lambda();
+            settling = before - with_usual_lambda;
+            search.tell(with_usual_lambda);
         }
-        let (coded, off) = best.expect("at least one was tried");
-        Ok((coded, off, search.at))
+        let (coded, deviation) = best.expect("at least one was tried");
+        Ok((coded, deviation, search.at))
     }
 
-    /// The first step to try: how long a file gets can nearly be told from rounding alone.
+    /// The first step to try. Rounding alone nearly tells the size of a file.
     fn first_step(
         &self,
         gaussians: &[Gaussian],
@@ -156,27 +160,27 @@ impl<'a> TargetSearch<'a> {
         if matches!(aim, Aim::Psnr(_)) {
             return Ok(search.at);
         }
-        for _ in 0..MOST_ROUNDINGS {
+        for _ in 0..MOST_ROUNDING_TRIES {
             observer.poll()?;
             let mut coded = self.codes.rounded(gaussians, search.at);
             self.codes.written(&mut coded);
-            let off = self.off(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
-            if search.is_exhausted(off) {
+            let deviation = self.deviation(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
+            if search.is_exhausted(deviation) {
                 break;
             }
-            search.tell(off);
-            if off.abs() < CLOSE {
+            search.tell(deviation);
+            if deviation.abs() < CLOSE {
                 break;
             }
         }
         Ok(search.at)
     }
 
-    fn scouting_passes(&self) -> u32 {
+    fn first_passes(&self) -> u32 {
         self.passes.div_ceil(4)
     }
 
-    /// Codes of a step after some passes, and how far they are from an aim.
+    /// The codes of a step after some passes, and their deviation from an aim.
     fn passed(
         &self,
         gaussians: &[Gaussian],
@@ -187,39 +191,40 @@ impl<'a> TargetSearch<'a> {
     ) -> Result<(LatticeCodes, f64), EncodeError> {
         let mut coded = self.codes.rounded(gaussians, step);
         self.codes.descend(&mut coded, 0.0, passes, observer)?;
-        let off = self.off(&coded, aim, observer)?;
-        Ok((coded, off))
+        let deviation = self.deviation(&coded, aim, observer)?;
+        Ok((coded, deviation))
     }
 
-    /// Goes on with scouted codes that are `off`, and gets as near to an aim as what a bit is worth
-    /// can bring them, in `most` passes; by `settling` they become less off anyway. How far they are from the aim
-    /// then, and what a bit was worth, as a logarithm to base 2.
-    fn steer(
+    /// Adjusts lambda from pass to pass, in `most` passes, so that codes after their first passes, which
+    /// deviate by `deviation`, come as near to an aim as lambda can bring them; without that, passes
+    /// lower the deviation by `settling`. Returns the deviation then, and the base-2 logarithm of what
+    /// lambda was multiplied by.
+    fn adjust_lambda(
         &self,
         coded: &mut LatticeCodes,
-        mut off: f64,
+        mut deviation: f64,
         settling: f64,
         most: u32,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(f64, f64), EncodeError> {
-        let first = self.scouting_passes();
+        let first = self.first_passes();
         let mut lambda: f64 = 0.0;
         for pass in first..most {
-            if pass >= self.passes && aim.miss(off) == 0.0 {
+            if pass >= self.passes && aim.miss(deviation) == 0.0 {
                 break;
             }
-            let expected = off - settling * f64::from(first) / f64::from(pass);
+            let expected = deviation - settling * f64::from(first) / f64::from(pass);
             lambda -= (expected / aim.by_lambda()).clamp(-0.5, 0.5);
-            lambda = lambda.clamp(-STEERED_BY, STEERED_BY);
+            lambda = lambda.clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
             self.codes.descend(coded, lambda, 1, observer)?;
-            off = self.off(coded, aim, observer)?;
+            deviation = self.deviation(coded, aim, observer)?;
         }
-        Ok((off, lambda))
+        Ok((deviation, lambda))
     }
 
-    /// How far from an aim.
-    fn off(
+    /// The deviation from an aim.
+    fn deviation(
         &self,
         coded: &LatticeCodes,
         aim: Aim,
@@ -232,8 +237,7 @@ impl<'a> TargetSearch<'a> {
             Aim::Psnr(psnr) => {
                 let verified = Verified::new(&file, self.source);
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
-                // An exact copy is off by no number.
-                ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_OFF)
+                ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
         })
     }
@@ -262,11 +266,11 @@ impl<'a> TargetSearch<'a> {
     fn trim(
         &self,
         mut coded: LatticeCodes,
-        mut off: f64,
+        mut deviation: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<LatticeCodes, EncodeError> {
-        if off > 0.0 || aim.miss(off) == 0.0 {
+        if deviation > 0.0 || aim.miss(deviation) == 0.0 {
             return Ok(coded);
         }
         coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
@@ -277,15 +281,15 @@ impl<'a> TargetSearch<'a> {
             let mut fewer = coded.clone();
             let start = end.saturating_sub(portion);
             fewer.codes.drain(start..end);
-            let off_with_fewer = self.off(&fewer, aim, observer)?;
-            if off_with_fewer <= 0.0 {
-                (coded, off, end) = (fewer, off_with_fewer, start);
+            let deviation_with_fewer = self.deviation(&fewer, aim, observer)?;
+            if deviation_with_fewer <= 0.0 {
+                (coded, deviation, end) = (fewer, deviation_with_fewer, start);
             } else if portion > 1 {
                 portion /= 2;
             } else {
                 end -= 1;
             }
-            if end == 0 || aim.miss(off) == 0.0 {
+            if end == 0 || aim.miss(deviation) == 0.0 {
                 break;
             }
         }
