@@ -57,9 +57,11 @@ pub(crate) fn map<T: Send, R: Send>(
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
 }
 
-/// How often a thread asks whether the others are done before it falls asleep: some milliseconds.
+/// How often a thread asks whether the others are done before it falls asleep: some ten microseconds
+/// in all. Two threads decode in 0.98 to 0.99 of the time that they take without that (8 Kodak pictures
+/// at 0.25, 0.5 and 1 bpp, both in one program in turns), and no longer wait brings more.
 #[cfg(feature = "rayon")]
-const PATIENCE: u32 = 10_000;
+const MOST_ASKED: u32 = 64;
 
 /// A thread that is expected to work; it is done when this is dropped.
 #[cfg(feature = "rayon")]
@@ -102,9 +104,9 @@ fn on_pool<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send +
             scope.spawn(|_| run());
         }
         run();
-        // What is left is under way and mostly soon done, and who was late soon here. To fall asleep
-        // until then takes longer, and so does it to wake up the others for what comes next.
-        for _ in 0..PATIENCE {
+        // The last items are being worked on and mostly soon done: falling asleep takes longer, and so
+        // does waking up for the next call.
+        for _ in 0..MOST_ASKED {
             if expected.load(Ordering::Relaxed) == 0 {
                 break;
             }
