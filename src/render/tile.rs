@@ -127,9 +127,6 @@ fn add<S: Simd, K: Weight, const CHANNELS: usize, const SPLATS: usize>(
         slants[index] = dx * splat.w;
         shifts[index] = ((py - splat.y) * splat.i22).to_array();
     }
-    // Through memory: a row takes its number from there within an addition, where taking it
-    // from a register would need instructions that compete with the arithmetic.
-    let shifts = core::hint::black_box(shifts);
     for rows in 0..TILE_HEIGHT / TOGETHER {
         let mut weights = [px; SPLATS];
         for index in 0..SPLATS {
