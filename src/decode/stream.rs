@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use super::pending::PendingLayers;
 use crate::chunk::ChunkType;
 use crate::coding::entropy::{AttributeBits, Lattice, LatticeSteps};
-use crate::coding::packed::{LayerReader, Quantizer};
+use crate::coding::packed::{PackedLayerReader, Quantizer};
 use crate::container::{Coding, Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
@@ -98,7 +98,7 @@ enum Stage {
         length: usize,
     },
     /// A layer, and how many Gaussians there were before it.
-    Layer(LayerReader, usize),
+    Layer(PackedLayerReader, usize),
     /// `GEND` was read.
     Complete,
     /// An earlier call failed.
@@ -344,7 +344,9 @@ impl StreamDecoder {
                 misplaced("more layers than the header declares")
             }
             ChunkType::GAUS if self.lattice.is_some() => self.collected(length),
-            ChunkType::GAUS => Ok(Stage::Layer(LayerReader::new(length), self.gaussians.len())),
+            ChunkType::GAUS => {
+                Ok(Stage::Layer(PackedLayerReader::new(length), self.gaussians.len()))
+            }
             ChunkType::GEND if length != 0 => misplaced("is not empty"),
             ChunkType::BNDS if self.layers == 0 && self.bounds.is_some() => {
                 misplaced("appears twice")
