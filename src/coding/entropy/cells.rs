@@ -3,8 +3,8 @@
 /// Coordinates are in units of 1/128 pixel, counted from the corner of the grid.
 const UNITS_PER_PIXEL: u32 = 128;
 
-/// The grid in which centres lie: square roots whose side is a power of two of pixels. They cover the
-/// picture and one more root on every side.
+/// The grid in which centres lie: square roots whose side is a power of two of pixels. They cover
+/// the picture and one more root on every side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CenterGrid {
     /// Side of a root in units.

@@ -8,8 +8,8 @@ use super::symbol::SYMBOLS;
 pub(super) const CLASSES: usize = MAX_CLASS as usize + 1;
 /// Ranges of a magnitude: 0, 1, 2 to 3, 4 to 7, and more.
 pub(super) const MAGNITUDES: usize = 5;
-/// Precision classes with contexts of their own for the shape. Finer classes share those of the last,
-/// and add plain bits.
+/// Precision classes with contexts of their own for the shape. Finer classes share those of the
+/// last, and add plain bits.
 pub(super) const SHAPE_CLASSES: usize = 3;
 /// Ranges of a ratio.
 pub(super) const RATIOS: usize = 7;
@@ -32,8 +32,8 @@ pub(super) const SLANT: usize = RATIO + SHAPE_CLASSES;
 pub(super) const EXCESS: usize = SLANT + SHAPE_CLASSES * RATIOS;
 /// How many of a cell's few Gaussians lie in its first part, by the number of Gaussians.
 pub(super) const SMALL_SPLIT: usize = EXCESS + 1;
-/// The same for many Gaussians: in which 16th of the possible numbers it is, by log2 of the number of
-/// Gaussians.
+/// The same for many Gaussians: in which 16th of the possible numbers it is, by log2 of the number
+/// of Gaussians.
 pub(super) const LARGE_SPLIT: usize = SMALL_SPLIT + SMALL_COUNT;
 /// The number of contexts.
 pub(super) const COUNT: usize = LARGE_SPLIT + 32;

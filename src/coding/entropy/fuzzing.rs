@@ -46,8 +46,8 @@ pub fn encode(items: &[Item]) -> Vec<u8> {
     encoder.finish()
 }
 
-/// Decodes as many symbols and plain bits as `items` has, with its contexts and counts. Returns their
-/// values, and whether the bytes are valid.
+/// Decodes as many symbols and plain bits as `items` has, with its contexts and counts. Returns
+/// their values, and whether the bytes are valid.
 ///
 /// # Panics
 /// When SIMD levels give different results.

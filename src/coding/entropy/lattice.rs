@@ -26,7 +26,8 @@ const STEPS: core::ops::RangeInclusive<f32> = 9.536_743e-7..=1024.0;
 /// finite.
 const MAX_LOGARITHM: f32 = 20.0;
 /// The red, green and blue of one unit along each of the three colour axes: lightness, red against
-/// blue, and green against both. Orthonormal, so that an error has the same size in axes and channels.
+/// blue, and green against both. Orthonormal, so that an error has the same size in axes and
+/// channels.
 const AXES: [[f32; 3]; 3] = [
     [0.577_350_26, 0.577_350_26, 0.577_350_26],
     [0.707_106_77, 0.0, -0.707_106_77],
@@ -133,8 +134,8 @@ pub struct LatticeSteps {
     pub ratio: f32,
     /// Of l21 / l22.
     pub slant: f32,
-    /// Of the amplitude (1.0 is a full sample) times the geometric mean of l11 and l22 in pixels: one
-    /// for each colour axis, which are as many as channels.
+    /// Of the amplitude (1.0 is a full sample) times the geometric mean of l11 and l22 in pixels:
+    /// one for each colour axis, which are as many as channels.
     pub color: Vec<f32>,
 }
 
@@ -155,7 +156,8 @@ impl Lattice {
         Self { position, size, ratio, slant, color }
     }
 
-    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel (spec, section 5.3).
+    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel (spec, section
+    /// 5.3).
     pub(crate) fn parse(payload: &[u8], channels: usize) -> Result<Self, DecodeError> {
         let malformed = |reason| DecodeError::malformed(ChunkType::QNTZ, reason);
         if payload.len() != (GEOMETRY + channels) * size_of::<f32>() {
@@ -289,8 +291,8 @@ impl Lattice {
         units
     }
 
-    /// A code whose centre is moved by one position interval along an axis; `None` at the edge of the
-    /// grid.
+    /// A code whose centre is moved by one position interval along an axis; `None` at the edge of
+    /// the grid.
     pub(crate) fn moved(
         &self,
         code: &Code,

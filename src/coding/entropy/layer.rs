@@ -60,8 +60,8 @@ impl<'a> LayerCoder<'a> {
         Self { lattice, grid, channels: header.color.channels() }
     }
 
-    /// Splits the payload of a layer into the number of its Gaussians, which is 1 to `allowed`, and the
-    /// bytes of the coded Gaussians.
+    /// Splits the payload of a layer into the number of its Gaussians, which is 1 to `allowed`, and
+    /// the bytes of the coded Gaussians.
     pub(crate) fn read_count(payload: &[u8], allowed: u32) -> Result<(usize, &[u8]), DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(ChunkType::GAUS, reason));
         let Some((prefix, bytes)) = payload.split_first_chunk::<LAYER_PREFIX>() else {
@@ -81,8 +81,8 @@ impl<'a> LayerCoder<'a> {
     }
 
     /// Reads `count` Gaussians and passes the code and shape of each on, in the order of the file.
-    /// They are to be dropped if the result is an error: that the bytes are malformed is known at the
-    /// end only. Adds to `statistics` if they are given.
+    /// They are to be dropped if the result is an error: that the bytes are malformed is known at
+    /// the end only. Adds to `statistics` if they are given.
     #[cfg_attr(not(feature = "std"), expect(clippy::needless_pass_by_value))]
     pub(crate) fn read(
         &self,
@@ -177,8 +177,8 @@ impl<'a> LayerCoder<'a> {
         }
     }
 
-    /// The cost in bits of a code with this shape in a cell of a level: its attributes and its position
-    /// within the cell, without the counts of the tree.
+    /// The cost in bits of a code with this shape in a cell of a level: its attributes and its
+    /// position within the cell, without the counts of the tree.
     #[cfg(feature = "encode")]
     pub(crate) fn cost(&self, code: Code, shape: &Shape, level: u32, costs: &SymbolCosts) -> f32 {
         let mut cost = CostCounter { costs, bits: 0.0 };
@@ -302,6 +302,10 @@ mod tests {
         Lattice::new([1.25, 0.66, 0.9, 1.9], color)
     }
 
+    fn coder(lattice: &Lattice) -> LayerCoder<'_> {
+        LayerCoder { lattice, grid: CenterGrid::new(700, 400), channels: lattice.color.len() }
+    }
+
     proptest! {
         #![proptest_config(config(200))]
 
@@ -310,9 +314,9 @@ mod tests {
             (channels, mut codes) in (1_usize..=4).prop_flat_map(|n| (Just(n), codes(n))),
         ) {
             let lattice = lattice(channels);
-            let coding = LayerCoder { lattice: &lattice, grid: CenterGrid::new(700, 400), channels };
+            let coder = coder(&lattice);
             let sent = codes.clone();
-            let EncodedLayer { payload, levels, .. } = coding.write(&mut codes);
+            let EncodedLayer { payload, levels, .. } = coder.write(&mut codes);
             prop_assert_eq!(levels.len(), codes.len());
             // Centres move within their position intervals, all else stays.
             let sorted = |codes: &[Code]| {
@@ -325,17 +329,17 @@ mod tests {
             let mut read = Vec::new();
             let (count, bytes) =
                 LayerCoder::read_count(&payload, codes.len() as u32).expect("the count is right");
-            coding.read(count, bytes, None, |code, _| read.push(code)).expect("the layer is valid");
+            coder.read(count, bytes, None, |code, _| read.push(code)).expect("the layer is valid");
             prop_assert_eq!(&read, &codes);
             // The centres stay where they are when they are written again.
-            prop_assert_eq!(coding.write(&mut codes).payload, payload);
+            prop_assert_eq!(coder.write(&mut codes).payload, payload);
         }
 
         #[test]
         fn a_cut_follows_the_order_of_the_file(mut codes in codes(3), share in 0.0..=1.0) {
             let lattice = lattice(3);
-            let coding = LayerCoder { lattice: &lattice, grid: CenterGrid::new(700, 400), channels: 3 };
-            coding.write(&mut codes);
+            let coder = coder(&lattice);
+            coder.write(&mut codes);
             let first = (share * codes.len() as f64) as usize;
             // Gaussians in the same pixel have no order.
             let pixels = |codes: &[Code]| {
@@ -346,7 +350,7 @@ mod tests {
             };
             let (front, back) = (pixels(&codes[..first]), pixels(&codes[first..]));
             codes.reverse();
-            coding.cut(&mut codes, first);
+            coder.cut(&mut codes, first);
             prop_assert_eq!(pixels(&codes[..first]), front);
             prop_assert_eq!(pixels(&codes[first..]), back);
         }
@@ -357,7 +361,7 @@ mod tests {
             count in prop_oneof![0_u32..2000, any::<u32>()],
         ) {
             let lattice = lattice(3);
-            let coding = LayerCoder { lattice: &lattice, grid: CenterGrid::new(700, 400), channels: 3 };
+            let coder = coder(&lattice);
             let payload = [&count.to_le_bytes(), &bytes[..]].concat();
             let counted = LayerCoder::read_count(&payload, 1000);
             let is_allowed = (1..=1000).contains(&count) && count as usize <= 4 * bytes.len();
@@ -365,10 +369,10 @@ mod tests {
             if let Ok((declared, rest)) = counted {
                 prop_assert_eq!((declared, rest), (count as usize, &bytes[..]));
                 let mut codes = Vec::new();
-                let read = coding.read(declared, rest, None, |code, _| codes.push(code));
+                let read = coder.read(declared, rest, None, |code, _| codes.push(code));
                 // All arrive, also those of a malformed layer.
                 prop_assert_eq!(codes.len(), declared);
-                let sides = coding.grid.whole().sides;
+                let sides = coder.grid.whole().sides;
                 for code in &codes {
                     prop_assert!(code.class <= MAX_CLASS, "{:?}", code);
                     prop_assert!((0..2).all(|axis| code.center[axis] < sides[axis]), "{:?}", code);

@@ -1,5 +1,5 @@
-//! The entropy coding (coding 1): the Gaussians of a layer as a set, in the order of a tree of cells,
-//! with every attribute entropy coded (spec, sections 7.3 to 7.5).
+//! The entropy coding (coding 1): the Gaussians of a layer as a set, in the order of a tree of
+//! cells, with every attribute entropy coded (spec, sections 7.3 to 7.5).
 
 mod attributes;
 mod cells;

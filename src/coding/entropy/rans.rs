@@ -1,5 +1,5 @@
-//! The entropy coder: the range variant of asymmetric numeral systems (rANS) with adaptive models of
-//! sixteen symbols (spec, section 7.3; Duda 2013, Giesen 2014).
+//! The entropy coder: the range variant of asymmetric numeral systems (rANS) with adaptive models
+//! of sixteen symbols (spec, section 7.3; Duda 2013, Giesen 2014).
 
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
@@ -30,8 +30,8 @@ const RATES: [u8; 256] = {
     rates
 };
 
-/// The adaptive probabilities of the symbols of one context. Each model has a cache line of its own,
-/// so that no symbol waits for two.
+/// The adaptive probabilities of the symbols of one context. Each model has a cache line of its
+/// own, so that no symbol waits for two.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(crate) struct Model {
@@ -40,8 +40,8 @@ pub(crate) struct Model {
     seen: u8,
 }
 
-/// For each symbol the starts that a model approaches if only that symbol is coded: each other symbol
-/// has one slot.
+/// For each symbol the starts that a model approaches if only that symbol is coded: each other
+/// symbol has one slot.
 const TARGETS: [[i16; SYMBOLS]; SYMBOLS] = {
     let mut targets = [[0; SYMBOLS]; SYMBOLS];
     let mut symbol = 0;
@@ -88,8 +88,8 @@ impl Model {
 
 /// An encoder or a decoder of symbols and plain bits.
 ///
-/// The syntax of a layer is written once for both: every call is given a value and returns the value
-/// that was coded. An encoder codes the value that it is given; a decoder ignores it.
+/// The syntax of a layer is written once for both: every call is given a value and returns the
+/// value that was coded. An encoder codes the value that it is given; a decoder ignores it.
 pub(crate) trait SymbolCoder {
     /// Codes a symbol below [`SYMBOLS`] with the model of a context, which adapts to it.
     fn symbol(&mut self, context: usize, symbol: u32) -> u32;
@@ -113,8 +113,8 @@ pub(crate) enum Attribute {
     Color,
 }
 
-/// Reads what a [`RansEncoder`] wrote. Malformed bytes give values of some kind as well; at the end,
-/// [`RansDecoder::is_complete`] says whether they were valid.
+/// Reads what a [`RansEncoder`] wrote. Malformed bytes give values of some kind as well; at the
+/// end, [`RansDecoder::is_complete`] says whether they were valid.
 #[derive(Debug)]
 pub(crate) struct RansDecoder<'a, S = BaselineSearch> {
     models: &'a mut [Model],
@@ -149,8 +149,8 @@ impl<'a, S: SymbolSearch> RansDecoder<'a, S> {
         decoder
     }
 
-    /// Whether nothing was malformed, all bytes were read, and the state is the one that the encoder
-    /// began with.
+    /// Whether nothing was malformed, all bytes were read, and the state is the one that the
+    /// encoder began with.
     #[inline(always)]
     pub(crate) fn is_complete(&self) -> bool {
         !self.refused && self.used == self.words.len() && self.state == MIN_STATE

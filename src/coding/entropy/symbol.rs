@@ -1,5 +1,5 @@
-//! From slots to symbols and back (spec, section 7.3). Finding the symbol of a slot is the step that
-//! decoding time depends on most.
+//! From slots to symbols and back (spec, section 7.3). Finding the symbol of a slot is the step
+//! that decoding time depends on most.
 
 #[cfg(feature = "std")]
 use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
@@ -44,7 +44,8 @@ pub(crate) trait SymbolSearch: Copy {
     /// The symbol of a slot below 2^15.
     fn find(self, starts: &CumulativeFrequencies, slot: u32) -> SlotSymbol;
 
-    /// Moves the starts of all symbols towards `targets` by 2^-rate of the difference, rounded down.
+    /// Moves the starts of all symbols towards `targets` by 2^-rate of the difference, rounded
+    /// down.
     fn adapt(self, starts: &mut CumulativeFrequencies, targets: &[i16; SYMBOLS], rate: u8);
 }
 

@@ -74,7 +74,7 @@ fn counts(file: &[u8]) -> SymbolCounts {
     let channels = header.color.channels();
     let steps = of(b"QNTZ").next().expect("steps").1;
     let lattice = Lattice::parse(steps, channels).expect("valid steps");
-    let coding = LayerCoder::new(&lattice, &header);
+    let coder = LayerCoder::new(&lattice, &header);
     let mut counts = vec![[0.0; SYMBOLS]; contexts::COUNT];
     for (_, payload) in of(b"GAUS") {
         let mut models = tables::initial_models();
@@ -82,7 +82,7 @@ fn counts(file: &[u8]) -> SymbolCounts {
             LayerCoder::read_count(payload, header.gaussians).expect("a valid layer");
         let decoder = RansDecoder::new(bytes, &mut models);
         let mut counter = SymbolCounter { coder: decoder, counts };
-        coding.read_with(&mut counter, count, |_, _| ());
+        coder.read_with(&mut counter, count, |_, _| ());
         assert!(counter.coder.is_complete());
         counts = counter.counts;
     }
@@ -90,8 +90,8 @@ fn counts(file: &[u8]) -> SymbolCounts {
     counts.iter().map(|counts| counts.map(|count| factor * count)).collect()
 }
 
-/// The starts that fit the counts of a context. Counts of rare symbols are noisy, so the frequencies of
-/// the table before are added as a prior.
+/// The starts that fit the counts of a context. Counts of rare symbols are noisy, so the
+/// frequencies of the table before are added as a prior.
 fn starts(counts: &[f64; SYMBOLS], before: &[i16; SYMBOLS]) -> [i16; SYMBOLS] {
     /// Fewest slots of a symbol.
     const MIN_SLOTS: f64 = 8.0;

@@ -14,8 +14,8 @@ const MAX_STACK: usize = 2 * 32 + 2;
 
 /// The Gaussians of a layer, in the order of the tree as far as the walk has come.
 pub(super) trait TreeGaussians {
-    /// Moves those of the Gaussians in `range` to the front whose centre lies before `middle` along an
-    /// axis. Returns how many they are: in a decoder, which does not know yet, any number.
+    /// Moves those of the Gaussians in `range` to the front whose centre lies before `middle` along
+    /// an axis. Returns how many they are: in a decoder, which does not know yet, any number.
     fn partition(&mut self, range: Range<usize>, axis: usize, middle: u32) -> usize;
 
     /// Codes a Gaussian that lies in `cell`. The indices are 0, 1, 2 and so on.
@@ -51,7 +51,8 @@ pub(super) fn walk(
     }
 }
 
-/// Codes the `count` Gaussians of a root, which follow `done` others. Returns how many are done then.
+/// Codes the `count` Gaussians of a root, which follow `done` others. Returns how many are done
+/// then.
 #[inline(always)]
 fn walk_root(
     coder: &mut impl SymbolCoder,
@@ -86,7 +87,8 @@ fn walk_root(
     }
 }
 
-/// Codes how many of a cell's `count` Gaussians, which follow `done` others, lie in each of its parts.
+/// Codes how many of a cell's `count` Gaussians, which follow `done` others, lie in each of its
+/// parts.
 #[inline(always)]
 fn code_counts<T>(
     coder: &mut impl SymbolCoder,

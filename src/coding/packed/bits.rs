@@ -13,8 +13,8 @@ pub(crate) struct BitReader {
 }
 
 impl BitReader {
-    /// Reads the next `count` <= 32 bits, and takes as many bytes from `input` as they need. `None` if
-    /// the input ends before; the bytes that were taken are kept.
+    /// Reads the next `count` <= 32 bits, and takes as many bytes from `input` as they need. `None`
+    /// if the input ends before; the bytes that were taken are kept.
     pub(crate) fn read(&mut self, count: u32, input: &mut &[u8]) -> Option<u32> {
         while self.available < count {
             let (&byte, rest) = input.split_first()?;

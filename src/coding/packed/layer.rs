@@ -46,8 +46,8 @@ impl PackedLayerReader {
         }
     }
 
-    /// The number of Gaussians in this layer: 1 to `allowed`, and just as many as the payload has bytes
-    /// for. `None` until its bytes have arrived.
+    /// The number of Gaussians in this layer: 1 to `allowed`, and just as many as the payload has
+    /// bytes for. `None` until its bytes have arrived.
     pub(crate) fn count(
         &mut self,
         input: &mut &[u8],
@@ -97,7 +97,8 @@ impl PackedLayerReader {
         Ok(Some(&self.values))
     }
 
-    /// Checks, after the last byte of the payload, that all Gaussians were read and the padding is zero.
+    /// Checks, after the last byte of the payload, that all Gaussians were read and the padding is
+    /// zero.
     pub(crate) fn finish(&self) -> Result<(), DecodeError> {
         if self.count != Some(self.done) {
             return Err(malformed("too short for its number of Gaussians"));

@@ -1,5 +1,5 @@
-//! LSQ+ quantizers: `value = code * scale + offset`, or the exponential of that (spec, section 6; paper,
-//! section "Compression Framework").
+//! LSQ+ quantizers: `value = code * scale + offset`, or the exponential of that (spec, section 6;
+//! paper, section "Compression Framework").
 
 use alloc::vec::Vec;
 
@@ -27,8 +27,8 @@ pub enum Quantizer {
     Log(UniformQuantizer),
 }
 
-/// A uniform quantizer: the scale and offset that LSQ+ learns, and a bit depth. `value = code * scale +
-/// offset`, in units of the component or of its logarithm.
+/// A uniform quantizer: the scale and offset that LSQ+ learns, and a bit depth. `value = code *
+/// scale + offset`, in units of the component or of its logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformQuantizer {
     /// Bit depth, 1 to 16: codes are 0 to 2^bits - 1.
