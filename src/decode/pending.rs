@@ -1,6 +1,6 @@
-//! Layers of the entropy coding that have arrived and are not decoded yet. They do not depend on each
-//! other, so that they can be decoded in parallel, and those that a region does not need can be
-//! skipped (spec, sections 5.6 and 7.3).
+//! Layers of the entropy coding that have arrived and are not decoded yet. They do not depend on
+//! each other, so that they can be decoded in parallel, and those that a region does not need can
+//! be skipped (spec, sections 5.6 and 7.3).
 
 use alloc::vec::Vec;
 use core::cmp::Reverse;
@@ -105,8 +105,8 @@ impl SelectedLayers<'_> {
     /// Decodes the layers and appends their Gaussians to `gaussians`, in file order. If a layer is
     /// malformed, only the Gaussians of the layers before it are appended.
     ///
-    /// The layers are shared among threads, unless `statistics` are given: then one is decoded after
-    /// the other, and its bits are added to the statistics.
+    /// The layers are shared among threads, unless `statistics` are given: then one is decoded
+    /// after the other, and its bits are added to the statistics.
     ///
     /// # Errors
     /// When a layer is malformed: the error of the first one.
