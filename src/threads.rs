@@ -1,15 +1,15 @@
-//! Work on this thread alone, or also on others of the current `rayon` pool.
+//! Runs work on the caller's thread alone, or on the threads of the current `rayon` pool.
 
 use alloc::vec::Vec;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// The threads that work is shared among. What comes out does not depend on them.
+/// The threads that work is shared among. The result does not depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Threads {
-    /// Those of the current `rayon` pool: the global one, or the one whose `install` makes the call.
-    /// Without the feature `rayon`, the same as [`Threads::One`].
+    /// The threads of the current `rayon` pool: of the global one, or of the one whose `install`
+    /// makes the call. Without the feature `rayon`, the same as [`Threads::One`].
     #[default]
     Pool,
     /// The caller's thread alone.
@@ -17,7 +17,7 @@ pub enum Threads {
 }
 
 impl Threads {
-    /// How many there are.
+    /// The number of threads.
     pub(crate) fn count(self) -> usize {
         #[cfg(feature = "rayon")]
         if self == Self::Pool {
@@ -27,8 +27,8 @@ impl Threads {
     }
 }
 
-/// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
-/// lends its memory from one item to the next.
+/// Calls `work` with every item. Each thread has memory of its own, which it passes to all of its
+/// calls.
 pub(crate) fn for_each<M: Default, T: Send>(
     threads: Threads,
     items: Vec<T>,
@@ -44,7 +44,7 @@ pub(crate) fn for_each<M: Default, T: Send>(
     items.into_iter().for_each(|item| work(&mut memory, item));
 }
 
-/// What `work` makes of every item, in their order.
+/// The results of `work` for every item, in the order of the items.
 pub(crate) fn map<T: Send, R: Send>(
     threads: Threads,
     items: impl Iterator<Item = T>,
@@ -57,11 +57,12 @@ pub(crate) fn map<T: Send, R: Send>(
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
 }
 
-/// How often a thread asks whether the others are done before it falls asleep: some milliseconds.
+/// How often a thread checks whether the others are done before it goes to sleep: for some
+/// milliseconds.
 #[cfg(feature = "rayon")]
 const PATIENCE: u32 = 10_000;
 
-/// A thread that is expected to work; it is done when this is dropped.
+/// Counts a thread that has not finished its work. Dropping it says that the thread has.
 #[cfg(feature = "rayon")]
 struct Expected<'a>(&'a AtomicUsize);
 
@@ -72,8 +73,8 @@ impl Drop for Expected<'_> {
     }
 }
 
-/// Wakes up a thread of the current pool for work that is about to come: that takes as long as some
-/// of the work does.
+/// Wakes up a thread of the current pool, for work that follows soon: waking up takes as long as
+/// some of the work does.
 #[cfg(feature = "std")]
 pub(crate) fn wake(threads: Threads) {
     #[cfg(feature = "rayon")]
@@ -96,19 +97,19 @@ fn on_pool<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send +
             work(&mut memory, item);
         }
     };
-    // Threads of the pool may have to wake up first; this one begins without them.
+    // The threads of the pool may have to wake up first. This thread does not wait for them.
     rayon::in_place_scope(|scope| {
         for _ in 0..others {
             scope.spawn(|_| run());
         }
         run();
-        // What is left is under way and mostly soon done, and who was late soon here. To fall asleep
-        // until then takes longer, and so does it to wake up the others for what comes next.
+        // All items are taken by now, and the other threads will finish soon. Going to sleep until
+        // then would take longer, and so would waking up for what comes next.
         for _ in 0..PATIENCE {
             if expected.load(Ordering::Relaxed) == 0 {
                 break;
             }
-            // Within a busy pool there is nobody but this thread to do what it has spawned.
+            // In a busy pool it may be this thread that has to run what it has spawned.
             if rayon::yield_local() != Some(rayon::Yield::Executed) {
                 std::thread::yield_now();
             }
