@@ -2,32 +2,33 @@
 
 use core::fmt;
 
-/// The first eight bytes of every file: a byte that no text starts with, the name, and line
-/// endings that a transfer in text mode would damage (as in PNG).
+/// The first eight bytes of every file: a byte that no text starts with, the letters `GIP`, and
+/// line endings that a transfer as text would change (as in PNG).
 pub(crate) const SIGNATURE: [u8; 8] = [0xC7, b'G', b'I', b'P', b'\r', b'\n', 0x1A, b'\n'];
 
-/// Longest payload that a chunk may declare.
+/// Longest payload of a chunk, in bytes.
 pub(crate) const MAX_CHUNK_LENGTH: u32 = (1 << 31) - 1;
 
-/// Bytes of a chunk beside its payload: length, type and CRC.
-#[cfg(feature = "std")]
+/// Bytes of a chunk besides its payload: length, type and CRC.
 pub(crate) const FRAMING: usize = 12;
 
-/// The type of a chunk: four ASCII letters. An upper-case first letter means *critical*: a decoder
-/// that does not know the type must refuse the file. Lower case means *ancillary*: skip it.
+/// The type of a chunk: four ASCII letters (spec, section 4.3).
+///
+/// A first letter in upper case means *critical*: a decoder that does not know the type must refuse
+/// the file. Lower case means *ancillary*: a decoder that does not know the type skips the chunk.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ChunkType(pub [u8; 4]);
 
 impl ChunkType {
-    /// The header, always first.
+    /// The header, always the first chunk.
     pub const GHDR: Self = Self(*b"GHDR");
-    /// The quantizers of all attributes.
+    /// The quantizers.
     pub const QNTZ: Self = Self(*b"QNTZ");
     /// One layer of Gaussians.
     pub const GAUS: Self = Self(*b"GAUS");
-    /// Where each layer shows.
+    /// The bounds of the layers: where each of them shows.
     pub const BNDS: Self = Self(*b"bNDS");
-    /// The end of the file.
+    /// The end of the file, always the last chunk.
     pub const GEND: Self = Self(*b"GEND");
     /// An ICC profile.
     pub const ICCP: Self = Self(*b"iCCP");
@@ -38,7 +39,7 @@ impl ChunkType {
     /// A keyword and its text.
     pub const TEXT: Self = Self(*b"tEXt");
 
-    /// Whether a decoder must know this type to show the picture.
+    /// Whether the chunk is critical: a decoder must know this type to show the picture.
     #[must_use]
     pub const fn is_critical(self) -> bool {
         self.0[0].is_ascii_uppercase()

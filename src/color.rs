@@ -1,7 +1,9 @@
 //! The colour models and sample depths that a picture can have (spec, section 5.2).
 
-/// What the channels of a picture mean. Samples are sRGB-encoded unless an ICC profile says
-/// otherwise; alpha is straight (not premultiplied) and linear.
+/// The channels of a picture, in the order of its samples (spec, section 5.2).
+///
+/// Colours are sRGB-encoded unless an ICC profile says otherwise. Alpha is straight (colours are
+/// not premultiplied by it) and linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ColorModel {
@@ -33,13 +35,13 @@ impl ColorModel {
         matches!(self, Self::GrayAlpha | Self::Rgba)
     }
 
-    /// The code that the header stores.
+    /// The code in the header.
     #[cfg(feature = "encode")]
     pub(crate) const fn code(self) -> u8 {
         self.channels() as u8 - 1
     }
 
-    /// The model that a header's code names.
+    /// The colour model with this code in the header.
     pub(crate) const fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Gray),
@@ -51,7 +53,7 @@ impl ColorModel {
     }
 }
 
-/// Bits per sample of the picture that was encoded, and of the natural output.
+/// Bits per sample: of the picture that was encoded, and of the output by default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum SampleDepth {
@@ -62,7 +64,7 @@ pub enum SampleDepth {
 }
 
 impl SampleDepth {
-    /// 8 or 16.
+    /// Bits per sample, 8 or 16.
     #[must_use]
     pub const fn bits(self) -> u8 {
         match self {
@@ -77,7 +79,7 @@ impl SampleDepth {
         self.bits() as usize / 8
     }
 
-    /// The value of a full sample, 255 or 65535.
+    /// The largest sample, 255 or 65535: white, or opaque.
     #[must_use]
     pub const fn max_sample(self) -> u16 {
         match self {
@@ -86,7 +88,7 @@ impl SampleDepth {
         }
     }
 
-    /// The depth of the given number of bits.
+    /// The depth with this number of bits per sample.
     pub(crate) const fn from_bits(bits: u8) -> Option<Self> {
         match bits {
             8 => Some(Self::Eight),

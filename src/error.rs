@@ -1,4 +1,4 @@
-//! What can go wrong while decoding, and where (spec, section 1).
+//! The errors of the decoder (spec, section 1).
 
 use alloc::borrow::Cow;
 use alloc::format;
@@ -11,12 +11,12 @@ use crate::chunk::ChunkType;
 use crate::color::ColorModel;
 use crate::region::Region;
 
-/// Largest width and height of an output. Up to here every pixel centre is exact in `f32`.
+/// Largest width and height of an output: every pixel centre is exact in `f32`.
 pub(crate) const MAX_OUTPUT_SIDE: u32 = 1 << 23;
 
-/// Why a file was not decoded, or not to its end.
+/// Why a file was not decoded, or not to its end (spec, section 11).
 ///
-/// Whatever was decoded before the error stays available from the decoder.
+/// What was decoded before the error remains available from the decoder.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DecodeError {
@@ -31,38 +31,40 @@ pub enum DecodeError {
         /// Which rule.
         reason: Reason,
     },
-    /// The file is sound as far as it can be read, but asks for something that this decoder does
-    /// not know: a later version, another coding, an unknown critical chunk.
+    /// The file may be valid, but requires something that this decoder does not have: a later
+    /// version, another coding, an unknown critical chunk.
     #[error("chunk {chunk}: unsupported: {what}")]
     Unsupported {
-        /// The chunk that asks for it.
+        /// The chunk that requires it.
         chunk: ChunkType,
-        /// What it asks for.
+        /// What it requires.
         what: Unsupported,
     },
-    /// The file ends too early. The Gaussians that had arrived are available.
+    /// The file ends too early. The Gaussians that have arrived are available.
     #[error("unexpected end of the file in {}", match .chunk {
         Some(chunk) => format!("chunk {chunk}"),
         None => String::from("the signature or between two chunks"),
     })]
     UnexpectedEnd {
-        /// The chunk that is incomplete; `None` between two chunks and in the signature.
+        /// The chunk that is incomplete; `None` if the file ends between two chunks, in the length
+        /// and type of a chunk, or in the signature.
         chunk: Option<ChunkType>,
     },
-    /// A bound of [`Limits`](crate::Limits) would be exceeded.
-    #[error("limit exceeded: {kind}: {wanted} wanted, {allowed} allowed")]
+    /// The file or the request requires more than one of the [`Limits`](crate::Limits) allows.
+    #[error("limit exceeded: {kind}: {wanted} required, {allowed} allowed")]
     Limit {
-        /// Which bound.
+        /// Which limit.
         kind: LimitKind,
-        /// What the file or the request asks for.
+        /// What the file or the request requires, in the unit of the limit. It may require more:
+        /// the check ends as soon as the limit is exceeded.
         wanted: u64,
-        /// What the limits allow.
+        /// The limit.
         allowed: u64,
     },
-    /// The caller asked for something that cannot be done.
+    /// The caller requested something that cannot be done.
     #[error("invalid request: {0}")]
     Request(#[from] RequestError),
-    /// An earlier call failed, and the decoder cannot go on from there.
+    /// An earlier call failed. The decoder cannot continue after an error.
     #[error("decoding already failed")]
     AlreadyFailed,
     /// The reader failed.
@@ -72,42 +74,42 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// A broken rule in `chunk`.
+    /// The error of a chunk that breaks a rule.
     pub(crate) fn malformed(chunk: ChunkType, reason: impl Into<Reason>) -> Self {
         Self::Malformed { chunk, reason: reason.into() }
     }
 
-    /// Something that `chunk` asks for and this decoder does not have.
+    /// The error of a chunk that requires something that this decoder does not have.
     pub(crate) fn unsupported(chunk: ChunkType, what: &'static str, value: u32) -> Self {
         Self::Unsupported { chunk, what: Unsupported { what, value: Some(value) } }
     }
 
-    /// A critical chunk of an unknown type.
+    /// The error of a critical chunk of an unknown type.
     pub(crate) fn unknown_critical(chunk: ChunkType) -> Self {
         let what = Unsupported { what: "critical chunk of an unknown type", value: None };
         Self::Unsupported { chunk, what }
     }
 
-    /// Whether more bytes of the same file would have helped.
+    /// Whether the file ended too early: with more bytes, decoding could have continued.
     #[must_use]
     pub fn is_unexpected_end(&self) -> bool {
         matches!(self, Self::UnexpectedEnd { .. })
     }
 }
 
-/// What a caller asked for that cannot be done.
+/// A request of the caller that cannot be fulfilled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RequestError {
     /// The output buffer has the wrong length.
     #[error("the output buffer holds {found} samples, {wanted} are needed")]
     BufferLength {
-        /// Samples that the buffer holds.
+        /// Length of the buffer in samples.
         found: usize,
-        /// Samples that the output has.
+        /// Length of the output in samples.
         wanted: usize,
     },
-    /// The size of the whole output is out of range: each side is 1 to 2^23 pixels.
+    /// The size of the whole output is out of range: each side must be 1 to 2^23 pixels.
     #[error("an output of {width}x{height} pixels; each side must be 1 to {MAX_OUTPUT_SIDE}")]
     OutputSize {
         /// Width in pixels.
@@ -115,30 +117,30 @@ pub enum RequestError {
         /// Height in pixels.
         height: u32,
     },
-    /// The region is empty or reaches beyond the output.
+    /// The region is empty, or not inside the output.
     #[error(
         "the region {}x{} at ({}, {}) is empty or not inside the {width}x{height} output",
         region.width, region.height, region.x, region.y
     )]
     Region {
-        /// The region.
+        /// The region, in output pixels.
         region: Region,
         /// Width of the whole output in pixels.
         width: u32,
         /// Height of the whole output in pixels.
         height: u32,
     },
-    /// The colour model lacks a channel of the stored one.
+    /// The requested colour model lacks a channel of the file's own.
     #[error("{from:?} cannot be written as {to:?}")]
     ColorModel {
         /// The colour model of the file.
         from: ColorModel,
-        /// The one asked for.
+        /// The requested colour model.
         to: ColorModel,
     },
 }
 
-/// Which bound of [`Limits`](crate::Limits) was exceeded.
+/// Which of the [`Limits`](crate::Limits) was exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LimitKind {
@@ -150,9 +152,9 @@ pub enum LimitKind {
     Pixels,
     /// Number of Gaussians.
     Gaussians,
-    /// Bytes of memory.
+    /// Memory in bytes.
     Memory,
-    /// Kernel evaluations.
+    /// Work in kernel evaluations.
     Work,
 }
 
@@ -169,7 +171,8 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// The rule that a malformed chunk breaks, in words. New rules are not breaking changes.
+/// The rule that a malformed chunk breaks, as a text for people. The texts may change in any
+/// release.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Reason(pub(crate) Cow<'static, str>);
 
@@ -191,7 +194,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What a file asks for that this decoder does not know.
+/// What a file requires that this decoder does not have, as a text for people.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unsupported {
     what: &'static str,

@@ -2,34 +2,35 @@
 
 use crate::math;
 
-/// Most components that a Gaussian is stored with: two of position, three of shape, four of
-/// colour.
+/// Most components of a stored Gaussian: two of position, three of shape, four of colour.
 pub(crate) const MAX_COMPONENTS: usize = 9;
-/// Smallest diagonal entry of a Cholesky factor that is drawn, in pixels.
+/// Smallest diagonal entry of the Cholesky factor of a Gaussian that is drawn, in pixels.
 pub(crate) const MIN_DIAGONAL: f32 = 1.0 / 4096.0;
-/// Largest magnitude of a coordinate and of an entry of a Cholesky factor that is drawn, in
-/// pixels.
+/// Largest magnitude of a coordinate, and of an entry of the Cholesky factor, of a Gaussian that is
+/// drawn, in pixels.
 pub(crate) const MAX_EXTENT: f32 = 16_777_216.0;
-/// Largest magnitude of a colour that is drawn.
+/// Largest magnitude of an amplitude of a Gaussian that is drawn.
 pub(crate) const MAX_COLOR: f32 = 65_536.0;
 
-/// One Gaussian of a picture: `color * kernel(q)` is added at every point, where q is the squared
-/// Mahalanobis distance from `center` (paper, equations 1 and 2).
+/// One Gaussian of a picture. It adds `color * weight(q)` at every point, where q is the point's
+/// squared Mahalanobis distance from `center`, and `weight` the picture's [`Kernel`](crate::Kernel)
+/// (spec, sections 8 and 9; paper, equations 1 and 2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian {
-    /// Centre (x, y) in pixels of the stored size: x to the right, y down, the centre of the
-    /// first pixel at (0.5, 0.5).
+    /// Centre (x, y) in pixels of the stored size: x to the right, y down. The centre of the first
+    /// pixel is (0.5, 0.5).
     pub center: [f32; 2],
-    /// The Cholesky factor (l11, l21, l22) of the covariance, in pixels: the covariance is
-    /// L L^T with L lower triangular, so it is positive definite whenever l11, l22 > 0.
+    /// The Cholesky factor (l11, l21, l22) of the covariance, in pixels of the stored size. The
+    /// covariance is L L^T, where L is lower triangular; it is positive definite if l11 and l22 are
+    /// positive.
     pub cholesky: [f32; 3],
-    /// Amplitude per channel, 1.0 being a full sample; may be negative. Channels that the colour
-    /// model lacks are 0.
+    /// Amplitude in each channel of the colour model, where 1.0 is a full sample; may be negative.
+    /// 0 in channels that the colour model lacks.
     pub color: [f32; 4],
 }
 
 impl Gaussian {
-    /// One that adds nothing.
+    /// A Gaussian that adds nothing.
     pub(crate) const NOTHING: Self =
         Self { center: [0.0; 2], cholesky: [1.0, 0.0, 1.0], color: [0.0; 4] };
 
@@ -40,28 +41,28 @@ impl Gaussian {
         [l11 * l11, l11 * l21, l21 * l21 + l22 * l22]
     }
 
-    /// The conic (xx, xy, yy), the inverse of the covariance:
-    /// q = xx dx^2 + 2 xy dx dy + yy dy^2. Not finite for a degenerate Gaussian.
+    /// The conic (xx, xy, yy), which is the inverse of the covariance, in 1 per square pixel:
+    /// q = xx dx^2 + 2 xy dx dy + yy dy^2. It is not finite if l11 or l22 is 0.
     #[must_use]
     pub fn conic(&self) -> [f32; 3] {
         let [i11, w, i22] = inverse_cholesky(self.cholesky);
         [i11 * i11 + w * w, w * i22, i22 * i22]
     }
 
-    /// How much the Gaussian adds to the picture by itself: squared samples summed up over the
-    /// pixels, but for a constant of the kernel.
+    /// The energy of the Gaussian: what it adds, squared and summed up over pixels and channels, up
+    /// to a constant factor of the kernel.
     #[cfg(feature = "encode")]
     pub(crate) fn importance(&self) -> f32 {
         let [l11, _, l22] = self.cholesky;
         self.color.iter().map(|color| color * color).sum::<f32>() * l11 * l22
     }
 
-    /// Whether the renderer draws this Gaussian: all values within the format's bounds and the
-    /// covariance positive definite (spec, section 8.5).
+    /// Whether the Gaussian is drawn: its covariance is positive definite, and all values are
+    /// within the bounds of the format (spec, section 8.5).
     #[must_use]
     pub fn is_drawable(&self) -> bool {
         let [l11, l21, l22] = self.cholesky;
-        // Comparisons that NaN fails.
+        // NaN fails every comparison.
         self.center.iter().all(|c| c.abs() <= MAX_EXTENT)
             && (MIN_DIAGONAL..=MAX_EXTENT).contains(&l11)
             && (MIN_DIAGONAL..=MAX_EXTENT).contains(&l22)
@@ -69,7 +70,7 @@ impl Gaussian {
             && self.color.iter().all(|c| c.abs() <= MAX_COLOR)
     }
 
-    /// A Gaussian from its stored components, in file order.
+    /// A Gaussian from its components in the order of the file (spec, section 8.1).
     pub(crate) fn from_components(values: &[f32], parameterization: Parameterization) -> Self {
         let mut color = [0.0; 4];
         color[..values.len() - 5].copy_from_slice(&values[5..]);
@@ -81,29 +82,29 @@ impl Gaussian {
     }
 }
 
-/// The inverse (i11, w, i22) of a Cholesky factor: q = (i11 dx)^2 + (w dx + i22 dy)^2.
+/// The inverse (i11, w, i22) of a Cholesky factor, with which q = (i11 dx)^2 + (w dx + i22 dy)^2.
 pub(crate) fn inverse_cholesky([l11, l21, l22]: [f32; 3]) -> [f32; 3] {
     let (i11, i22) = (1.0 / l11, 1.0 / l22);
     [i11, -(l21 * i11) * i22, i22]
 }
 
-/// What the three shape components of a stored Gaussian mean (paper, section "2D Gaussian
-/// Splatting": the three parameterizations).
+/// What the three components of a stored shape mean: the three parameterizations of the paper's
+/// section "2D Gaussian Splatting" (spec, sections 8.2 to 8.4).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Parameterization {
-    /// The covariance itself: (xx, xy, yy) in square pixels. The paper's own choice. Not every
-    /// triple is a covariance; those that are not are not drawn.
+    /// The covariance itself: (xx, xy, yy) in square pixels, as the paper has it. Not every triple
+    /// is a covariance; a Gaussian with one that is not is not drawn.
     Covariance,
     /// The Cholesky factor of the covariance: (l11, l21, l22) in pixels.
     Cholesky,
-    /// Standard deviations along the two axes in pixels, and the angle of the first axis against
-    /// x in radians, towards y: (s1, s2, angle).
+    /// (s1, s2, angle): the standard deviations in pixels along two perpendicular axes, and the
+    /// angle in radians from x to the first axis, towards y.
     RotationScale,
 }
 
 impl Parameterization {
-    /// The code that the header stores.
+    /// The code in the header.
     #[cfg(feature = "encode")]
     pub(crate) const fn code(self) -> u8 {
         match self {
@@ -113,7 +114,7 @@ impl Parameterization {
         }
     }
 
-    /// The parameterization that a header's code names.
+    /// The parameterization with this code in the header.
     pub(crate) const fn from_code(code: u8) -> Option<Self> {
         match code {
             0 => Some(Self::Covariance),
@@ -123,12 +124,12 @@ impl Parameterization {
         }
     }
 
-    /// The Cholesky factor that stored values stand for; entries that are not finite or not
-    /// positive where the values are no covariance.
+    /// The Cholesky factor (l11, l21, l22) of a stored shape. If that is not a covariance, an entry
+    /// is not finite or not positive, so that the Gaussian is not drawn.
     pub(crate) fn to_cholesky(self, [a, b, c]: [f32; 3]) -> [f32; 3] {
         match self {
             Self::Covariance => {
-                // Of a negative number the root is NaN, which is never drawn.
+                // The root of a negative number is NaN.
                 let l11 = math::sqrt(a);
                 let l21 = b / l11;
                 [l11, l21, math::sqrt(c - l21 * l21)]
@@ -153,7 +154,7 @@ mod tests {
     use crate::testing::config;
     use proptest::prelude::*;
 
-    /// The covariance that a parameterization's values stand for, in f64.
+    /// The covariance of a stored shape, in f64.
     fn covariance(parameterization: Parameterization, values: [f32; 3]) -> [f64; 3] {
         let [a, b, c] = values.map(f64::from);
         match parameterization {
@@ -171,7 +172,7 @@ mod tests {
         #![proptest_config(config(200))]
 
         #[test]
-        fn every_chart_yields_its_covariance(
+        fn every_parameterization_gives_its_covariance(
             s1 in 0.01_f32..1000.0, s2 in 0.01_f32..1000.0, angle in -7.0_f32..7.0,
         ) {
             // Comparable axes keep the direct covariance well conditioned in f32.
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_covariance_is_not_drawn() {
+    fn a_shape_that_is_not_a_covariance_is_not_drawn() {
         for values in
             [[-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [1.0, 1.0, 1.0], [0.0; 3], [1.0, 2.0, 1.0]]
         {

@@ -1,7 +1,7 @@
-//! Everything that touches the `image` crate: hooks, [`GipDecoder`], and with the feature `encode`
+//! The integration with the `image` crate: hooks, [`GipDecoder`], and with the feature `encode`
 //! `GipEncoder`.
 //!
-//! The names are prefixed because they are used next to `image`'s own.
+//! The names have a prefix because they are used next to those of `image`.
 
 use std::io::Read;
 use std::sync::OnceLock;
@@ -21,15 +21,15 @@ use crate::limits::Limits;
 use crate::region::Region;
 use crate::render::RenderOptions;
 
-/// The extension of `.gip` files, in the form in which `image` keeps it.
+/// The extension of `.gip` files, in the form that `image` expects.
 const EXTENSION: &str = "gip";
 
-/// Makes `image` read `.gip` files: by their extension, as `image::open` does, and by their
-/// content, as `ImageReader::with_guessed_format` and `image::load_from_memory` do.
+/// Makes `image` read `.gip` files. They are recognized by their extension, as in `image::open`,
+/// and by their content, as in `ImageReader::with_guessed_format` and `image::load_from_memory`.
 ///
-/// Call it once at the start of the program; further calls do nothing. Returns whether `.gip` is
-/// read by this crate now: `false` means that another decoder had taken the extension before, and
-/// that one stays.
+/// Call it once at the start of the program; further calls do nothing. Returns whether `image` now
+/// uses this crate for `.gip`: `false` means that another decoder was registered for the extension
+/// before, and remains.
 ///
 /// `image` has no such hook for writing: use `GipEncoder` (feature `encode`) with
 /// `DynamicImage::write_with_encoder`.
@@ -44,7 +44,7 @@ const EXTENSION: &str = "gip";
 pub fn register() -> bool {
     static REGISTERED: OnceLock<bool> = OnceLock::new();
     *REGISTERED.get_or_init(|| {
-        // `image` bounds width, height and memory itself, as its caller wishes.
+        // `image` has limits of its own for width, height and memory, which its caller sets.
         let limits = Limits {
             max_width: u32::MAX,
             max_height: u32::MAX,
@@ -64,20 +64,21 @@ pub fn register() -> bool {
     })
 }
 
-/// Decodes `.gip` for `image`: an [`ImageDecoder`] and [`ImageDecoderRect`] over any reader.
+/// Decodes `.gip` for `image`: an [`ImageDecoder`] and [`ImageDecoderRect`] over any reader. The
+/// samples have the file's own colour model and depth.
 ///
-/// A file that ends before its last Gaussian is an error, as `image` has it. For the picture so
-/// far use [`Decoder`].
+/// A file that ends too early is an error. For the picture of the Gaussians that have arrived, use
+/// [`Decoder`].
 #[derive(Debug)]
 pub struct GipDecoder<R> {
     decoder: Decoder<R>,
     limits: Limits,
-    /// Width and height of the whole output.
+    /// Width and height of the whole output in pixels.
     size: (u32, u32),
 }
 
 impl<R: Read> GipDecoder<R> {
-    /// Reads header and metadata, with the default [`Limits`].
+    /// Reads the header and the metadata, with the default [`Limits`].
     ///
     /// # Errors
     /// As [`Decoder::new`].
@@ -85,7 +86,7 @@ impl<R: Read> GipDecoder<R> {
         Self::new_with_limits(reader, Limits::default())
     }
 
-    /// Reads header and metadata, with the given limits.
+    /// Reads the header and the metadata, with the given limits.
     ///
     /// # Errors
     /// As [`Decoder::new_with_limits`].
@@ -95,21 +96,23 @@ impl<R: Read> GipDecoder<R> {
         Ok(Self { decoder, limits, size })
     }
 
-    /// Renders the whole picture `width` by `height` pixels large instead of at its stored size;
-    /// see [`RenderOptions::with_size`]. Dimensions and rectangles are in pixels of that size then.
+    /// Renders the whole picture with `width` x `height` pixels instead of its stored size; see
+    /// [`RenderOptions::with_size`]. Dimensions and rectangles are then in pixels of that size.
     ///
     /// # Errors
-    /// When a side is zero or exceeds the limits. The size stays as it was then.
+    /// When a side is zero or exceeds the limits. The size then remains as it was.
     pub fn set_size(&mut self, width: u32, height: u32) -> ImageResult<()> {
         if width == 0 || height == 0 {
-            return Err(parameter(format!("an output size of {width}x{height}")));
+            return Err(parameter(format!(
+                "an output size of {width}x{height}; each side must be at least 1"
+            )));
         }
         self.limits.check_size(width, height)?;
         self.size = (width, height);
         Ok(())
     }
 
-    /// Renders a rectangle into rows that begin `row_pitch` bytes apart.
+    /// Renders a region into rows that begin `row_pitch` bytes apart.
     fn render(&mut self, region: Region, buf: &mut [u8], row_pitch: usize) -> ImageResult<()> {
         let (width, height) = self.size;
         let options = RenderOptions::new().with_size(width, height).with_region(region);
@@ -117,7 +120,7 @@ impl<R: Read> GipDecoder<R> {
         let depth = self.decoder.header().depth;
         let row = region.width as usize * usize::from(self.color_type().bytes_per_pixel());
         let samples = self.decoder.output_len()?;
-        // A copy of the output stands next to what the decoder holds.
+        // The memory of a copy of the output is checked by itself, next to what the decoder holds.
         let copy = (samples as u64).saturating_mul(depth.bytes() as u64);
         let scratch = || self.limits.check_memory(copy);
         match depth {
@@ -179,14 +182,15 @@ impl<R: Read> ImageDecoder for GipDecoder<R> {
         Ok(self.decoder.metadata().xmp.clone())
     }
 
-    /// Takes over `max_image_width`, `max_image_height` and, for all that this decoder holds next
-    /// to the caller's buffer, `max_alloc`. What `image` has no limit for, the number of Gaussians
-    /// and the work of rendering, stays limited as it was.
+    /// Checks `max_image_width` and `max_image_height`, and uses `max_alloc` as the limit of all
+    /// memory but the caller's buffer. The limits that `image` does not have, of the number of
+    /// Gaussians and of the work of rendering, remain as they were.
     fn set_limits(&mut self, limits: ::image::Limits) -> ImageResult<()> {
         limits.check_support(&::image::LimitSupport::default())?;
         let (width, height) = self.dimensions();
         limits.check_dimensions(width, height)?;
-        // The stored size may be larger than what was asked for: it costs nothing.
+        // The stored size is not checked: it may be larger than the requested one, which costs
+        // nothing.
         self.limits.max_memory = limits.max_alloc.unwrap_or(u64::MAX);
         Ok(self.decoder.set_limits(self.limits.clone())?)
     }
@@ -204,9 +208,9 @@ impl<R: Read> ImageDecoder for GipDecoder<R> {
 }
 
 impl<R: Read> ImageDecoderRect for GipDecoder<R> {
-    /// Renders only this rectangle, at a cost that follows its size: of a large picture, layers that do
-    /// not show in it are not decoded. It may be called any number of times; the reader is read to its
-    /// end by the first call.
+    /// Renders only this rectangle, and skips layers that do not show in it, so that the cost
+    /// depends on its size. It may be called any number of times. The first call reads the whole
+    /// file.
     fn read_rect(
         &mut self,
         x: u32,
@@ -222,7 +226,7 @@ impl<R: Read> ImageDecoderRect for GipDecoder<R> {
             .and_then(|bytes| bytes.checked_add(row));
         if (row_pitch as u64) < row || needed.is_none_or(|needed| (buf.len() as u64) < needed) {
             return Err(parameter(format!(
-                "a buffer of {} bytes with {row_pitch} per row for {width}x{height} pixels",
+                "a buffer of {} bytes with {row_pitch} per row is too small for {width}x{height} pixels",
                 buf.len()
             )));
         }
@@ -286,8 +290,8 @@ mod encoder {
     use crate::color::{ColorModel, SampleDepth};
     use crate::encode::{EncodeError, Encoder, Source, SourceError};
 
-    /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and RGB
-    /// pictures with or without alpha.
+    /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and
+    /// RGB pictures with or without alpha.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -303,18 +307,18 @@ mod encoder {
     }
 
     impl<W> GipEncoder<W> {
-        /// Writes a file with the default options of [`Encoder`].
+        /// An encoder with the default options of [`Encoder`].
         pub fn new(writer: W) -> Self {
             Self::with_encoder(writer, Encoder::new())
         }
 
-        /// Writes a file with the options of `encoder`.
+        /// An encoder with the options of `encoder`.
         pub fn with_encoder(writer: W, encoder: Encoder) -> Self {
             Self { writer, encoder }
         }
     }
 
-    // By hand, for writers that have no `Debug`.
+    // Not derived, because a writer need not have `Debug`.
     impl<W> fmt::Debug for GipEncoder<W> {
         fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
             f.debug_struct("GipEncoder").field("encoder", &self.encoder).finish_non_exhaustive()
@@ -351,9 +355,7 @@ mod encoder {
                 SampleDepth::Sixteen => {
                     let (samples, rest) = buf.as_chunks();
                     if !rest.is_empty() {
-                        return Err(parameter(
-                            "half a 16-bit sample at the end of the buffer".into(),
-                        ));
+                        return Err(parameter("the buffer ends within a 16-bit sample".into()));
                     }
                     let samples: Vec<_> = samples.iter().copied().map(u16::from_ne_bytes).collect();
                     self.encoder.encode(&Source::new_u16(width, height, color, &samples)?)

@@ -1,39 +1,40 @@
-//! The kernel: how a Gaussian falls off with the squared Mahalanobis distance q (spec, section
-//! 9.3).
+//! The kernel: the weight of a Gaussian at a squared Mahalanobis distance q (spec, section 9.3).
 
 use crate::chunk::ChunkType;
 use crate::error::DecodeError;
 use crate::math;
 
-/// Largest cut-off of the reference kernel.
+/// Largest cut-off of the exponential kernel.
 const MAX_CUTOFF: f32 = 64.0;
 /// The Mahalanobis distance at which the quartic kernel ends.
 pub(crate) const QUARTIC_RADIUS: f32 = 2.0;
-/// Its square.
+/// The cut-off of the quartic kernel: the square of that.
 pub(crate) const QUARTIC_CUTOFF: f32 = QUARTIC_RADIUS * QUARTIC_RADIUS;
 
-/// What is added at squared Mahalanobis distance q from a Gaussian's centre, relative to its
-/// colour.
+/// The weight of a Gaussian at a squared Mahalanobis distance q from its centre: what is added to
+/// each channel is its amplitude times this weight (spec, section 9.3; paper, equations 1 and 2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Kernel {
-    /// The paper's: exp(-q / 2) for q up to a cut-off, else 0. Discontinuous there.
+    /// The kernel of the paper: exp(-q / 2) for q up to a cut-off, else 0. It is discontinuous at
+    /// the cut-off.
     Exponential {
-        /// The largest q that is drawn, in (0, 64]. The paper's code draws weights of at least
-        /// 1/255, that is up to 2 ln 255 = 11.08.
+        /// The largest q with a weight over 0: over 0, at most 64. The paper's code draws weights
+        /// of at least 1/255, which is a q of at most 2 ln 255 = 11.08.
         cutoff: f32,
     },
-    /// (1 - q / 4)^2 for q < 4, else 0, the quartic or biweight kernel of statistics: like
-    /// exp(-q / 2) near the centre, but without an exponential, smooth where it ends, and with far
-    /// fewer pixels under it.
+    /// (1 - q / 4)^2 for q < 4, else 0: the quartic or biweight kernel of statistics. Near the
+    /// centre it is like exp(-q / 2), but it needs no exponential, ends smoothly, and covers far
+    /// fewer pixels.
     Quartic,
 }
 
 impl Kernel {
-    /// The paper's kernel as its released code cuts it off: at weights below 1/255.
+    /// The kernel of the paper with the cut-off of its released code, which draws weights of at
+    /// least 1/255.
     pub const PAPER: Self = Self::Exponential { cutoff: 11.082_527 };
 
-    /// The value of q from which on nothing is drawn.
+    /// The cut-off: the weight is 0 for every larger q.
     #[must_use]
     pub const fn cutoff(self) -> f32 {
         match self {
@@ -42,8 +43,8 @@ impl Kernel {
         }
     }
 
-    /// By what distances are multiplied before the weight is taken: the quartic kernel ends at a
-    /// distance of 1 then, which saves a pixel two operations.
+    /// The factor of all distances before the weight is computed. It makes the quartic kernel end
+    /// at a distance of 1, which saves two operations per pixel (spec, section 9.2).
     pub(crate) const fn scale(self) -> f32 {
         match self {
             Self::Exponential { .. } => 1.0,
@@ -51,7 +52,7 @@ impl Kernel {
         }
     }
 
-    /// Its variance along each axis, for a covariance of 1.
+    /// The variance of the kernel along each axis, for a stored covariance of 1.
     pub(crate) const fn variance(self) -> f32 {
         match self {
             Self::Exponential { .. } => 1.0,
@@ -59,7 +60,8 @@ impl Kernel {
         }
     }
 
-    /// The weight at a point (u, v), in scaled distances, which may be infinite.
+    /// The weight at a point (u, v), in distances multiplied by [`Kernel::scale`]. They may be
+    /// infinite.
     pub(crate) fn weight(self, (u, v): (f32, f32)) -> f32 {
         match self {
             Self::Exponential { cutoff } => {
@@ -73,7 +75,7 @@ impl Kernel {
         }
     }
 
-    /// The code that the header stores.
+    /// The code in the header.
     #[cfg(feature = "encode")]
     pub(crate) const fn code(self) -> u8 {
         match self {
@@ -82,7 +84,7 @@ impl Kernel {
         }
     }
 
-    /// The kernel that a header names, with the cut-off that it states.
+    /// The kernel with this code and cut-off in the header.
     pub(crate) fn parse(code: u8, cutoff: f32) -> Result<Self, DecodeError> {
         const CHUNK: ChunkType = ChunkType::GHDR;
         match code {

@@ -1,20 +1,20 @@
 #![cfg_attr(not(feature = "std"), no_std)]
-// The encoder needs `std` anyway; what works without it says so in its imports.
+// The decoder works without `std`, so it imports from `core` and `alloc`. The encoder needs `std`.
 #![cfg_attr(
     not(feature = "encode"),
     warn(clippy::alloc_instead_of_core, clippy::std_instead_of_alloc, clippy::std_instead_of_core)
 )]
-// The README's code is compiled with the documentation's.
+// The code in the README is compiled as well.
 #![cfg_attr(all(doctest, feature = "encode"), doc = include_str!("../README.md"))]
 
 //! `.gip`: pictures made of 2D Gaussians.
 //!
-//! A `.gip` file holds a few thousand Gaussians, each with a centre, a covariance and a colour,
-//! that add up to a picture (the representation of GaussianImage++). It has no pixels until it is
-//! rendered: at any size and in any part, at a cost that follows the output. Any prefix of the
-//! file that reaches beyond its header is a picture already. The decoder's arithmetic is specified
-//! to the last bit, so all machines show the same samples. Version 1 of the format may still be
-//! corrected until its first release; from then on it stays as it is.
+//! A `.gip` file has some thousands of Gaussians, each with a centre, a covariance and a colour,
+//! whose sum is a picture (the representation of GaussianImage++). It can be rendered at any size
+//! and in any part, at a cost that depends on the size of the output. Every prefix of the file from
+//! the header on gives a picture, the more Gaussians the better. The decoder's arithmetic is
+//! specified to the last bit, so the samples are the same on all machines. Until its first release,
+//! version 1 of the format may still be corrected; from then on it does not change.
 //!
 //! # Encode and decode
 //!
@@ -42,42 +42,42 @@
 //!
 //! # Which decoder
 //!
-//! | | takes | layers are decoded | for a region of a large picture |
+//! | | input | layers are decoded | layers that do not show in a region |
 //! | --- | --- | --- | --- |
-//! | [`decode`](decode()) | a whole file in memory | on many threads | - |
-//! | `Decoder` | any `Read` | on many threads, when an output needs them | skips layers that do not show |
-//! | [`StreamDecoder`] | bytes as they arrive, in pieces of any size | as they arrive, on the caller's thread | decodes all layers |
+//! | [`decode`](decode()) | a whole file in memory | in parallel | - (no regions) |
+//! | `Decoder` | any `Read` | in parallel, when an output needs them | are skipped |
+//! | [`StreamDecoder`] | bytes as they arrive, in pieces of any size | as they arrive, on the caller's thread | are decoded |
 //!
-//! `Decoder` needs the feature `std`. Work is shared among the [`Threads`] of the options; the result
-//! does not depend on them.
+//! `Decoder` needs the feature `std`. [`RenderOptions::with_threads`] sets the [`Threads`] that
+//! work is shared among; the result does not depend on them.
 //!
 //! # Where to find what
 //!
-//! - **Decoding:** the three above. [`Limits`] bounds what a file may cost; [`DecodeError`] says what
-//!   was wrong. [`Header`] and [`Metadata`] are what the file says of its picture.
-//! - **Rendering:** [`Picture`] is a header and the Gaussians so far; [`RenderOptions`] says at
-//!   which size, which [`Region`], and in which [`ColorModel`].
+//! - **Decoding:** the three above. [`Limits`] bounds the memory and the work that a file may take;
+//!   [`DecodeError`] says why a file was not decoded. [`Header`] and [`Metadata`] describe the
+//!   picture.
+//! - **Rendering:** [`Picture`] is a header with the Gaussians that have arrived; [`RenderOptions`]
+//!   has the output size, the [`Region`] and the [`ColorModel`].
 //! - **The model:** [`Gaussian`], its stored shape ([`Parameterization`]), the [`Kernel`], and the
-//!   [`Quantizer`]s or [`LatticeSteps`] between codes and values.
-//! - **Encoding** (feature `encode`): [`encode`](encode()), or an `Encoder`, which fits a `Source` to
-//!   a `Target` and returns the file with a `Report`.
+//!   [`Quantizer`]s or [`LatticeSteps`] that relate codes to values.
+//! - **Encoding** (feature `encode`): [`encode`](encode()), or an `Encoder`, which encodes a
+//!   `Source` for a `Target` and returns the file with a `Report`.
 //! - **The `image` crate** (feature `image`): `register` makes `image::open` read `.gip`.
 //!
-//! # What may change
+//! # Stability
 //!
-//! Three things are for those who study the method, and are outside of what a release promises to
-//! keep: the modules `training` and `metrics`, and
-//! [`RenderOptions::with_reference`].
+//! The modules `training` and `metrics` and [`RenderOptions::with_reference`] are for the study of
+//! the method. They may change in any release.
 //!
 //! # Features
 //!
 //! | feature | default | what it adds |
 //! | --- | --- | --- |
-//! | `decode` | yes | the decoder; alone, it is `no_std` + `alloc` with three small dependencies |
-//! | `std` | yes | `Decoder`, and SIMD chosen at run time |
-//! | `rayon` | yes | threads in the decoder; the output stays the same bit for bit |
+//! | `decode` | yes | the decoder; by itself it is `no_std` with `alloc`, and has three small dependencies |
+//! | `std` | yes | `Decoder`, and SIMD at the level that the machine supports |
+//! | `rayon` | yes | threads in the decoder; the output is the same bit for bit |
 //! | `encode` | yes | the encoder |
-//! | `image` | no | hooks and `ImageDecoder` for the `image` crate; with `encode` also `ImageEncoder` |
+//! | `image` | no | hooks and an `ImageDecoder` for the `image` crate; with `encode` also an `ImageEncoder` |
 //! | `cli` | no | the command line tool `gip` |
 
 #[cfg(feature = "decode")]
@@ -167,7 +167,7 @@ pub use coding::entropy::fuzzing;
 
 #[cfg(feature = "encode")]
 pub mod training {
-    //! The constants of training, for those who study the method: see [`Training`].
+    //! The constants of training, for the study of the method; see [`Training`].
 
     pub use crate::encode::training::{
         Densification, Distortion, GaussianFilter, LearningRateSchedule, NewColor, NewShape,

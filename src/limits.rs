@@ -1,11 +1,12 @@
-//! Every bound that a decoder applies to a file it does not trust (spec, section 10).
+//! What a decoder spends on a file at most (spec, section 10).
 
 use crate::error::{DecodeError, LimitKind};
 
-/// Bounds that are checked before anything is allocated or computed.
+/// What a decoder spends on a file at most. Each limit is checked before the memory is allocated or
+/// the work is done (spec, section 10).
 ///
-/// The defaults accept every ordinary picture and keep a hostile file to a few seconds and a few
-/// hundred megabytes. All fields may be changed; `Limits::none()` lifts them all.
+/// The defaults accept every ordinary picture, and bound what a hostile file costs to a few seconds
+/// and a few hundred megabytes. All fields may be changed; [`Limits::none`] removes all limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
@@ -17,12 +18,12 @@ pub struct Limits {
     pub max_pixels: u64,
     /// Most Gaussians. Default 2^22.
     pub max_gaussians: u32,
-    /// Most bytes that decoder and renderer may hold at a time, the caller's own output buffer
-    /// not counted. Default 512 MiB.
+    /// Most bytes that the decoder and the renderer may hold at any time; the caller's output
+    /// buffer does not count. Default 512 MiB.
     pub max_memory: u64,
-    /// Most kernel evaluations in one rendering: the sum over the Gaussians of the pixels that
-    /// each covers at most, in whole tiles of 8x8 and as if it were as wide everywhere as at its
-    /// widest. Default 2^32, a few seconds on one core.
+    /// Most kernel evaluations in one rendering. Each Gaussian counts with an upper bound of the
+    /// pixels that it covers: the rows of 8 x 8 tiles that it reaches, times the most tiles that it
+    /// can reach in one of them, times 64. Default 2^32, a few seconds on one core.
     pub max_work: u64,
 }
 
@@ -40,7 +41,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// No bounds but those of the format itself. For trusted files only.
+    /// No limits but those of the format. For trusted files only.
     #[must_use]
     pub const fn none() -> Self {
         Self {
@@ -53,7 +54,7 @@ impl Limits {
         }
     }
 
-    /// Checks the size of a picture, in pixels.
+    /// Checks the size of a picture in pixels.
     pub(crate) fn check_size(&self, width: u32, height: u32) -> Result<(), DecodeError> {
         check(LimitKind::Width, u64::from(width), u64::from(self.max_width))?;
         check(LimitKind::Height, u64::from(height), u64::from(self.max_height))?;
@@ -65,12 +66,12 @@ impl Limits {
         check(LimitKind::Gaussians, u64::from(count), u64::from(self.max_gaussians))
     }
 
-    /// Checks bytes held at a time.
+    /// Checks the memory that is held at one time, in bytes.
     pub(crate) fn check_memory(&self, bytes: u64) -> Result<(), DecodeError> {
         check(LimitKind::Memory, bytes, self.max_memory)
     }
 
-    /// Checks kernel evaluations.
+    /// Checks the work of one rendering, in kernel evaluations.
     pub(crate) fn check_work(&self, evaluations: u64) -> Result<(), DecodeError> {
         check(LimitKind::Work, evaluations, self.max_work)
     }

@@ -1,24 +1,23 @@
-//! The few functions whose every bit the specification fixes (spec, section 3).
+//! The functions that the specification defines to the last bit (spec, section 3).
 //!
-//! Platform mathematics libraries differ in the last bits of `exp`, `sin` and `cos`, so the
-//! format brings its own: IEEE 754 additions and multiplications in a stated order, never
-//! contracted to fused operations. `sqrt` is correctly rounded everywhere, hence the same bits
-//! from hardware and from the integer version that serves builds without `std`.
+//! The mathematics libraries of platforms differ in the last bits of `exp`, `sin` and `cos`, so the
+//! format defines its own: IEEE 754 additions and multiplications in a stated order, never fused.
+//! `sqrt` is correctly rounded everywhere, so hardware gives the same bits as the integer version
+//! for builds without `std`.
 
-/// Adding and subtracting this rounds an `f32` below 2^22 in magnitude to the nearest integer,
+/// Adding and then subtracting this rounds an `f32` of magnitude below 2^22 to the nearest integer,
 /// ties to even.
 pub(crate) const ROUND_MAGIC: f32 = 12_582_912.0;
 /// log2(e).
 pub(crate) const LOG2_E: f32 = core::f32::consts::LOG2_E;
-/// The coefficients of 2^f on [-1/2, 1/2], highest power first; relative error 2e-8 before
-/// rounding.
+/// The coefficients of a polynomial for 2^f on [-1/2, 1/2], highest power first. Its relative error
+/// is 2e-8, rounding not counted.
 pub(crate) const EXP2_POLYNOMIAL: [f32; 7] =
     [1.540_353e-4, 1.333_355_8e-3, 9.618_129e-3, 5.550_411e-2, 2.402_265e-1, 6.931_472e-1, 1.0];
 
 /// e^x for finite x, from the specification's polynomial (spec, section 3.1).
 ///
-/// The argument in powers of two is clamped to [-126, 126], so the result is always finite and
-/// normal.
+/// The exponent of two is clamped to [-126, 126], so the result is always finite and normal.
 pub(crate) fn exp(x: f32) -> f32 {
     let y = (x * LOG2_E).clamp(-126.0, 126.0);
     let n = (y + ROUND_MAGIC) - ROUND_MAGIC;
@@ -27,14 +26,14 @@ pub(crate) fn exp(x: f32) -> f32 {
     for &coefficient in &EXP2_POLYNOMIAL[1..] {
         p = p * f + coefficient;
     }
-    // |n| <= 126, so the biased exponent stays inside (0, 255).
+    // |n| <= 126, so the biased exponent is within 1 to 254.
     p * f32::from_bits(((n as i32 + 127) as u32) << 23)
 }
 
 /// (sin x, cos x) for |x| <= 1024, from the specification's polynomials (spec, section 3.2).
 pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     let n = (x * core::f32::consts::FRAC_2_PI + ROUND_MAGIC) - ROUND_MAGIC;
-    // pi/2 in two parts, the first with few enough bits that `n * part` is exact.
+    // pi/2 in two parts. The first has so few bits that its product with n is exact.
     let r = (x - n * 1.570_312_5) - n * 4.838_268e-4;
     let r2 = r * r;
     let sin = ((-1.951_529_6e-4 * r2 + 8.332_161e-3) * r2 - 1.666_665_5e-1) * r2 * r + r;
@@ -78,8 +77,8 @@ fn soft_sqrt(x: f32) -> f32 {
     } else {
         mantissa |= 0x80_0000;
     }
-    // x = mantissa * 2^(exponent - 150); make that power even, then take an integer root that
-    // carries one bit more than the result, and a sticky remainder.
+    // x = mantissa * 2^(exponent - 150). Make that power even, then take an integer root with more
+    // bits than the result; `exact` tells whether it has a remainder.
     let mut power = exponent - 150;
     if power & 1 != 0 {
         mantissa <<= 1;
@@ -91,12 +90,12 @@ fn soft_sqrt(x: f32) -> f32 {
     let half = 1_u64 << (extra - 1);
     let exact = root * root == mantissa << 26;
     let (mut kept, rest) = (root >> extra, root & ((1 << extra) - 1));
-    // A root of a 24-bit number is never exactly halfway, so "half or more" decides rounding
-    // unless the remainder is exactly half and exact, which cannot happen.
+    // If the root has a remainder, a rest of one half is more than that. The root of a 24-bit
+    // number is never exactly halfway; ties go to even for completeness only.
     if rest > half || (rest == half && (!exact || kept & 1 == 1)) {
         kept += 1;
     }
-    // kept <= 2^24 is exact as f32, and the power is far from the subnormal range.
+    // kept <= 2^24 is exact in f32, and the power is far from the subnormal range.
     kept as f32 * f32::from_bits(((power + extra + 127) as u32) << 23)
 }
 
@@ -105,11 +104,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exp_is_within_two_ulp_of_the_true_value() {
+    fn exp_is_accurate_over_its_range() {
         for i in -80_000..80_000 {
             let x = i as f32 * 1e-3;
             let truth = f64::from(x).exp();
-            // The argument reduction's own rounding grows with |x|.
+            // The rounding error of the argument reduction grows with |x|.
             let allowed = 2.4e-7 + f64::from(x.abs()) * 1.3e-7;
             let error = (f64::from(exp(x)) - truth).abs() / truth;
             assert!(error < allowed, "exp({x}): relative error {error:e}");

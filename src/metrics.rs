@@ -1,20 +1,20 @@
-//! How far a picture is from another one: PSNR, MS-SSIM, largest error.
+//! Measures of the difference between two pictures: PSNR, MS-SSIM, largest error.
 //!
-//! All functions take interleaved samples of any numeric type (`u8`, `u16`, `f32`) and compute in
-//! `f64`.
+//! All functions take interleaved samples of `u8`, `u16`, `f32` or any other type that converts to
+//! `f64`, and compute in `f64`.
 
 /// Standard deviation of the Gaussian window of SSIM, in pixels.
 const SIGMA: f64 = 1.5;
-/// Taps of the Gaussian window of SSIM.
+/// Taps of the Gaussian window of SSIM along each axis.
 const WINDOW: usize = 11;
-/// The constants that keep SSIM's quotients stable, relative to full scale.
+/// The constants that keep SSIM's quotients stable, relative to a full sample.
 const K1: f64 = 0.01;
 const K2: f64 = 0.03;
-/// The exponents of the five scales, finest first (Wang, Simoncelli and Bovik, 2003).
+/// The exponents of the five scales of MS-SSIM, finest first (Wang, Simoncelli and Bovik, 2003).
 const SCALE_WEIGHTS: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 
-/// Peak signal-to-noise ratio over all samples of all channels, in dB, `full_scale` being the
-/// value of a full sample: 255.0, 65535.0 or 1.0. Infinite where the pictures are identical.
+/// Peak signal-to-noise ratio in dB, over all samples of all channels. `full_scale` is the value of
+/// a full sample: 255.0, 65535.0 or 1.0. Infinite if the pictures are identical.
 ///
 /// ```
 /// assert_eq!(image_gip::metrics::psnr(&[0_u8, 255], &[0, 255], 255.0), f64::INFINITY);
@@ -30,7 +30,7 @@ pub fn psnr<T: Copy + Into<f64>>(a: &[T], b: &[T], full_scale: f64) -> f64 {
     10.0 * (full_scale * full_scale * a.len() as f64 / squares).log10()
 }
 
-/// The largest absolute difference of two samples.
+/// The largest absolute difference of two samples, in the unit of the samples.
 ///
 /// # Panics
 /// When the pictures are empty or differ in length.
@@ -40,21 +40,24 @@ pub fn max_abs_error<T: Copy + Into<f64>>(a: &[T], b: &[T]) -> f64 {
     a.iter().zip(b).map(|(&a, &b)| (a.into() - b.into()).abs()).fold(0.0, f64::max)
 }
 
-/// Multi-scale structural similarity: 1 for identical pictures, 0 for the most different ones.
-/// The mean over the channels, alpha like any other.
+/// Multi-scale structural similarity (MS-SSIM), from 0 to 1, which is that of identical pictures.
+/// It is the mean over the channels; alpha counts like any other. Pictures have rows of `width`
+/// pixels of `channels` samples, and `full_scale` is the value of a full sample: 255.0, 65535.0 or
+/// 1.0.
 ///
-/// The definition is that of the Python package `pytorch_msssim`: an 11-tap Gaussian window of
-/// standard deviation 1.5 without padding, five scales, between them means of 2x2 pixels, which
-/// start one pixel outside (in zeros) along an odd side.
+/// The definition is that of the Python package `pytorch_msssim`: a Gaussian window of 11 taps and
+/// standard deviation 1.5 without padding, and five scales. From one scale to the next, 2 x 2
+/// pixels are averaged; along an odd side, the first pair begins one pixel before the picture, with
+/// zeros.
 ///
-/// Five scales need sides of more than 160 pixels. Smaller pictures are measured on as many scales
-/// as fit (a side of more than 10 pixels at the coarsest, and always one), with the weights of
-/// those scales scaled up to the sum of all five. Along a side of less than 11 pixels the window has as
-/// many taps as fit, an odd number; one pixel alone is compared by its value.
+/// Five scales need sides of more than 160 pixels. For a smaller picture, only the scales are used
+/// whose shorter side is more than 10 pixels, but at least one scale. Their weights are multiplied
+/// so that their sum is that of all five. Along a side of less than 11 pixels, the window has the
+/// largest odd number of taps that fits.
 ///
 /// # Panics
-/// When the pictures are empty or differ in length, or when the length is not a number of rows of
-/// `width` pixels of `channels` samples.
+/// When the pictures are empty or differ in length, or when the length is not a whole number of
+/// rows.
 #[must_use]
 pub fn ms_ssim<T: Copy + Into<f64>>(
     a: &[T],
@@ -74,8 +77,9 @@ pub fn ms_ssim<T: Copy + Into<f64>>(
         width,
         samples: samples.iter().skip(channel).step_by(channels).map(|&s| s.into()).collect(),
     };
-    let sum: f64 =
-        (0..channels).map(|c| of_planes(channel(a, c), channel(b, c), scales, full_scale)).sum();
+    let sum: f64 = (0..channels)
+        .map(|c| ms_ssim_of_planes(channel(a, c), channel(b, c), scales, full_scale))
+        .sum();
     sum / channels as f64
 }
 
@@ -84,22 +88,23 @@ fn check<T>(a: &[T], b: &[T]) {
     assert_eq!(a.len(), b.len(), "pictures of different sizes cannot be compared");
 }
 
-/// The number of scales for a size: the window fits the coarsest one.
+/// The number of scales for a size: as many as have room for the window, but at least one.
 fn scales(width: usize, height: usize) -> usize {
     let side = width.min(height);
     (1..=SCALE_WEIGHTS.len()).rev().find(|&n| side > (WINDOW - 1) << (n - 1)).unwrap_or(1)
 }
 
 /// MS-SSIM of one channel.
-fn of_planes(mut a: Plane, mut b: Plane, scales: usize, full_scale: f64) -> f64 {
+fn ms_ssim_of_planes(mut a: Plane, mut b: Plane, scales: usize, full_scale: f64) -> f64 {
     let weights = &SCALE_WEIGHTS[..scales];
-    // Five scales have the published weights as they are, which sum to 1.0001.
-    let missing = SCALE_WEIGHTS.iter().sum::<f64>() / weights.iter().sum::<f64>();
+    // With all five scales this is 1: their published weights, whose sum is 1.0001, are not
+    // changed.
+    let correction = SCALE_WEIGHTS.iter().sum::<f64>() / weights.iter().sum::<f64>();
     let mut product = 1.0;
     for (scale, weight) in weights.iter().enumerate() {
         let (ssim, contrast) = ssim(&a, &b, full_scale);
         let factor = if scale + 1 < scales { contrast } else { ssim };
-        product *= factor.max(0.0).powf(weight * missing);
+        product *= factor.max(0.0).powf(weight * correction);
         if scale + 1 < scales {
             (a, b) = (a.halved(), b.halved());
         }
@@ -118,7 +123,8 @@ impl Plane {
         self.samples.len() / self.width
     }
 
-    /// Means of 2x2 pixels. Along an odd side the pairs start at -1, where there are zeros.
+    /// Means of 2 x 2 pixels. Along an odd side, the first pair begins at -1, where samples are
+    /// zero.
     fn halved(&self) -> Self {
         let (odd_x, odd_y) = (self.width % 2, self.height() % 2);
         let width = self.width.div_ceil(2);
@@ -133,15 +139,15 @@ impl Plane {
     }
 }
 
-/// The means over all windows of SSIM and of its contrast-and-structure part.
+/// The means of SSIM and of its contrast-and-structure factor, over all positions of the window.
 ///
-/// Rows are filtered horizontally once, and a ring of as many as the window is high is kept, so
-/// that memory does not grow with the picture.
+/// Rows are filtered horizontally once. A ring buffer keeps as many of them as the window is high,
+/// so that memory does not grow with the height of the picture.
 fn ssim(a: &Plane, b: &Plane, full_scale: f64) -> (f64, f64) {
     let (c1, c2) = ((K1 * full_scale).powi(2), (K2 * full_scale).powi(2));
     let (across, down) = (window(a.width), window(a.height()));
     let width = a.width + 1 - across.len();
-    // The five moments: a, b, aa, bb, ab.
+    // The filtered means of a, b, aa, bb and ab.
     let mut ring = vec![[(); 5].map(|()| vec![0.0; width]); down.len()];
     let mut moments = [(); 5].map(|()| vec![0.0; width]);
     let (mut sum, mut contrast_sum) = (0.0, 0.0);
@@ -176,7 +182,7 @@ fn ssim(a: &Plane, b: &Plane, full_scale: f64) -> (f64, f64) {
     (sum / windows, contrast_sum / windows)
 }
 
-/// The Gaussian window for a side: 11 taps, or the largest odd number that fits.
+/// The Gaussian window along a side: 11 taps, or the largest odd number that fits.
 fn window(side: usize) -> Vec<f64> {
     let taps = WINDOW.min(side - (side + 1) % 2);
     let middle = (taps / 2) as f64;
@@ -187,7 +193,8 @@ fn window(side: usize) -> Vec<f64> {
     weights.iter().map(|weight| weight / total).collect()
 }
 
-/// Filters a row where the whole window fits: `out` is shorter than `row` by the taps but one.
+/// Filters a row at the positions where the whole window fits: `out` is shorter than `row` by the
+/// number of taps minus one.
 fn filter_row(row: &[f64], weights: &[f64], out: &mut [f64]) {
     out.fill(0.0);
     for (tap, &weight) in weights.iter().enumerate() {
@@ -205,8 +212,8 @@ fn add_scaled(out: &mut [f64], row: &[f64], weight: f64) {
 mod tests {
     use super::*;
 
-    /// A picture by formula: ramps, parabolas and checkers, and with a seed noise upon them.
-    /// Samples are 8 bits deep, spread to 16 when `deep`.
+    /// A computed picture: ramps, parabolas and checkers, with noise that depends on the seed.
+    /// Samples have 8 bits, or 16 if `deep`.
     fn picture(size: [usize; 3], seed: usize, noise: usize, deep: bool) -> Vec<u16> {
         let [width, height, channels] = size;
         let mut samples = Vec::with_capacity(width * height * channels);
@@ -228,7 +235,7 @@ mod tests {
 
     #[test]
     fn agrees_with_an_independent_implementation() {
-        // Computed with NumPy: a dense two-dimensional window, padding and means by reshaping.
+        // Computed with NumPy: a dense two-dimensional window, padding, and means by reshaping.
         for (size, noise, deep, expected_psnr, expected_ms_ssim, expected_error) in [
             ([256, 192, 3], 60, false, 23.505_763_368_3, 0.992_920_195_920, 30.0),
             ([177, 161, 1], 200, false, 13.808_797_111_8, 0.914_719_776_509, 100.0),

@@ -1,12 +1,12 @@
-//! Parts of an output.
+//! The region of an output that is rendered.
 
-/// A rectangle of output pixels: from (x, y), which is included, `width` to the right and
-/// `height` down.
+/// A rectangle of output pixels: columns x to x + width - 1 and rows y to y + height - 1, counted
+/// from the output's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Region {
-    /// Left edge in pixels.
+    /// First column.
     pub x: u32,
-    /// Top edge in pixels.
+    /// First row.
     pub y: u32,
     /// Width in pixels, at least 1.
     pub width: u32,
@@ -15,7 +15,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// How many pixels it has.
+    /// The number of its pixels.
     pub(crate) fn pixels(self) -> u64 {
         u64::from(self.width) * u64::from(self.height)
     }

@@ -1,27 +1,28 @@
-//! Vector code and its plain counterpart: which one runs.
+//! Whether SIMD code or scalar code runs, and at which SIMD level.
 
 #[cfg(feature = "std")]
 use fearless_simd::{Level, dispatch};
 
-/// Gaussians that vector code takes together.
+/// Gaussians that are processed together, one per lane.
 pub(crate) const LANES: usize = 16;
 
-/// Which code does the decoder's arithmetic. All give the same bits.
+/// The code that does the decoder's arithmetic. All choices give the same results, bit for bit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Backend {
-    /// Plain loops: the oracle, and all there is without `std`.
+    /// Scalar code: the reference in tests, and the only choice without `std`.
     Reference,
-    /// Vector code at one of the levels that this machine has.
+    /// SIMD code at a level that this machine supports.
     #[cfg(feature = "std")]
     Simd(Level),
 }
 
 impl Backend {
+    /// Scalar code.
     pub(crate) fn reference() -> Self {
         Self::Reference
     }
 
-    /// The best that this machine has.
+    /// SIMD at the highest level that this machine supports, or scalar code without `std`.
     pub(crate) fn fastest() -> Self {
         #[cfg(feature = "std")]
         return Self::Simd(Level::new());
@@ -29,7 +30,7 @@ impl Backend {
         return Self::Reference;
     }
 
-    /// Runs plain loops, compiled for this code's machines.
+    /// Runs `work`, which is compiled again for each SIMD level, so that its loops are vectorized.
     #[inline]
     pub(crate) fn run<T>(self, work: impl FnOnce() -> T) -> T {
         match self {

@@ -1,15 +1,15 @@
-//! What several unit tests share.
+//! Helpers of unit tests.
 
 #[cfg(feature = "std")]
 use fearless_simd::{Level, Simd};
 use proptest::test_runner::{Config, RngSeed};
 
-/// Property tests that try the same cases every time.
+/// The configuration of property tests: the same random cases in every run.
 pub(crate) fn config(cases: u32) -> Config {
     Config { cases, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() }
 }
 
-/// Every SIMD level that this machine has, not only its best, by name.
+/// Every SIMD level that this machine supports, with its name.
 #[cfg(feature = "std")]
 pub(crate) fn simd_levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();

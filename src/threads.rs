@@ -1,15 +1,15 @@
-//! Work on this thread alone, or also on others of the current `rayon` pool.
+//! Runs work on the caller's thread alone, or on the threads of the current `rayon` pool.
 
 use alloc::vec::Vec;
 #[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// The threads that work is shared among. What comes out does not depend on them.
+/// The threads that work is shared among. The result does not depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Threads {
-    /// Those of the current `rayon` pool: the global one, or the one whose `install` makes the call.
-    /// Without the feature `rayon`, the same as [`Threads::One`].
+    /// The threads of the current `rayon` pool: of the global one, or of the one whose `install`
+    /// makes the call. Without the feature `rayon`, the same as [`Threads::One`].
     #[default]
     Pool,
     /// The caller's thread alone.
@@ -17,7 +17,7 @@ pub enum Threads {
 }
 
 impl Threads {
-    /// How many there are.
+    /// The number of threads.
     pub(crate) fn count(self) -> usize {
         #[cfg(feature = "rayon")]
         if self == Self::Pool {
@@ -27,8 +27,8 @@ impl Threads {
     }
 }
 
-/// Runs `work` on every item, on this thread and, if asked for, on others of the current pool; each
-/// lends its memory from one item to the next.
+/// Calls `work` with every item. Each thread has memory of its own, which it passes to all of its
+/// calls.
 pub(crate) fn for_each<M: Default, T: Send>(
     threads: Threads,
     items: Vec<T>,
@@ -44,7 +44,7 @@ pub(crate) fn for_each<M: Default, T: Send>(
     items.into_iter().for_each(|item| work(&mut memory, item));
 }
 
-/// What `work` makes of every item, in their order.
+/// The results of `work` for every item, in the order of the items.
 pub(crate) fn map<T: Send, R: Send>(
     threads: Threads,
     items: impl Iterator<Item = T>,
@@ -57,13 +57,13 @@ pub(crate) fn map<T: Send, R: Send>(
     results.into_iter().map(|result| result.expect("every item was worked on")).collect()
 }
 
-/// How often a thread asks whether the others are done before it falls asleep: some ten microseconds
-/// in all. Two threads decode in 0.98 to 0.99 of the time that they take without that (8 Kodak pictures
-/// at 0.25, 0.5 and 1 bpp, both in one program in turns), and no longer wait brings more.
+/// How often a thread checks whether the others are done before it goes to sleep: for some ten
+/// microseconds. Two threads decode in 0.98 to 0.99 of the time that they take without that (8 Kodak
+/// pictures at 0.25, 0.5 and 1 bpp, both in turns in one program), and a longer wait brings no more.
 #[cfg(feature = "rayon")]
-const MOST_ASKED: u32 = 64;
+const MAX_CHECKS: u32 = 64;
 
-/// A thread that is expected to work; it is done when this is dropped.
+/// Counts a thread that has not finished its work. Dropping it says that the thread has.
 #[cfg(feature = "rayon")]
 struct Expected<'a>(&'a AtomicUsize);
 
@@ -74,8 +74,8 @@ impl Drop for Expected<'_> {
     }
 }
 
-/// Wakes up a thread of the current pool for work that is about to come: that takes as long as some
-/// of the work does.
+/// Wakes up a thread of the current pool, for work that follows soon: waking up takes as long as
+/// some of the work does.
 #[cfg(feature = "std")]
 pub(crate) fn wake(threads: Threads) {
     #[cfg(feature = "rayon")]
@@ -98,19 +98,19 @@ fn on_pool<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send +
             work(&mut memory, item);
         }
     };
-    // Threads of the pool may have to wake up first; this one begins without them.
+    // The threads of the pool may have to wake up first. This thread does not wait for them.
     rayon::in_place_scope(|scope| {
         for _ in 0..others {
             scope.spawn(|_| run());
         }
         run();
-        // The last items are being worked on and mostly soon done: falling asleep takes longer, and so
-        // does waking up for the next call.
-        for _ in 0..MOST_ASKED {
+        // All items are taken by now, and the other threads will finish soon. Going to sleep until
+        // then would take longer, and so would waking up for what comes next.
+        for _ in 0..MAX_CHECKS {
             if expected.load(Ordering::Relaxed) == 0 {
                 break;
             }
-            // Within a busy pool there is nobody but this thread to do what it has spawned.
+            // In a busy pool it may be this thread that has to run what it has spawned.
             if rayon::yield_local() != Some(rayon::Yield::Executed) {
                 std::thread::yield_now();
             }

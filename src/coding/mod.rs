@@ -1,5 +1,5 @@
-//! The two ways to store Gaussians: codes of a fixed length, packed, and entropy coding (spec,
-//! section 7).
+//! The two codings of Gaussians: packed, with codes of fixed bit depths, and entropy coded (spec,
+//! sections 6 and 7).
 
 pub(crate) mod entropy;
 pub(crate) mod packed;

@@ -1,4 +1,5 @@
-//! The `GHDR` chunk: all that a decoder must know before it allocates (spec, section 5.1).
+//! The header, the chunk `GHDR`: all that a decoder must know before it allocates memory (spec,
+//! section 5.1).
 
 use byteorder::{ByteOrder, LittleEndian};
 
@@ -9,20 +10,22 @@ use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
 use crate::layers::plan;
 
-/// The version that this crate reads and writes; 0 was a draft.
+/// The version that this crate reads and writes. Version 0 was a draft.
 pub(crate) const VERSION: u8 = 1;
-/// Largest width and height.
+/// Largest width and height of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;
 /// Bytes in the payload of `GHDR`.
 pub(crate) const HEADER_LENGTH: usize = 36;
 
-/// How the attributes of Gaussians become bytes.
+/// How a file stores its Gaussians (spec, section 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Coding {
-    /// Every component at a fixed bit depth, Gaussians in any order.
+    /// The packed coding: every component has the fixed bit depth of its quantizer, and Gaussians
+    /// may stand in any order.
     Packed,
-    /// Each layer as a set, entropy coded, with steps as fine as a Gaussian is strong.
+    /// The entropy coding: the Gaussians of each layer are stored as a set, in the order of a tree
+    /// of cells. Each has a precision class, and every attribute is entropy coded.
     Entropy,
 }
 
@@ -44,32 +47,33 @@ impl Coding {
     }
 }
 
-/// What a file says of its picture before the first Gaussian.
+/// The header of a file: what it says of its picture before the first Gaussian (spec, section 5.1).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Header {
     /// Version of the format: 1.
     pub version: u8,
-    /// How the Gaussians are stored.
+    /// How the file stores its Gaussians.
     pub coding: Coding,
     /// Width in pixels, 1 to 2^20.
     pub width: u32,
     /// Height in pixels, 1 to 2^20.
     pub height: u32,
-    /// What the channels mean.
+    /// The channels.
     pub color: ColorModel,
-    /// Bits per sample of the source picture.
+    /// Bits per sample of the picture that was encoded, and of the output by default.
     pub depth: SampleDepth,
     /// Number of Gaussians in all layers.
     pub gaussians: u32,
-    /// Number of `GAUS` chunks.
+    /// Number of layers, which are `GAUS` chunks: 0 if there are no Gaussians, else 1 to their
+    /// number.
     pub layers: u16,
     /// The kernel and its cut-off.
     pub kernel: Kernel,
-    /// What the three shape attributes mean.
+    /// What the three stored components of a shape mean.
     pub parameterization: Parameterization,
-    /// The colour that the Gaussians are added to: one value in 1/65535 per channel; channels
-    /// that the colour model lacks are 0.
+    /// The colour that the Gaussians are added to: one value per channel, in 1/65535 of a full
+    /// sample; 0 in channels that the colour model lacks.
     pub base_color: [u16; 4],
 }
 
@@ -77,7 +81,7 @@ impl Header {
     /// Reads the payload of `GHDR`.
     pub(crate) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
         const CHUNK: ChunkType = ChunkType::GHDR;
-        // The version comes first, so that a later version may change all that follows.
+        // The version is checked first: a later version may change all that follows.
         if let Some(&version) = payload.first()
             && version != VERSION
         {
@@ -163,20 +167,20 @@ impl Header {
         payload
     }
 
-    /// The base colour as samples in [0, 1].
+    /// The base colour, where 1.0 is a full sample.
     pub(crate) fn base(&self) -> [f32; 4] {
         self.base_color.map(|value| f32::from(value) / 65535.0)
     }
 
-    /// Number of stored components per Gaussian: two of position, three of shape, one per channel.
+    /// The number of stored components of a Gaussian: two of position, three of shape, one per
+    /// channel.
     #[must_use]
     pub fn components(&self) -> usize {
         5 + self.color.channels()
     }
 
-    /// How many Gaussians make a fair preview of this size, in pixels: all, or fewer where it is
-    /// much smaller than the picture, but at least a sixth. The first ones of a file are the
-    /// strongest.
+    /// How many Gaussians are enough for a preview of this size in pixels: one for 12 pixels, but
+    /// at least a sixth of all, and at most all. The first Gaussians of a file are the strongest.
     #[must_use]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
         plan::gaussians_for(self.gaussians, width, height)

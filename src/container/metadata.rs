@@ -1,4 +1,4 @@
-//! The ancillary chunks that this crate understands (spec, section 5.5).
+//! Metadata: ICC profile, Exif, XMP and texts (spec, section 5.5).
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -8,20 +8,21 @@ use crate::chunk::ChunkType;
 use crate::chunk::MAX_CHUNK_LENGTH;
 use crate::error::DecodeError;
 
-/// Most bytes in a keyword.
+/// Most bytes of a keyword.
 const MAX_KEYWORD: usize = 79;
 
-/// What a file carries besides its picture. Stored as it is, never interpreted.
+/// The metadata of a file. It is passed on as it is stored, and does not change the samples (spec,
+/// section 5.5).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Metadata {
-    /// An ICC profile for the colour channels; without one they are sRGB.
+    /// The ICC profile of the colour channels. Without one they are sRGB.
     pub icc_profile: Option<Vec<u8>>,
-    /// Exif data: a TIFF stream, starting with `II` or `MM`.
+    /// Exif data: a TIFF stream, which begins with `II` or `MM`.
     pub exif: Option<Vec<u8>>,
-    /// An XMP packet: UTF-8 XML.
+    /// An XMP packet: XML in UTF-8.
     pub xmp: Option<Vec<u8>>,
-    /// Keywords and texts, in file order.
+    /// Keywords and their texts, in file order.
     pub texts: Vec<Text>,
 }
 
@@ -30,13 +31,13 @@ pub struct Metadata {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetadataError {
-    /// A profile, Exif or XMP is longer than a chunk can be.
+    /// The ICC profile, the Exif data or the XMP packet is longer than a chunk can be.
     #[error("metadata of more than 2^31 - 1 bytes")]
     TooLong,
-    /// A keyword is empty or too long.
+    /// This keyword is empty or too long.
     #[error("keyword {0:?}; it must be 1 to 79 bytes long")]
     Keyword(String),
-    /// A keyword or the text of this keyword has a NUL.
+    /// This keyword, or its text, contains a NUL character.
     #[error("a NUL in the text {0:?}")]
     Nul(String),
     /// The text of this keyword is longer than a chunk can be.
@@ -48,16 +49,15 @@ pub enum MetadataError {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Text {
-    /// 1 to 79 bytes of UTF-8 without NUL, such as `Title`, `Author`, `Copyright`.
+    /// The keyword: 1 to 79 bytes of UTF-8 without NUL, such as `Title`, `Author` or `Copyright`.
     pub keyword: String,
-    /// Any UTF-8 text without NUL.
+    /// The text: any UTF-8 without NUL.
     pub text: String,
 }
 
 impl Metadata {
-    /// Takes the payload of a known ancillary chunk; the first of each single-valued kind counts,
-    /// later ones are an error.
-    pub(crate) fn take(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
+    /// Adds the payload of a metadata chunk. A second ICC profile, Exif or XMP is an error.
+    pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
         let slot = match chunk {
             ChunkType::ICCP => &mut self.icc_profile,
             ChunkType::EXIF => &mut self.exif,
@@ -74,15 +74,16 @@ impl Metadata {
         Ok(())
     }
 
-    /// Whether `chunk` is one of those that [`Metadata::take`] takes.
-    pub(crate) fn knows(chunk: ChunkType) -> bool {
+    /// Whether a chunk is metadata, which [`Metadata::insert`] takes.
+    pub(crate) fn includes(chunk: ChunkType) -> bool {
         matches!(chunk, ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP | ChunkType::TEXT)
     }
 
-    /// Bytes held, a little more rather than less.
-    pub(crate) fn size(&self) -> u64 {
-        // A growing vector of texts holds up to three places for each at the moment it grows, and
-        // a short string costs what the allocator's smallest pieces do.
+    /// An upper bound of the memory that is held, in bytes.
+    pub(crate) fn memory(&self) -> u64 {
+        // While the vector of texts grows, it takes memory for up to three elements per text. The
+        // fourth stands for the two strings: even a short one takes one of the allocator's smallest
+        // blocks.
         const PER_TEXT: usize = 4 * size_of::<Text>();
 
         let blobs = [&self.icc_profile, &self.exif, &self.xmp];
@@ -91,7 +92,7 @@ impl Metadata {
         blobs as u64 + texts as u64 + (self.texts.len() * PER_TEXT) as u64
     }
 
-    /// Says what cannot be stored, if anything cannot.
+    /// Checks that all of it can be stored.
     #[cfg(feature = "encode")]
     pub(crate) fn check(&self) -> Result<(), MetadataError> {
         let blobs = [&self.icc_profile, &self.exif, &self.xmp];
@@ -112,7 +113,7 @@ impl Metadata {
         Ok(())
     }
 
-    /// The chunks that carry this metadata, in the order in which they are written.
+    /// The chunks of this metadata, in the order in which they are written.
     #[cfg(feature = "encode")]
     pub(crate) fn chunks(&self) -> impl Iterator<Item = (ChunkType, Vec<u8>)> + '_ {
         let blobs = [
@@ -126,7 +127,8 @@ impl Metadata {
 }
 
 impl Text {
-    /// A keyword of 1 to 79 bytes and its text, both without NUL.
+    /// A keyword and its text. Both are checked when a file is written; see [`Text::keyword`] and
+    /// [`Text::text`].
     #[must_use]
     pub fn new(keyword: impl Into<String>, text: impl Into<String>) -> Self {
         Self { keyword: keyword.into(), text: text.into() }

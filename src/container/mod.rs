@@ -1,4 +1,4 @@
-//! The container: signature, chunks, header, metadata (spec, sections 4 and 5).
+//! The container of a file: signature, chunks, header and metadata (spec, sections 4 and 5).
 
 mod header;
 mod metadata;

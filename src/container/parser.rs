@@ -1,4 +1,5 @@
-//! A push parser for the chunk sequence. It does no I/O and holds at most one chunk header.
+//! A push parser for the signature and the framing of chunks (spec, sections 4.1 and 4.2). It does
+//! no I/O, and buffers at most eight bytes.
 
 use byteorder::{ByteOrder, LittleEndian};
 
@@ -10,16 +11,16 @@ use crate::error::DecodeError;
 /// Bytes of a CRC.
 const CRC_LENGTH: usize = 4;
 
-/// What the parser found next.
+/// What the parser has found.
 #[derive(Debug)]
 pub(crate) enum Event<'a> {
-    /// The input is used up; feed more.
+    /// The end of the input.
     NeedMore,
-    /// A chunk begins, with this many bytes of payload.
+    /// The beginning of a chunk with this many bytes of payload.
     Begin(ChunkType, u32),
     /// The next bytes of the payload of the current chunk.
     Payload(&'a [u8]),
-    /// A chunk with this many bytes of payload is complete and its CRC is right.
+    /// The end of a chunk with this many bytes of payload and the right CRC.
     Complete(ChunkType, u32),
 }
 
@@ -29,7 +30,7 @@ enum State {
     Signature,
     /// Collecting length and type.
     ChunkHeader,
-    /// Passing payload on; this many bytes are missing.
+    /// Passing payload on, of which this many bytes are missing.
     Payload(ChunkType, u32),
     /// Collecting the CRC.
     Crc(ChunkType),
@@ -39,8 +40,9 @@ enum State {
 #[derive(Debug)]
 pub(crate) struct Parser {
     state: State,
-    /// Bytes collected for `Signature`, `ChunkHeader` and `Crc`.
+    /// The bytes of the signature, of length and type, or of a CRC that have arrived.
     word: [u8; 8],
+    /// The number of these bytes.
     collected: usize,
     crc: crc32fast::Hasher,
     /// Bytes of payload that the current chunk declares.
@@ -58,10 +60,10 @@ impl Parser {
         }
     }
 
-    /// How many of the next bytes are certain to be of this file, at least one before it ends: who
-    /// reads no more of them never reads past its end.
+    /// How many bytes can be read without reading past the end of the file: at least one until
+    /// then.
     #[cfg(feature = "std")]
-    pub(crate) fn certain(&self) -> usize {
+    pub(crate) fn safe_to_read(&self) -> usize {
         let chunk_after = |chunk| if chunk == ChunkType::GEND { 0 } else { FRAMING };
         match self.state {
             State::Signature => SIGNATURE.len() - self.collected + FRAMING,
@@ -73,7 +75,7 @@ impl Parser {
         }
     }
 
-    /// The chunk that is incomplete at this moment.
+    /// The chunk whose payload or CRC is incomplete.
     pub(crate) fn current(&self) -> Option<ChunkType> {
         match self.state {
             State::Payload(chunk, _) | State::Crc(chunk) => Some(chunk),
@@ -81,14 +83,14 @@ impl Parser {
         }
     }
 
-    /// Advances `input` past what it used and says what it found. Payload is passed through
+    /// Reads up to the next event, and advances `input` past what was read. Payload is passed on
     /// without a copy.
     pub(crate) fn next<'a>(&mut self, input: &mut &'a [u8]) -> Result<Event<'a>, DecodeError> {
         loop {
             match self.state {
                 State::Signature => {
                     let ready = self.collect(input, SIGNATURE.len());
-                    // Refuse foreign data at its first wrong byte, not after eight of them.
+                    // Other data is refused at its first wrong byte, not after eight bytes.
                     if self.word[..self.collected] != SIGNATURE[..self.collected] {
                         return Err(DecodeError::Signature);
                     }
@@ -133,7 +135,7 @@ impl Parser {
                     }
                     let stored = LittleEndian::read_u32(&self.word);
                     let computed = self.crc.clone().finalize();
-                    // The fuzzer cannot guess checksums; let it get past them.
+                    // A fuzzer cannot guess checksums.
                     if stored != computed && !cfg!(fuzzing) {
                         return Err(DecodeError::malformed(chunk, "the CRC does not match"));
                     }
@@ -149,12 +151,12 @@ impl Parser {
         self.collected = 0;
     }
 
-    /// Moves bytes to `word` until it holds `wanted`; whether it does.
-    fn collect(&mut self, input: &mut &[u8], wanted: usize) -> bool {
-        let (taken, rest) = input.split_at(input.len().min(wanted - self.collected));
+    /// Moves bytes from `input` to `word` until it has `length`. Returns whether it has.
+    fn collect(&mut self, input: &mut &[u8], length: usize) -> bool {
+        let (taken, rest) = input.split_at(input.len().min(length - self.collected));
         self.word[self.collected..self.collected + taken.len()].copy_from_slice(taken);
         self.collected += taken.len();
         *input = rest;
-        self.collected == wanted
+        self.collected == length
     }
 }

@@ -1,4 +1,5 @@
-//! Signature and chunk framing: length, type, payload, CRC-32 (spec, sections 4.1 and 4.2).
+//! Writes the signature and the framing of chunks: length, type, payload, CRC-32 (spec, sections
+//! 4.1 and 4.2).
 
 use alloc::vec::Vec;
 
@@ -6,19 +7,19 @@ use byteorder::{ByteOrder, LittleEndian};
 
 use crate::chunk::{ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
 
-/// A file that is being written, chunk by chunk.
+/// Writes a file chunk by chunk.
 #[derive(Debug)]
 pub(crate) struct ChunkWriter {
     file: Vec<u8>,
 }
 
 impl ChunkWriter {
-    /// Begins a file.
+    /// Begins a file: with the signature.
     pub(crate) fn new() -> Self {
         Self { file: SIGNATURE.to_vec() }
     }
 
-    /// Appends one chunk. The payload is at most [`MAX_CHUNK_LENGTH`] bytes long.
+    /// Appends a chunk, whose payload must have at most [`MAX_CHUNK_LENGTH`] bytes.
     pub(crate) fn chunk(&mut self, kind: ChunkType, payload: &[u8]) {
         assert!(payload.len() <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
         let mut word = [0; 4];
@@ -33,7 +34,7 @@ impl ChunkWriter {
         self.file.extend_from_slice(&word);
     }
 
-    /// Ends the file.
+    /// Appends `GEND`, and returns the file.
     pub(crate) fn finish(mut self) -> Vec<u8> {
         self.chunk(ChunkType::GEND, &[]);
         self.file

@@ -1,5 +1,6 @@
-//! PendingLayers of the entropy coding that wait to be decoded: none needs another one (spec, section 7.3), so that
-//! threads can take them side by side.
+//! Layers of the entropy coding that have arrived and are not decoded yet. They do not depend on
+//! each other, so that they can be decoded in parallel, and those that a region does not need can
+//! be skipped (spec, sections 5.6 and 7.3).
 
 use alloc::vec::Vec;
 use core::cmp::Reverse;
@@ -12,10 +13,11 @@ use crate::gaussian::Gaussian;
 use crate::layers::bounds::LayerBounds;
 use crate::threads::{self, Threads};
 
-/// Bytes that a layer takes beside its payload: its entries in lists, and what came of it.
-const BY_LAYER: u64 = size_of::<(PendingLayer, [usize; 5], Result<(), DecodeError>)>() as u64;
+/// Bytes that a layer takes besides its payload: its entries in lists, and its result.
+const BYTES_PER_LAYER: u64 =
+    size_of::<(PendingLayer, [usize; 5], Result<(), DecodeError>)>() as u64;
 
-/// PendingLayers that have arrived, in file order.
+/// The layers that are not decoded yet, in file order.
 #[derive(Debug, Default)]
 pub(crate) struct PendingLayers {
     layers: Vec<PendingLayer>,
@@ -25,69 +27,69 @@ pub(crate) struct PendingLayers {
 
 #[derive(Debug)]
 struct PendingLayer {
-    /// How many Gaussians it has.
+    /// The number of its Gaussians.
     count: usize,
     payload: Vec<u8>,
-    /// Where they show, if the file says so.
+    /// Where it shows, if the file has bounds.
     bounds: Option<LayerBounds>,
 }
 
 impl PendingLayer {
-    /// Decodes the Gaussians into as many places.
-    fn read(
+    /// Decodes the Gaussians into `out`, which has as many elements.
+    fn decode(
         &self,
-        coding: &LayerCoder<'_>,
+        coder: &LayerCoder<'_>,
         model: ColorModel,
         statistics: Option<&mut AttributeBits>,
-        places: &mut [Gaussian],
+        out: &mut [Gaussian],
     ) -> Result<(), DecodeError> {
-        let mut places = places.iter_mut();
-        coding.read(self.count, &self.payload[LAYER_PREFIX..], statistics, |code, shape| {
-            if let Some(place) = places.next() {
-                *place = coding.lattice.gaussian(&code, shape, &coding.grid, model);
+        let mut out = out.iter_mut();
+        coder.read(self.count, &self.payload[LAYER_PREFIX..], statistics, |code, shape| {
+            if let Some(gaussian) = out.next() {
+                *gaussian = coder.lattice.gaussian(&code, shape, &coder.grid, model);
             }
         })
     }
 }
 
 impl PendingLayers {
-    /// Adds a layer that has at most `allowed` Gaussians.
+    /// Adds a layer, which must have 1 to `allowed` Gaussians.
     pub(crate) fn push(
         &mut self,
         payload: Vec<u8>,
         bounds: Option<LayerBounds>,
         allowed: u32,
     ) -> Result<(), DecodeError> {
-        let (count, _) = LayerCoder::counted(&payload, allowed)?;
+        let (count, _) = LayerCoder::read_count(&payload, allowed)?;
         self.count += count;
-        self.memory += payload.len() as u64 + BY_LAYER;
+        self.memory += payload.len() as u64 + BYTES_PER_LAYER;
         self.layers.push(PendingLayer { count, payload, bounds });
         Ok(())
     }
 
-    /// How many Gaussians there are in all layers.
+    /// The number of Gaussians in all layers.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// Bytes that all layers take.
+    /// The memory of all layers, in bytes.
     pub(crate) fn memory(&self) -> u64 {
         self.memory
     }
 
-    /// Those of the layers whose bounds are wanted.
+    /// The layers whose bounds fulfil a condition.
     pub(crate) fn select(
         &self,
-        wanted: impl Fn(Option<LayerBounds>) -> bool,
+        condition: impl Fn(Option<LayerBounds>) -> bool,
     ) -> SelectedLayers<'_> {
         let mut layers = Vec::with_capacity(self.layers.len());
-        layers.extend(self.layers.iter().filter(|layer| wanted(layer.bounds)));
+        layers.extend(self.layers.iter().filter(|layer| condition(layer.bounds)));
         let count = layers.iter().map(|layer: &&PendingLayer| layer.count).sum();
         SelectedLayers { layers, count }
     }
 }
 
-/// PendingLayers that are to be decoded, in file order.
+/// Layers to decode, in file order.
 #[derive(Debug)]
 pub(crate) struct SelectedLayers<'a> {
     layers: Vec<&'a PendingLayer>,
@@ -95,17 +97,19 @@ pub(crate) struct SelectedLayers<'a> {
 }
 
 impl SelectedLayers<'_> {
-    /// How many Gaussians there are in all of them.
+    /// The number of Gaussians in all of them.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// Adds the Gaussians of the layers to others, those before the first layer that is not sound,
-    /// or also adds to an statistics on the
-    /// way, one after the other.
+    /// Decodes the layers and appends their Gaussians to `gaussians`, in file order. If a layer is
+    /// malformed, only the Gaussians of the layers before it are appended.
+    ///
+    /// The layers are shared among threads, unless `statistics` are given: then one is decoded
+    /// after the other, and its bits are added to the statistics.
     ///
     /// # Errors
-    /// What is wrong with that layer.
+    /// When a layer is malformed: the error of the first one.
     pub(crate) fn decode(
         self,
         header: &Header,
@@ -114,34 +118,34 @@ impl SelectedLayers<'_> {
         threads: Threads,
         gaussians: &mut Vec<Gaussian>,
     ) -> Result<(), DecodeError> {
-        let mut sound = gaussians.len();
-        gaussians.resize(sound + self.count, Gaussian::NOTHING);
-        let mut places = &mut gaussians[sound..];
-        let coding = LayerCoder::new(lattice, header);
-        let mut outcomes: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
+        let mut valid = gaussians.len();
+        gaussians.resize(valid + self.count, Gaussian::NOTHING);
+        let mut free = &mut gaussians[valid..];
+        let coder = LayerCoder::new(lattice, header);
+        let mut results: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
         let mut work = Vec::with_capacity(self.layers.len());
-        for (&layer, outcome) in self.layers.iter().zip(&mut outcomes) {
-            let (own, rest) = core::mem::take(&mut places).split_at_mut(layer.count);
-            places = rest;
-            work.push((layer, own, outcome));
+        for (&layer, result) in self.layers.iter().zip(&mut results) {
+            let (out, rest) = core::mem::take(&mut free).split_at_mut(layer.count);
+            free = rest;
+            work.push((layer, out, result));
         }
         if let Some(statistics) = statistics {
-            for (layer, places, outcome) in work {
-                *outcome = layer.read(&coding, header.color, Some(statistics), places);
+            for (layer, out, result) in work {
+                *result = layer.decode(&coder, header.color, Some(statistics), out);
             }
         } else {
-            // The largest first, so that none of them is what all wait for in the end.
+            // The largest first, so that at the end no thread waits for a large one.
             work.sort_by_key(|(layer, ..)| Reverse(layer.count));
-            threads::for_each(threads, work, |(): &mut (), (layer, places, outcome)| {
-                *outcome = layer.read(&coding, header.color, None, places);
+            threads::for_each(threads, work, |(): &mut (), (layer, out, result)| {
+                *result = layer.decode(&coder, header.color, None, out);
             });
         }
-        for (layer, outcome) in self.layers.iter().zip(outcomes) {
-            if outcome.is_err() {
-                gaussians.truncate(sound);
-                return outcome;
+        for (layer, result) in self.layers.iter().zip(results) {
+            if result.is_err() {
+                gaussians.truncate(valid);
+                return result;
             }
-            sound += layer.count;
+            valid += layer.count;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! The decoder over any `Read` (spec, sections 4 and 11).
+//! The decoder that reads from any `Read` (spec, sections 4 and 11).
 
 use std::io::{ErrorKind, Read};
 
@@ -10,18 +10,18 @@ use crate::limits::Limits;
 use crate::render::{Picture, RenderOptions};
 use crate::threads;
 
-/// Bytes that are read at a time, at most.
+/// Most bytes in one read.
 const BUFFER: usize = 8192;
 
 /// Decodes from any reader, in one pass and without seeking.
 ///
-/// Layers are decoded on the threads of the options ([`RenderOptions::with_threads`]); for a region
-/// of a large picture, those that do not show in it are left out. To show a picture while it arrives,
-/// use a [`StreamDecoder`].
+/// Layers are decoded in parallel on the threads of [`RenderOptions::with_threads`]. For a region,
+/// layers that do not show in it are skipped. To show a picture while it arrives, use a
+/// [`StreamDecoder`].
 ///
-/// Not one byte is read beyond the end of the file, so that what follows can be read from
-/// [`Decoder::into_reader`]. Small chunks take small reads: give it a
-/// [`BufReader`](std::io::BufReader) where each read is a call of the system.
+/// No byte after the end of the file is read: the reader that [`Decoder::into_reader`] returns is
+/// at the first of them. For the same reason, small chunks are read with small reads. Use a
+/// [`BufReader`](std::io::BufReader) if each read is a system call.
 ///
 /// ```no_run
 /// # fn main() -> Result<(), image_gip::DecodeError> {
@@ -40,53 +40,56 @@ pub struct Decoder<R> {
 }
 
 impl<R: Read> Decoder<R> {
-    /// Reads header and metadata, with the default limits.
+    /// Reads the header and the metadata, with the default [`Limits`].
     ///
     /// # Errors
-    /// When reading fails, or the file is not a sound `.gip` file up to its first layer.
+    /// When reading fails, or when the file up to its first layer is malformed, requires something
+    /// that this decoder does not have, or exceeds a limit.
     pub fn new(reader: R) -> Result<Self, DecodeError> {
         Self::new_with_limits(reader, Limits::default())
     }
 
-    /// Reads header and metadata, with the given limits.
+    /// Reads the header and the metadata, with the given limits.
     ///
     /// # Errors
-    /// As [`Decoder::new`], and when a limit is exceeded.
+    /// As [`Decoder::new`].
     pub fn new_with_limits(reader: R, limits: Limits) -> Result<Self, DecodeError> {
         let stream = StreamDecoder::new().with_limits(limits);
         let options = RenderOptions::new();
         let mut decoder = Self { reader, stream, options };
-        decoder.read_until(StreamDecoder::has_begun)?;
+        decoder.read_until(StreamDecoder::has_reached_layers)?;
         Ok(decoder)
     }
 
-    /// What the file says of its picture.
+    /// The header.
     #[must_use]
     #[expect(clippy::missing_panics_doc, reason = "no decoder exists without a header")]
     pub fn header(&self) -> &Header {
         self.stream.header().expect("`new_with_limits` read it")
     }
 
-    /// ICC profile, Exif, XMP and texts.
+    /// The metadata: ICC profile, Exif, XMP and texts.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         self.stream.metadata()
     }
 
-    /// The push decoder inside, with what was decoded so far: layers that no output has needed yet are
-    /// not among its Gaussians. [`Decoder::picture`] decodes them.
+    /// The push decoder inside, for its statistics and quantizers. Its Gaussians are those that
+    /// were decoded: they lack layers that no output has needed so far, which [`Decoder::picture`]
+    /// decodes.
     #[must_use]
     pub fn stream(&self) -> &StreamDecoder {
         &self.stream
     }
 
-    /// The reader. After [`Decoder::read_to_end`] or a `decode_into`, it stands right behind the file.
+    /// The reader. After [`Decoder::read_to_end`] or a `decode_into`, it is at the first byte after
+    /// the file.
     #[must_use]
     pub fn into_reader(self) -> R {
         self.reader
     }
 
-    /// Replaces the limits; see [`StreamDecoder::set_limits`].
+    /// Replaces the limits, for what is still to be read and for rendering.
     ///
     /// # Errors
     /// As [`StreamDecoder::set_limits`].
@@ -94,13 +97,13 @@ impl<R: Read> Decoder<R> {
         self.stream.set_limits(limits)
     }
 
-    /// Sets size, region, colour model and so on of what [`Decoder::decode_into`] writes, and
-    /// whether threads are used from here on.
+    /// Sets the options of what [`Decoder::decode_into`] writes: size, region, colour model and so
+    /// on, and the threads of all that follows. Default [`RenderOptions::new`].
     pub fn set_options(&mut self, options: RenderOptions) {
         self.options = options;
     }
 
-    /// The number of samples that [`Decoder::decode_into`] writes with these options; see
+    /// The number of samples that [`Decoder::decode_into`] writes with the present options; see
     /// [`Picture::output_len`].
     ///
     /// # Errors
@@ -112,37 +115,41 @@ impl<R: Read> Decoder<R> {
     /// Reads the rest of the file.
     ///
     /// # Errors
-    /// When reading fails or the file is not sound. [`Decoder::picture`] gives what had been
-    /// decoded until then.
+    /// When reading fails, or when the file is malformed, requires something that this decoder does
+    /// not have, or exceeds a limit. [`Decoder::picture`] still gives the picture of the Gaussians
+    /// before the error.
     pub fn read_to_end(&mut self) -> Result<(), DecodeError> {
         self.read_layers_until(StreamDecoder::is_complete)
     }
 
-    /// Reads until so many Gaussians have arrived, or all: enough layers for a thumbnail, with
-    /// [`Header::gaussians_for`]. [`Decoder::picture`] renders what is there.
+    /// Reads layers until at least this many Gaussians have arrived, or all. With
+    /// [`Header::gaussians_for`], they are enough for a thumbnail, which [`Decoder::picture`]
+    /// renders.
     ///
     /// # Errors
     /// As [`Decoder::read_to_end`].
     pub fn read_at_least(&mut self, gaussians: u32) -> Result<(), DecodeError> {
-        let enough = gaussians as usize;
-        self.read_layers_until(|stream| stream.arrived() >= enough || stream.is_complete())
+        let least = gaussians as usize;
+        self.read_layers_until(|stream| stream.arrived() >= least || stream.is_complete())
     }
 
-    /// The picture of all Gaussians that have been read: after an error of those before it, after
-    /// [`Decoder::read_at_least`] of so many, otherwise of all. Layers that a region has left out are
-    /// decoded now.
+    /// The picture of all Gaussians that have been read: those of the whole file after a
+    /// `decode_into` or [`Decoder::read_to_end`], the first ones after [`Decoder::read_at_least`],
+    /// and those before an error. Layers that were skipped for a region are decoded now.
     ///
     /// # Errors
-    /// When one of these layers is malformed. The next call gives the picture of those before it.
+    /// When one of these layers is malformed. The next call gives the picture of the layers before
+    /// it.
     pub fn picture(&mut self) -> Result<Picture<'_>, DecodeError> {
-        self.decode_waiting()?;
+        self.decode_pending()?;
         Ok(self.decoded())
     }
 
-    /// Reads the rest of the file and renders interleaved 8-bit samples.
+    /// Reads the rest of the file and renders interleaved 8-bit samples, as [`Picture::render_u8`]
+    /// describes them. `out` must have [`Decoder::output_len`] elements.
     ///
-    /// For a region of a large picture, layers that do not show in it are read and their CRCs checked,
-    /// but they are not decoded, and what was decoded for it is not kept. To render many regions,
+    /// For a region, layers that do not show in it are read and their CRCs checked, but they are
+    /// not decoded. Those that were decoded for the region are not kept: to render many regions,
     /// call [`Decoder::read_to_end`] first.
     ///
     /// # Errors
@@ -160,8 +167,8 @@ impl<R: Read> Decoder<R> {
         self.render(|picture, options| picture.render_u16(options, out))
     }
 
-    /// Reads the rest of the file and renders planes of `f32`, as [`Decoder::decode_into`] does; see
-    /// [`Picture::render_planes`] for what they hold.
+    /// Reads the rest of the file and renders planes of `f32`, as [`Picture::render_planes`]
+    /// describes them; otherwise as [`Decoder::decode_into`].
     ///
     /// # Errors
     /// As [`Decoder::read_to_end`] and [`Picture::render_planes`].
@@ -169,61 +176,63 @@ impl<R: Read> Decoder<R> {
         self.render(|picture, options| picture.render_planes(options, out))
     }
 
-    /// Reads the rest of the file and renders what shows.
+    /// Reads the rest of the file, and renders the Gaussians that the output needs.
     fn render(
         &mut self,
         render: impl FnOnce(&Picture<'_>, &RenderOptions) -> Result<(), DecodeError>,
     ) -> Result<(), DecodeError> {
         threads::wake(self.options.threads);
         self.read_until(StreamDecoder::is_complete)?;
-        if let Some(gaussians) = self.stream.showing(&self.options) {
-            let held = self.stream.held() + gaussians.len() as u64 * size_of::<Gaussian>() as u64;
-            let picture = Picture::new(self.header(), &gaussians, &self.stream.limits, held);
+        if let Some(gaussians) = self.stream.visible_gaussians(&self.options) {
+            let copies = gaussians.len() as u64 * size_of::<Gaussian>() as u64;
+            let memory = self.stream.memory() + copies;
+            let picture = Picture::new(self.header(), &gaussians, self.stream.limits(), memory);
             return render(&picture, &self.options);
         }
-        self.decode_waiting()?;
+        self.decode_pending()?;
         render(&self.decoded(), &self.options)
     }
 
-    /// Reads until something is reached, and decodes the layers that came.
+    /// Reads until a condition holds, and decodes the layers that have arrived.
     fn read_layers_until(
         &mut self,
-        reached: impl Fn(&StreamDecoder) -> bool,
+        holds: impl Fn(&StreamDecoder) -> bool,
     ) -> Result<(), DecodeError> {
         threads::wake(self.options.threads);
-        self.read_until(reached)?;
-        self.decode_waiting()
+        self.read_until(holds)?;
+        self.decode_pending()
     }
 
-    /// Reads until something is reached.
-    fn read_until(&mut self, reached: impl Fn(&StreamDecoder) -> bool) -> Result<(), DecodeError> {
-        while !reached(&self.stream) {
+    /// Reads until a condition holds.
+    fn read_until(&mut self, holds: impl Fn(&StreamDecoder) -> bool) -> Result<(), DecodeError> {
+        while !holds(&self.stream) {
             if let Err(error) = self.read_some() {
-                // What was wrong with what came earlier is to be told.
-                self.decode_waiting()?;
+                // An error in an earlier layer comes first.
+                self.decode_pending()?;
                 return Err(error);
             }
         }
         Ok(())
     }
 
-    /// The picture of what was decoded.
+    /// The picture of the Gaussians that were decoded.
     fn decoded(&self) -> Picture<'_> {
         self.stream.picture().expect("`new_with_limits` read the header")
     }
 
-    fn decode_waiting(&mut self) -> Result<(), DecodeError> {
-        self.stream.decode_waiting(self.options.threads)
+    /// Decodes the layers that have arrived and are not decoded yet.
+    fn decode_pending(&mut self) -> Result<(), DecodeError> {
+        self.stream.decode_pending(self.options.threads)
     }
 
-    /// Takes one piece of the file.
+    /// Reads one piece of the file.
     fn read_some(&mut self) -> Result<(), DecodeError> {
         let mut buffer = [0; BUFFER];
-        let buffer = &mut buffer[..self.stream.certain().min(BUFFER)];
+        let buffer = &mut buffer[..self.stream.safe_to_read().min(BUFFER)];
         loop {
             match self.reader.read(buffer) {
                 Ok(0) => return self.stream.finish(),
-                Ok(length) => return self.stream.take(&buffer[..length], true).map(|_| ()),
+                Ok(length) => return self.stream.feed_deferred(&buffer[..length]).map(|_| ()),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(error.into()),
             }

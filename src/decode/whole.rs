@@ -1,4 +1,4 @@
-//! The usual case: a whole file to a whole picture.
+//! The usual case: from a whole file to a whole picture.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,29 +14,30 @@ use crate::threads::Threads;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Decoded {
-    /// What the file says of its picture: size, colour model, depth.
+    /// The header: size, colour model, sample depth and so on.
     pub header: Header,
-    /// ICC profile, Exif, XMP and texts.
+    /// The metadata: ICC profile, Exif, XMP and texts.
     pub metadata: Metadata,
-    /// Interleaved samples, rows from the top, without padding: width x height x channels of
-    /// [`Header::color`].
+    /// height x width x channels interleaved samples, rows from the top, without padding. The
+    /// channels are those of [`Header::color`].
     pub samples: Samples,
 }
 
-/// Samples of the file's own depth.
+/// Samples with the file's own depth, [`Header::depth`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Samples {
-    /// Of 8 bits.
+    /// Samples of 8 bits: 0 to 255.
     Eight(Vec<u8>),
-    /// Of 16 bits, in the machine's byte order.
+    /// Samples of 16 bits: 0 to 65535.
     Sixteen(Vec<u16>),
 }
 
 /// Decodes a whole file at its stored size, with the default [`Limits`](crate::Limits), on the
 /// threads of the current pool.
 ///
-/// A `Decoder` gives other sizes, regions and samples, a [`StreamDecoder`] the picture so far.
+/// For other sizes, regions or samples, use a `Decoder`; for a picture that is shown while it
+/// arrives, a [`StreamDecoder`].
 ///
 /// ```no_run
 /// use image_gip::Samples;
@@ -52,14 +53,14 @@ pub enum Samples {
 /// ```
 ///
 /// # Errors
-/// When the file is not a sound `.gip` file, is not complete, needs something that this decoder does
-/// not have, or exceeds a limit.
+/// When the file is malformed or ends too early, requires something that this decoder does not
+/// have, or exceeds a limit.
 #[expect(clippy::missing_panics_doc, reason = "a complete file has a header")]
 pub fn decode(file: &[u8]) -> Result<Decoded, DecodeError> {
     let mut stream = StreamDecoder::new();
-    let read = stream.take(file, true).and_then(|_| stream.finish());
-    // What is wrong with a layer comes before what is wrong behind it.
-    stream.decode_waiting(Threads::Pool)?;
+    let read = stream.feed_deferred(file).and_then(|_| stream.finish());
+    // An error in a layer comes before an error after it.
+    stream.decode_pending(Threads::Pool)?;
     read?;
     let picture = stream.picture().expect("a complete file has a header");
     let options = RenderOptions::new();

@@ -1,5 +1,5 @@
-//! Where the layers of a file show, so that a decoder can leave out those that do not show in a region
-//! (spec, section 5.6).
+//! The bounds of layers, with which a decoder skips those that do not show in a region (spec,
+//! section 5.6).
 
 use alloc::vec::Vec;
 
@@ -11,27 +11,27 @@ use crate::gaussian::Gaussian;
 #[cfg(feature = "std")]
 use crate::{math, render::view::View};
 
-/// Cells of a picture along each side.
+/// Cells that a picture is divided into along each side.
 #[cfg(any(feature = "encode", feature = "std"))]
 const CELLS: f32 = 256.0;
-/// Output pixels by which what shows may lie beside its bounds: more than what computing makes of it.
+/// Margin of the bounds in output pixels, which is more than the rounding of ellipses and bounds.
 #[cfg(feature = "std")]
 const MARGIN: f32 = 8.0;
 
-/// The cells of a picture in which a layer shows, at any size.
+/// The cells of a picture in which a layer shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LayerBounds {
-    /// Column and row of the first cell.
+    /// First column and first row.
     first: [u8; 2],
-    /// Those of the last cell, which is included.
+    /// Last column and last row, which are included.
     last: [u8; 2],
 }
 
 impl LayerBounds {
-    /// Bytes of an entry.
+    /// Bytes of the entry of a layer.
     const LENGTH: usize = 4;
 
-    /// Reads those of all layers that a header declares.
+    /// Reads the payload of `bNDS`: the bounds of all layers that the header declares.
     pub(crate) fn parse_all(payload: &[u8], header: &Header) -> Result<Vec<Self>, DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(ChunkType::BNDS, reason));
         if payload.len() != usize::from(header.layers) * Self::LENGTH {
@@ -48,7 +48,7 @@ impl LayerBounds {
         Ok(entries.iter().map(read).collect())
     }
 
-    /// Where Gaussians of a picture show.
+    /// The bounds of a layer with these Gaussians.
     #[cfg(feature = "encode")]
     pub(crate) fn of(gaussians: impl Iterator<Item = Gaussian>, header: &Header) -> Self {
         let sides = [header.width, header.height].map(|side| side as f32);
@@ -56,7 +56,7 @@ impl LayerBounds {
         let mut bounds = Self { first: [u8::MAX; 2], last: [0; 2] };
         for Gaussian { center, cholesky: [l11, l21, l22], .. } in gaussians {
             for (axis, reach) in [l11, l21.hypot(l22)].into_iter().enumerate() {
-                // What lies beside the picture counts as its nearest cell.
+                // The cast clamps: outside of the picture, the nearest cell counts.
                 let cell = |at: f32| (at * CELLS / sides[axis]) as u8;
                 let reach = reach * radius;
                 bounds.first[axis] = bounds.first[axis].min(cell(center[axis] - reach));
@@ -66,26 +66,27 @@ impl LayerBounds {
         bounds
     }
 
+    /// The entry of the layer in `bNDS`.
     #[cfg(feature = "encode")]
     pub(crate) fn to_entry(self) -> [u8; Self::LENGTH] {
         let ([left, top], [right, bottom]) = (self.first, self.last);
         [left, top, right, bottom]
     }
 
-    /// Whether anything may show in a region of a picture.
+    /// Whether the layer may show in the region of a view.
     #[cfg(feature = "std")]
-    pub(crate) fn show_in(&self, view: &View, header: &Header) -> bool {
+    pub(crate) fn may_show_in(&self, view: &View, header: &Header) -> bool {
         let region = [(view.region.x, view.region.width), (view.region.y, view.region.height)];
         let sides = [header.width, header.height].map(|side| side as f32);
         (0..2).all(|axis| {
             let (start, length) = region[axis];
             let (start, end) = (start as f32, (start + length) as f32);
             let cell = sides[axis] * view.scale[axis] / CELLS;
-            // Where the picture is made smaller, its Gaussians are wider than they were.
+            // Minification widens Gaussians.
             let margin = MARGIN + math::sqrt(header.kernel.cutoff() * view.filter[axis]);
             let first = f32::from(self.first[axis]) * cell - margin;
             let last = (f32::from(self.last[axis]) + 1.0) * cell + margin;
-            // What is nearest to a cell at the edge may lie beyond it.
+            // A cell at the edge of the picture also stands for all that lies beyond it.
             (self.first[axis] == 0 || first < end) && (self.last[axis] == u8::MAX || last > start)
         })
     }
@@ -125,7 +126,7 @@ mod tests {
         #![proptest_config(config(2000))]
 
         #[test]
-        fn nothing_shows_where_bounds_do_not_meet(
+        fn a_gaussian_adds_nothing_outside_of_its_bounds(
             center in [-20.0_f32..120.0, -20.0_f32..100.0],
             cholesky in [0.05_f32..20.0, -20.0_f32..20.0, 0.05_f32..20.0],
             size in (1_u32..400, 1_u32..400),
@@ -140,8 +141,8 @@ mod tests {
             let region = Region { x, y, width, height };
             let options = RenderOptions::new().with_size(size.0, size.1).with_region(region);
             let limits = Limits::none();
-            let view = options.view(&header, &limits).expect("it is inside");
-            if !bounds.show_in(&view, &header) {
+            let view = options.view(&header, &limits).expect("the region is inside");
+            if !bounds.may_show_in(&view, &header) {
                 let mut planes = vec![7.0; (width * height) as usize];
                 let picture = Picture::new(&header, core::slice::from_ref(&gaussian), &limits, 0);
                 picture.render_planes(&options, &mut planes).expect("there are no limits");
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_as_narrow_as_cells_are() {
+    fn bounds_end_at_the_nearest_cells() {
         let header = header(256, 512);
         let gaussian =
             Gaussian { center: [20.5, 101.0], cholesky: [1.0, 0.0, 2.0], color: [1.0; 4] };
@@ -159,14 +160,14 @@ mod tests {
         assert_eq!(bounds.to_entry(), [18, 48, 22, 52]);
         let entries = LayerBounds::parse_all(&bounds.to_entry(), &header);
         assert_eq!(entries.expect("one layer"), [bounds]);
-        // From 18 to 23 and 96 to 106 pixels, and a margin of 8.
-        for (x, y, meets) in [(9, 100, false), (10, 100, true), (30, 100, true), (31, 100, false)]
+        // Columns 18 to 22 and rows 96 to 105 of pixels, and a margin of 8.
+        for (x, y, shows) in [(9, 100, false), (10, 100, true), (30, 100, true), (31, 100, false)]
             .into_iter()
             .chain([(20, 87, false), (20, 88, true), (20, 113, true), (20, 114, false)])
         {
             let options = RenderOptions::new().with_region(Region { x, y, width: 1, height: 1 });
             let view = options.view(&header, &Limits::none()).expect("it is inside");
-            assert_eq!(bounds.show_in(&view, &header), meets, "{x}, {y}");
+            assert_eq!(bounds.may_show_in(&view, &header), shows, "{x}, {y}");
         }
     }
 }

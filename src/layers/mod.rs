@@ -1,5 +1,5 @@
-//! The policy about layers: how Gaussians are shared out among them, how many a small output takes,
-//! and which of them show in a region.
+//! Decisions about layers: how an encoder divides the Gaussians among them, how many Gaussians a
+//! small output needs, and which layers show in a region.
 
 pub(crate) mod bounds;
 pub(crate) mod plan;

@@ -1,14 +1,14 @@
-//! How the Gaussians of a file are shared out among its layers, and how many of them a small output
-//! takes. Files of either coding have their strongest Gaussians first, so that every prefix of a file
-//! is a picture.
+//! How the Gaussians of a file are divided into layers, and how many of them a small output needs.
+//! In both codings the strongest Gaussians come first, so that every prefix of a file gives a
+//! picture.
 
-/// Of a small output: pixels for which one Gaussian is enough.
+/// In a small output, one Gaussian is enough for this many pixels.
 const PIXELS_PER_GAUSSIAN: u64 = 12;
-/// A thumbnail takes at least one out of so many of a file's Gaussians: with fewer it is not the same
-/// picture, however small.
+/// A thumbnail needs at least one out of this many of a file's Gaussians: with fewer it would
+/// differ visibly, however small it is.
 const LEAST_THUMBNAIL: u64 = 6;
 
-/// How many of a file's Gaussians make a fair preview of a size in pixels.
+/// How many of a file's Gaussians are enough for a preview of a size in pixels.
 pub(crate) fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
     let all = u64::from(all);
     let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
@@ -17,31 +17,36 @@ pub(crate) fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
 
 #[cfg(feature = "encode")]
 mod shares {
-    /// The layers of a packed file, as shares of its Gaussians: each ends with a checksum, and the
-    /// first already shows the picture.
+    /// The layers of a file with the packed coding, as fractions of its Gaussians. The first is
+    /// enough to recognize the picture.
     const PACKED: [f64; 4] = [0.125, 0.125, 0.25, 0.5];
-    /// Fewest Gaussians of a packed file with layers: 64 in the smallest.
+    /// A file with the packed coding and fewer Gaussians than this has one layer. With more, the
+    /// smallest layer has at least 64.
     const LEAST_PACKED: usize = 512;
 
-    /// The first layers of an entropy-coded file, as shares of its Gaussians: a tenth of the file
-    /// already shows the picture, and both together are enough for a thumbnail.
-    pub(crate) const FIRST_ENTROPY: [f64; 2] = [0.04, 0.13];
-    /// Fewest Gaussians of an entropy-coded file with such layers.
+    /// The first layers of an entropy-coded file, as fractions of its Gaussians. With the first, a
+    /// tenth of the file is enough to recognize the picture; both together are enough for a
+    /// thumbnail.
+    const FIRST_ENTROPY: [f64; 2] = [0.04, 0.13];
+    /// An entropy-coded file with fewer Gaussians than this has no such layers.
     const LEAST_ENTROPY: usize = 250;
-    /// Fewest Gaussians that are worth being decoded by several threads.
+    /// A file with fewer Gaussians than this need not be decoded on several threads.
     const LEAST_PARALLEL: usize = 2048;
-    /// The largest layer's share of them: those of the layers before it take more time each.
+    /// Most of a file's Gaussians in one layer, as a fraction: two threads then take the same time.
+    /// It is over one half because Gaussians of the first layers take more time each.
     const LARGEST: f64 = 0.52;
     /// Most Gaussians in a layer, so that many threads can be used.
     const MOST_IN_LAYER: usize = 16_384;
-    /// More Gaussians than this make a large picture, of which a region is decoded from few layers:
-    /// they have at most so many then.
+    /// A file with more Gaussians than this is a large picture, which has small layers, so that a
+    /// region needs few of them.
     pub(crate) const MOST_WHOLE: usize = 32_768;
+    /// Most Gaussians in a layer of a large picture.
     const MOST_IN_SMALL_LAYER: usize = 320;
-    /// A file of more layers than this says where they show.
+    /// A file with more layers than this has bounds of its layers.
     const MOST_WITHOUT_BOUNDS: usize = 8;
 
-    /// The sizes of the layers of a packed file with `count` Gaussians.
+    /// The numbers of Gaussians in the layers of a file with the packed coding and `count`
+    /// Gaussians.
     pub(crate) fn packed_layers(count: usize) -> Vec<usize> {
         if count == 0 {
             return Vec::new();
@@ -50,14 +55,15 @@ mod shares {
             return vec![count];
         }
         let mut sizes: Vec<_> = PACKED.map(|share| (share * count as f64) as usize).into();
-        // Rounding leaves a few over.
+        // The last layer also gets those that rounding has left over.
         let last = sizes.len() - 1;
         sizes[last] += count - sizes.iter().sum::<usize>();
         sizes
     }
 
-    /// How many Gaussians, the strongest ones, each of the first layers of an entropy-coded file with
-    /// `count` Gaussians takes; the others follow by where they are.
+    /// The numbers of Gaussians in the first layers of an entropy-coded file with `count`
+    /// Gaussians. These layers have the strongest Gaussians; the layers after them divide the
+    /// others by position.
     pub(crate) fn first_entropy_layers(count: usize) -> impl Iterator<Item = usize> {
         let shares = if count < LEAST_ENTROPY { &[][..] } else { &FIRST_ENTROPY };
         shares.iter().map(move |share| (share * count as f64) as usize)
@@ -68,12 +74,12 @@ mod shares {
         match count {
             0..LEAST_PARALLEL => count,
             LEAST_PARALLEL..=MOST_WHOLE => ((LARGEST * count as f64) as usize).min(MOST_IN_LAYER),
-            // As many layers as a header can declare.
+            // At least so many that a header can declare the number of layers.
             _ => MOST_IN_SMALL_LAYER.max(count / usize::from(u16::MAX / 2)),
         }
     }
 
-    /// Whether a file of so many layers says where they show.
+    /// Whether a file with this many layers has bounds of its layers.
     pub(crate) fn has_bounds(layers: usize) -> bool {
         layers > MOST_WITHOUT_BOUNDS
     }
@@ -81,3 +87,42 @@ mod shares {
 
 #[cfg(feature = "encode")]
 pub(crate) use shares::*;
+
+#[cfg(all(test, feature = "encode"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_layers_have_all_gaussians_and_none_is_empty() {
+        assert_eq!(packed_layers(0), []);
+        assert_eq!(packed_layers(511), [511]);
+        assert_eq!(packed_layers(512), [64, 64, 128, 256]);
+        for count in 1..5000 {
+            let sizes = packed_layers(count);
+            assert_eq!(sizes.iter().sum::<usize>(), count);
+            assert!(sizes.iter().all(|&size| size > 0), "{count}: {sizes:?}");
+        }
+    }
+
+    #[test]
+    fn the_layers_of_any_file_can_be_declared() {
+        for count in
+            [0, 1, 249, 250, 2047, 2048, 32_768, 32_769, 1 << 20, 1 << 22, u32::MAX as usize]
+        {
+            let first: Vec<usize> = first_entropy_layers(count).collect();
+            let rest = count - first.iter().sum::<usize>();
+            let most = most_in_entropy_layer(count).max(1);
+            let layers: usize = first.iter().chain([&rest]).map(|size| size.div_ceil(most)).sum();
+            assert!(u16::try_from(layers).is_ok(), "{count}: {layers} layers");
+        }
+    }
+
+    #[test]
+    fn a_small_output_needs_a_sixth_of_the_gaussians_at_least() {
+        assert_eq!(gaussians_for(6000, 1, 1), 1000);
+        assert_eq!(gaussians_for(6000, 120, 200), 2000);
+        assert_eq!(gaussians_for(6000, 4000, 3000), 6000);
+        assert_eq!(gaussians_for(u32::MAX, u32::MAX, u32::MAX), u32::MAX);
+        assert_eq!(gaussians_for(0, 100, 100), 0);
+    }
+}

@@ -1,5 +1,4 @@
-//! What is held to render a picture: which Gaussians may show in which band of it, and the splats
-//! of one band at a time.
+//! Which Gaussians may show in which band of the output, and the splats of one band at a time.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -8,11 +7,11 @@ use core::ops::Range;
 #[cfg(feature = "std")]
 use fearless_simd::dispatch;
 
-use super::splat::{Block, Splat, fill};
+use super::splat::{Block, Splat, fill_block};
 #[cfg(feature = "std")]
-use super::tile_grid::truncated_at_once;
-use super::tile_grid::{Columns, Extent, TILE_PIXELS, TILE_WIDTH, TileGrid, truncated};
-use super::tile_lists::{MOST_TOGETHER, TileEntry, TileLists};
+use super::tile_grid::truncate_simd;
+use super::tile_grid::{Columns, Extent, TILE_PIXELS, TILE_WIDTH, TileGrid, truncate};
+use super::tile_lists::{MAX_BLOCK_SPAN, TileEntry, TileLists};
 use super::view::View;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
@@ -24,146 +23,155 @@ use crate::threads::{self, Threads};
 /// Rows of tiles in a band.
 pub(crate) const BAND_ROWS: usize = 4;
 
-/// What is drawn, and how it is looked at.
+/// The Gaussians to render, with the view and the kernel.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Scene<'a> {
+pub(crate) struct RenderInput<'a> {
     pub(crate) gaussians: &'a [Gaussian],
     pub(crate) view: View,
     pub(crate) kernel: Kernel,
 }
 
-/// Fewest Gaussians that are sorted by another thread.
-const LEAST_APART: usize = 512;
+/// Fewest Gaussians in a slice: fewer are not worth a thread.
+const MIN_SLICE: usize = 512;
 
-/// Which Gaussians may show in which band.
+/// For each band of the output, the Gaussians that may show in it.
 #[derive(Debug)]
 pub(crate) struct Bands {
     grid: TileGrid<TILE_WIDTH>,
-    /// In file order, of some Gaussians each: one for each thread.
-    parts: Vec<Part>,
+    /// One for each slice of the Gaussians, in file order.
+    slices: Vec<BandMembers>,
 }
 
-/// Which of some Gaussians may show in which band.
+/// For each band, the Gaussians of a slice that may show in it.
 #[derive(Debug)]
-struct Part {
-    /// `members[starts[b]..starts[b + 1]]` are those of band b, in file order.
+struct BandMembers {
+    /// `members[starts[b]..starts[b + 1]]` are those of band b.
     starts: Vec<usize>,
+    /// Indices of Gaussians, in file order within each band.
     members: Vec<u32>,
 }
 
 impl Bands {
-    /// Sorts Gaussians by band; `held` is what the caller already holds, in bytes.
+    /// Finds the Gaussians of each band. They are divided into slices, one for each thread.
+    /// `memory` is what is held already, in bytes.
+    ///
+    /// # Errors
+    /// When memory or work would exceed the limits.
     pub(crate) fn new(
-        scene: &Scene<'_>,
+        input: &RenderInput<'_>,
         backend: Backend,
         limits: &Limits,
-        held: u64,
+        memory: u64,
         threads: Threads,
     ) -> Result<Self, DecodeError> {
-        let gaussians = scene.gaussians;
-        let grid = TileGrid::new(scene.view.region);
+        let gaussians = input.gaussians;
+        let grid = TileGrid::new(input.view.region);
         let count = threads.count();
-        let apart = gaussians.len().div_ceil(count).max(LEAST_APART).next_multiple_of(LANES);
-        let parts = gaussians.chunks(apart).map(|gaussians| Scene { gaussians, ..*scene });
+        let length = gaussians.len().div_ceil(count).max(MIN_SLICE).next_multiple_of(LANES);
+        let slices = gaussians.chunks(length).map(|gaussians| RenderInput { gaussians, ..*input });
         let bands = grid.rows.div_ceil(BAND_ROWS);
-        let by_band = (bands as u64 + 1) * (size_of::<usize>() + size_of::<Load>()) as u64;
+        let by_band = (bands as u64 + 1) * (size_of::<usize>() + size_of::<BandLoad>()) as u64;
         let by_gaussian = gaussians.len() as u64 * size_of::<Range<u32>>() as u64;
-        let held = held + by_band * parts.len() as u64 + by_gaussian;
-        limits.check_memory(held)?;
-        let reaches = threads::map(threads, parts, |scene| {
-            Reaches::new(&scene, &grid, bands, backend, limits)
+        let memory = memory + by_band * slices.len() as u64 + by_gaussian;
+        limits.check_memory(memory)?;
+        let ranges = threads::map(threads, slices, |slice| {
+            BandRanges::new(&slice, &grid, bands, backend, limits)
         });
-        let reaches = reaches.into_iter().collect::<Result<Vec<_>, _>>()?;
-        limits.check_work(reaches.iter().map(|reaches| reaches.work).sum())?;
-        let mut loads = vec![Load::default(); reaches.len()];
+        let ranges = ranges.into_iter().collect::<Result<Vec<_>, _>>()?;
+        limits.check_work(ranges.iter().map(|ranges| ranges.work).sum())?;
+        let mut loads = vec![BandLoad::default(); ranges.len()];
         let (mut members, mut most) = (0, 0);
         for band in 0..bands {
-            for (load, reaches) in loads.iter_mut().zip(&reaches) {
-                load.add(reaches.changes[band]);
+            for (load, ranges) in loads.iter_mut().zip(&ranges) {
+                load.add(ranges.changes[band]);
             }
             members += loads.iter().map(|load| load.members).sum::<u64>();
             most = most.max(loads.iter().map(|load| load.memory(grid.columns)).sum());
         }
         let columns = (2 * grid.columns + 1) * size_of::<usize>() + size_of::<TileEntry>();
         let per_thread = most + columns as u64;
-        let memory = members * size_of::<u32>() as u64;
-        limits.check_memory(held + memory + per_thread * count.min(bands) as u64)?;
-        let firsts = (0..).step_by(apart);
-        let parts = threads::map(threads, reaches.into_iter().zip(firsts), |(reaches, first)| {
-            Part::new(&reaches, first)
+        let members = members * size_of::<u32>() as u64;
+        limits.check_memory(memory + members + per_thread * count.min(bands) as u64)?;
+        let firsts = (0..).step_by(length);
+        let slices = threads::map(threads, ranges.into_iter().zip(firsts), |(ranges, first)| {
+            BandMembers::new(&ranges, first)
         });
-        Ok(Self { grid, parts })
+        Ok(Self { grid, slices })
     }
 
-    /// The members of a band, in file order.
+    /// The indices of the Gaussians that may show in a band, slice by slice, in file order.
     fn members(&self, band: usize) -> impl Iterator<Item = &[u32]> {
-        self.parts.iter().map(move |part| &part.members[part.starts[band]..part.starts[band + 1]])
+        let slices = self.slices.iter();
+        slices.map(move |slice| &slice.members[slice.starts[band]..slice.starts[band + 1]])
     }
 
-    /// How many Gaussians may show in a band.
-    pub(crate) fn load(&self, band: usize) -> usize {
+    /// The number of Gaussians that may show in a band.
+    pub(crate) fn gaussians_in(&self, band: usize) -> usize {
         self.members(band).map(<[u32]>::len).sum()
     }
 
+    /// The number of tiles in a row.
     pub(crate) fn columns(&self) -> usize {
         self.grid.columns
     }
 
+    /// The number of bands.
     pub(crate) fn count(&self) -> usize {
         self.grid.rows.div_ceil(BAND_ROWS)
     }
 
-    /// How many rows of tiles a band has: the last one may have fewer.
+    /// The number of rows of tiles in a band: the last band may have fewer than the others.
     pub(crate) fn rows(&self, band: usize) -> usize {
         BAND_ROWS.min(self.grid.rows - band * BAND_ROWS)
     }
 }
 
-/// In which bands some Gaussians may show.
+/// The bands in which each Gaussian of a slice may show.
 #[derive(Debug)]
-struct Reaches {
-    /// For each Gaussian.
+struct BandRanges {
+    /// For each Gaussian, a range of bands.
     bands: Vec<Range<u32>>,
-    /// By how much the load changes from one band to the next.
-    changes: Vec<Load>,
-    /// Most kernel evaluations.
+    /// For each band, the difference of its load from that of the band before it.
+    changes: Vec<BandLoad>,
+    /// An upper bound of the kernel evaluations.
     work: u64,
 }
 
-impl Reaches {
+impl BandRanges {
     fn new(
-        Scene { gaussians, view, kernel }: &Scene<'_>,
+        RenderInput { gaussians, view, kernel }: &RenderInput<'_>,
         grid: &TileGrid<TILE_WIDTH>,
         bands: usize,
         backend: Backend,
         limits: &Limits,
     ) -> Result<Self, DecodeError> {
-        let mut changes = vec![Load::default(); bands + 1];
-        let mut reaches = Vec::with_capacity(gaussians.len());
+        let mut changes = vec![BandLoad::default(); bands + 1];
+        let mut ranges = Vec::with_capacity(gaussians.len());
         let mut work = 0;
         for gaussians in gaussians.chunks(LANES) {
             let extents = grid.extents(backend, gaussians, view, kernel.cutoff());
             for &Extent { first, end, columns } in &extents[..gaussians.len()] {
                 work += u64::from(end - first) * u64::from(columns) * TILE_PIXELS as u64;
-                // Every band counts as work, so that hostile shapes cannot keep this loop busy.
+                // Each band counts as work, which bounds the time that hostile shapes take here and
+                // in `BandMembers::new`.
                 limits.check_work(work)?;
-                let reach = first / BAND_ROWS as u32..end.div_ceil(BAND_ROWS as u32);
-                let reach = if first < end { reach } else { 0..0 };
-                let load = Load { members: 1, entries: columns.into() };
-                changes[reach.start as usize].add(load);
-                changes[reach.end as usize].subtract(load);
-                reaches.push(reach);
+                let range = first / BAND_ROWS as u32..end.div_ceil(BAND_ROWS as u32);
+                let range = if first < end { range } else { 0..0 };
+                let load = BandLoad { members: 1, entries: columns.into() };
+                changes[range.start as usize].add(load);
+                changes[range.end as usize].subtract(load);
+                ranges.push(range);
             }
         }
-        Ok(Self { bands: reaches, changes, work })
+        Ok(Self { bands: ranges, changes, work })
     }
 }
 
-impl Part {
-    /// Sorts Gaussians, the `first` of which has this index.
-    fn new(reaches: &Reaches, first: u32) -> Self {
-        let (mut total, mut load) = (0, Load::default());
-        let starts = reaches.changes.iter().map(|&change| {
+impl BandMembers {
+    /// The members of the bands of a slice, whose first Gaussian has the index `first`.
+    fn new(ranges: &BandRanges, first: u32) -> Self {
+        let (mut total, mut load) = (0, BandLoad::default());
+        let starts = ranges.changes.iter().map(|&change| {
             load.add(change);
             let start = total;
             total += load.members as usize;
@@ -171,10 +179,10 @@ impl Part {
         });
         let mut starts: Vec<usize> = starts.collect();
         let mut members = vec![0; total];
-        // `starts[b]` runs through its band's members and ends where the next begins; shift it
-        // back afterwards.
-        for (index, reach) in (first..).zip(&reaches.bands) {
-            for start in &mut starts[reach.start as usize..reach.end as usize] {
+        // `starts[b]` moves over the members of band b, and is at those of the next band at the
+        // end.
+        for (index, range) in (first..).zip(&ranges.bands) {
+            for start in &mut starts[range.start as usize..range.end as usize] {
                 members[*start] = index;
                 *start += 1;
             }
@@ -185,15 +193,16 @@ impl Part {
     }
 }
 
-/// What a band takes.
+/// How much there is in a band. Differences wrap around.
 #[derive(Clone, Copy, Debug, Default)]
-struct Load {
+struct BandLoad {
+    /// The number of Gaussians.
     members: u64,
-    /// At most so many tiles are touched in any row.
+    /// An upper bound of the pairs of a Gaussian and a tile in any of the band's rows.
     entries: u64,
 }
 
-impl Load {
+impl BandLoad {
     fn add(&mut self, other: Self) {
         self.members = self.members.wrapping_add(other.members);
         self.entries = self.entries.wrapping_add(other.entries);
@@ -204,47 +213,54 @@ impl Load {
         self.entries = self.entries.wrapping_sub(other.entries);
     }
 
-    /// Bytes of a [`Band`], beside what the columns' own places take.
+    /// The memory of a [`Band`] in bytes, without what its tiles take whether or not splats touch
+    /// them.
     fn memory(&self, columns: usize) -> u64 {
         let blocks = self.members.div_ceil(LANES as u64);
-        let groups = self.entries + blocks * (columns as u64).min(MOST_TOGETHER.into());
+        let entries = self.entries + blocks * (columns as u64).min(MAX_BLOCK_SPAN.into());
         blocks * (size_of::<Block>() + BAND_ROWS * size_of::<Columns>()) as u64
-            + groups * size_of::<TileEntry>() as u64
+            + entries * size_of::<TileEntry>() as u64
     }
 }
 
-/// The splats of one band, and which of them touch which tile of a row.
+/// The splats of one band, and those that touch each tile of one of its rows.
 #[derive(Debug, Default)]
 pub(crate) struct Band {
     blocks: Vec<Block>,
-    /// For every row of tiles, those that each splat touches.
+    /// For each row of tiles, the tiles that each splat touches.
     columns: [Vec<Columns>; BAND_ROWS],
-    groups: TileLists,
+    lists: TileLists,
 }
 
 impl Band {
     /// Prepares the splats of a band, in the memory of an earlier one.
-    pub(crate) fn fill(&mut self, bands: &Bands, band: usize, scene: &Scene<'_>, backend: Backend) {
+    pub(crate) fn prepare(
+        &mut self,
+        bands: &Bands,
+        band: usize,
+        input: &RenderInput<'_>,
+        backend: Backend,
+    ) {
         match backend {
-            Backend::Reference => self.fill_with(bands, band, scene, truncated),
+            Backend::Reference => self.prepare_with(bands, band, input, truncate),
             #[cfg(feature = "std")]
-            Backend::Simd(level) => dispatch!(level, simd => self.fill_with(
+            Backend::Simd(level) => dispatch!(level, simd => self.prepare_with(
                 bands,
                 band,
-                scene,
+                input,
                 #[inline(always)]
-                |values| truncated_at_once(simd, values),
+                |values| truncate_simd(simd, values),
             )),
         }
     }
 
     #[inline(always)]
-    fn fill_with(
+    fn prepare_with(
         &mut self,
         bands: &Bands,
         band: usize,
-        Scene { gaussians, view, kernel }: &Scene<'_>,
-        truncated: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
+        RenderInput { gaussians, view, kernel }: &RenderInput<'_>,
+        truncate: impl Fn([f32; LANES]) -> [i32; LANES] + Copy,
     ) {
         let first = band * BAND_ROWS;
         let rows = first..(first + BAND_ROWS).min(bands.grid.rows);
@@ -260,22 +276,23 @@ impl Band {
         let members = bands.members(band).flat_map(|members| members.chunks(LANES));
         for (index, (members, block)) in members.zip(&mut self.blocks).enumerate() {
             let gaussians = members.iter().map(|&index| &gaussians[index as usize]);
-            let ellipses = fill(block, gaussians, view, kernel.scale());
+            let ellipses = fill_block(block, gaussians, view, kernel.scale());
             let rows = rows.clone();
-            bands.grid.columns_with(&ellipses, kernel.cutoff(), rows, truncated, |row, columns| {
+            bands.grid.columns_with(&ellipses, kernel.cutoff(), rows, truncate, |row, columns| {
                 self.columns[row - first][index] = *columns;
             });
         }
     }
 
-    /// The splats of the band, and those of each tile of one of its rows, which has so many.
+    /// The splats that touch each of the `columns` tiles of a row of the band, and all splats of
+    /// the band.
     pub(crate) fn row(
         &mut self,
         backend: Backend,
         columns: usize,
         row: usize,
     ) -> (&TileLists, &[Block]) {
-        self.groups.sort(backend, columns, &self.columns[row]);
-        (&self.groups, &self.blocks)
+        self.lists.fill(backend, columns, &self.columns[row]);
+        (&self.lists, &self.blocks)
     }
 }

@@ -1,23 +1,25 @@
-//! Where splats may show: sixteen at a time, in plain loops over lanes that become vector code.
+//! Where splats may show: sixteen at a time, in loops over lanes that the compiler vectorizes.
 
 use super::view::View;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::math;
 use crate::simd::LANES;
 
-/// Centres and Cholesky factors, one lane for each of several ellipses.
+/// The centres and Cholesky factors of sixteen splats in output pixels, one per lane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ellipses {
+    /// x, y.
     pub(super) center: [[f32; LANES]; 2],
+    /// l11, l21, l22.
     pub(super) cholesky: [[f32; LANES]; 3],
 }
 
 impl Ellipses {
-    /// Far from every picture, all of them.
+    /// Ellipses that are all far from every picture.
     pub(super) const NOWHERE: Self =
         Self { center: [[-4e9; LANES]; 2], cholesky: [[1.0; LANES], [0.0; LANES], [1.0; LANES]] };
 
-    /// A Gaussian in output pixels, not widened yet.
+    /// Sets a lane to a Gaussian in output pixels, without the filter of the view.
     #[inline(always)]
     pub(super) fn set(&mut self, lane: usize, gaussian: &Gaussian, view: &View) {
         let [sx, sy] = view.scale;
@@ -27,8 +29,8 @@ impl Ellipses {
         (a[lane], b[lane], c[lane]) = (l11 * sx, l21 * sy, l22 * sy);
     }
 
-    /// Widens them by the filter of a view, if it has one. Returns by what that changes amplitudes:
-    /// it keeps the integral, so that they fall as the area grows (spec, section 9.2).
+    /// Widens the ellipses by the filter of a view, if it has one. Returns the factors of the
+    /// amplitudes, which keep the integrals as they were (spec, section 9.2).
     #[inline(always)]
     pub(super) fn widen(&mut self, view: &View) -> [f32; LANES] {
         let mut amplitudes = [1.0; LANES];
@@ -41,7 +43,7 @@ impl Ellipses {
             let (a, b, c) = (l11[lane], l21[lane], l22[lane]);
             let wide11 = math::sqrt(a * a + fx);
             let wide21 = (a * b) / wide11;
-            // yy + fy - wide21^2 without its cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
+            // yy + fy - wide21^2, without cancellation: l21^2 - wide21^2 = l21^2 fx / wide11^2.
             let rest = b / wide11;
             let wide22 = math::sqrt((c * c + fy) + (rest * rest) * fx);
             amplitudes[lane] = (a / wide11) * (c / wide22);
@@ -64,28 +66,28 @@ impl Ellipses {
     }
 }
 
-/// Outlines that hold every pixel whose *computed* weight is not 0: ellipses a little larger than
-/// where q is at most a cut-off. One lane for each of several splats, for loops that become vector
-/// code.
+/// The outlines of sixteen splats, one per lane. Each contains every pixel whose *computed* weight
+/// is not 0: it is an ellipse that is slightly larger than the one where q equals the cut-off.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footprints {
     x: [f32; LANES],
     y: [f32; LANES],
-    /// Half of the height.
+    /// Half of the height, without the margin.
     reach: [f32; LANES],
     margin_x: [f32; LANES],
     margin_y: [f32; LANES],
-    /// dy of the rightmost point; of the leftmost point with the other sign.
+    /// dy of the rightmost point, and minus dy of the leftmost point.
     tip: [f32; LANES],
-    /// dx of the middle of a horizontal chord, per dy.
+    /// dx of the middle of a horizontal chord, divided by its dy.
     slope: [f32; LANES],
-    /// Half of the chord through the centre.
+    /// Half of the horizontal chord through the centre.
     half_width: [f32; LANES],
     inverse_reach: [f32; LANES],
 }
 
 #[expect(clippy::needless_range_loop, reason = "every loop is over lanes")]
 impl Footprints {
+    /// The outlines of ellipses, for a cut-off of the squared Mahalanobis distance.
     #[inline(always)]
     pub(super) fn new(ellipses: &Ellipses, cutoff: f32) -> Self {
         const NONE: [f32; LANES] = [0.0; LANES];
@@ -107,8 +109,8 @@ impl Footprints {
             let (x, y) = (x[lane], y[lane]);
             let (l11, l21, l22) = (l11[lane], l21[lane], l22[lane]);
             // Rounding moves the computed edge: along x by a few units in the last place, along y
-            // by as many units of the larger of l21 and l22 (w dx + i22 dy cancels in a needle).
-            // Widen the ellipse by eight of them.
+            // by as many units of the larger of l21 and l22, since w dx + i22 dy cancels in a long
+            // thin ellipse. Hence the ellipse is made larger by eight of these units.
             let l11 = l11 * (1.0 + 1e-6);
             let l22 = l22 + (l21.abs() + l22) * 1e-6;
             let sigma_y = math::sqrt(l21 * l21 + l22 * l22);
@@ -124,7 +126,7 @@ impl Footprints {
         all
     }
 
-    /// Where they begin and end along y, in pixels.
+    /// Where the outlines begin and end along y, in pixels.
     #[inline(always)]
     pub(super) fn rows(&self) -> [[f32; LANES]; 2] {
         let mut ends = [[0.0; LANES]; 2];
@@ -136,7 +138,8 @@ impl Footprints {
         ends
     }
 
-    /// Where the parts between the rows `top` and `bottom` begin and end along x, in pixels.
+    /// Where the parts of the outlines between `top` and `bottom` begin and end along x. All are in
+    /// pixels.
     #[inline(always)]
     pub(super) fn columns(&self, top: f32, bottom: f32) -> [[f32; LANES]; 2] {
         let mut ends = [[0.0; LANES]; 2];
@@ -144,8 +147,8 @@ impl Footprints {
             let (reach, margin) = (self.reach[lane], self.margin_y[lane]);
             let low = larger(top - self.y[lane] - margin, -reach);
             let high = smaller(bottom - self.y[lane] + margin, reach);
-            // A chord's end moves monotonically on either side of the tip, so the outermost end
-            // lies at the row nearest to the tip.
+            // The end of a chord moves monotonically on both sides of the tip, so the outermost end
+            // is at the height nearest to the tip.
             let end = |tip: f32, half_width: f32, margin: f32| {
                 let dy = smaller(larger(tip, low), high);
                 let t = dy * self.inverse_reach[lane];
@@ -159,7 +162,8 @@ impl Footprints {
         ends
     }
 
-    /// At least as wide as any parts between two rows `height` pixels apart, in pixels.
+    /// Upper bounds of the widths of all parts of the outlines that are `height` pixels high, in
+    /// pixels.
     #[inline(always)]
     pub(super) fn widest(&self, height: f32) -> [f32; LANES] {
         let mut widths = [0.0; LANES];
@@ -172,12 +176,13 @@ impl Footprints {
     }
 }
 
-// One instruction each, unlike those of `f32`, which think of NaN.
+/// The larger of two numbers. One instruction, unlike `f32::max`, which also handles NaN.
 #[inline(always)]
 pub(super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// The smaller of two numbers. One instruction, unlike `f32::min`, which also handles NaN.
 #[inline(always)]
 pub(super) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }

@@ -1,4 +1,9 @@
-//! Gaussians to samples: view, tiles, kernel, output (spec, section 9).
+//! From Gaussians to samples (spec, section 9).
+//!
+//! The output is divided into bands of four rows of tiles. [`band`] finds the Gaussians that may
+//! show in each band, and prepares its splats; [`tile_lists`] finds those that touch each tile;
+//! [`tile`] adds them up; and [`output`] converts the sums to samples. Threads work on different
+//! bands.
 
 mod band;
 mod footprint;
@@ -17,7 +22,7 @@ use core::cmp::Reverse;
 pub(crate) use output::Sample;
 pub use view::RenderOptions;
 
-use band::{BAND_ROWS, Band, Bands, Scene};
+use band::{BAND_ROWS, Band, Bands, RenderInput};
 use output::Destination;
 use tile::{PairPlane, Tile};
 use tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
@@ -31,21 +36,22 @@ use crate::threads;
 
 /// Rows of pixels in a band.
 const BAND_HEIGHT: usize = BAND_ROWS * TILE_HEIGHT;
-/// Most bytes that a band takes for slices of the output.
-const STRIP: u64 = 128;
+/// Most bytes that a band takes in the list of the parts of the output.
+const STRIP_MEMORY: u64 = 128;
 
-/// A picture that can be rendered: a header and the Gaussians that have arrived so far.
+/// A picture that can be rendered: a header and the Gaussians that have arrived.
 ///
-/// Rendering evaluates the continuous model at the centres of the output's pixels: at the stored
-/// size, at any other size, for the whole picture or any region of it, with all Gaussians or the
-/// first few. All output is bit-exact: it depends neither on the machine nor on SIMD or threads.
+/// Rendering evaluates the sum of the Gaussians at the centres of the output's pixels: at the
+/// stored size or any other, for the whole picture or a region, with all Gaussians or only the
+/// first ones. The samples are specified bit for bit (spec, section 9): they depend neither on the
+/// machine nor on SIMD or threads.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture<'a> {
     header: &'a Header,
     gaussians: &'a [Gaussian],
     limits: &'a Limits,
-    /// Bytes that the decoder holds.
-    held: u64,
+    /// The memory that the decoder holds, in bytes.
+    decoder_memory: u64,
 }
 
 impl<'a> Picture<'a> {
@@ -53,12 +59,12 @@ impl<'a> Picture<'a> {
         header: &'a Header,
         gaussians: &'a [Gaussian],
         limits: &'a Limits,
-        held: u64,
+        decoder_memory: u64,
     ) -> Self {
-        Self { header, gaussians, limits, held }
+        Self { header, gaussians, limits, decoder_memory }
     }
 
-    /// What the file says of the picture.
+    /// The header.
     #[must_use]
     pub fn header(&self) -> &'a Header {
         self.header
@@ -70,11 +76,13 @@ impl<'a> Picture<'a> {
         self.gaussians
     }
 
-    /// The number of samples that rendering with these options writes, checked against the picture
-    /// and the limits: safe to allocate.
+    /// The number of samples of the output with these options: width x height x channels of the
+    /// region that is rendered. It is checked against the [`Limits`], so that it is safe to
+    /// allocate.
     ///
     /// # Errors
-    /// When the options do not fit the picture, or when a limit would be exceeded.
+    /// When the output size or the region is out of range, when the colour model lacks a channel of
+    /// the picture, or when the size exceeds a limit.
     pub fn output_len(&self, options: &RenderOptions) -> Result<usize, DecodeError> {
         let view = options.view(self.header, self.limits)?;
         let samples = view.region.pixels() * options.output_color(self.header)?.channels() as u64;
@@ -85,16 +93,17 @@ impl<'a> Picture<'a> {
         })
     }
 
-    /// Renders interleaved 8-bit samples, rows from the top, without padding.
+    /// Renders interleaved 8-bit samples: height x width x channels, rows from the top, without
+    /// padding. Sums are clamped to [0, 1] and rounded (spec, section 9.5).
     ///
     /// # Errors
-    /// When `out` is not [`Picture::output_len`] long, when the options do not fit the
-    /// picture, or when a limit would be exceeded. `out` is untouched then.
+    /// As [`Picture::output_len`], when `out` does not have that length, and when the memory or the
+    /// work would exceed a limit. `out` is not changed then.
     pub fn render_u8(&self, options: &RenderOptions, out: &mut [u8]) -> Result<(), DecodeError> {
         self.render(options, out)
     }
 
-    /// Renders interleaved 16-bit samples in the machine's byte order.
+    /// Renders interleaved 16-bit samples, 0 to 65535, otherwise as [`Picture::render_u8`].
     ///
     /// # Errors
     /// As [`Picture::render_u8`].
@@ -102,9 +111,10 @@ impl<'a> Picture<'a> {
         self.render(options, out)
     }
 
-    /// Renders planes of `f32`, one after the other: all of the first channel, then all of the
-    /// second. 1.0 is a full sample; values are neither clamped nor rounded. Where a source is
-    /// black or white they may lie far beyond: encoders know that integer samples are clamped.
+    /// Renders planes of `f32`, channels x height x width: all samples of the first channel, then
+    /// all of the second, and so on. 1.0 is a full sample. Samples are neither clamped nor rounded:
+    /// in black and white parts of a picture they may be far outside of [0, 1], because an encoder
+    /// takes into account that integer samples are clamped.
     ///
     /// # Errors
     /// As [`Picture::render_u8`].
@@ -113,12 +123,12 @@ impl<'a> Picture<'a> {
         options: &RenderOptions,
         out: &mut [f32],
     ) -> Result<(), DecodeError> {
-        let job = self.prepare(options, out.len())?;
-        let width = job.scene.view.region.width as usize;
-        let pixels = width * job.scene.view.region.height as usize;
+        let render = self.prepare(options, out.len())?;
+        let width = render.input.view.region.width as usize;
+        let pixels = width * render.input.view.region.height as usize;
         let mut planes: Vec<&mut [f32]> = out.chunks_exact_mut(pixels).collect();
-        let mut strips = Vec::with_capacity(job.bands.count());
-        for band in 0..job.bands.count() {
+        let mut strips = Vec::with_capacity(render.bands.count());
+        for band in 0..render.bands.count() {
             let length = planes[0].len().min(width * BAND_HEIGHT);
             let strip = planes.iter_mut().map(|plane| {
                 let (strip, rest) = core::mem::take(plane).split_at_mut(length);
@@ -127,45 +137,50 @@ impl<'a> Picture<'a> {
             });
             strips.push((band, strip.collect::<Vec<_>>()));
         }
-        job.sort(&mut strips);
+        render.sort(&mut strips);
         threads::for_each(options.threads, strips, |memory: &mut Band, (band, mut strip)| {
-            job.band(memory, band, |planes, x, y| {
-                output::write_planes(planes, (x, y), job.sources, &mut strip, width);
+            render.band(memory, band, |planes, x, y| {
+                output::write_planes(planes, (x, y), render.sources, &mut strip, width);
             });
         });
         Ok(())
     }
 
     fn render<T: Sample>(&self, options: &RenderOptions, out: &mut [T]) -> Result<(), DecodeError> {
-        let job = self.prepare(options, out.len())?;
-        let stride = job.scene.view.region.width as usize * job.sources.len();
+        let render = self.prepare(options, out.len())?;
+        let stride = render.input.view.region.width as usize * render.sources.len();
         let mut strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
-        job.sort(&mut strips);
+        render.sort(&mut strips);
         threads::for_each(options.threads, strips, |memory: &mut Band, (band, strip)| {
-            job.band(memory, band, |planes, x, y| {
+            render.band(memory, band, |planes, x, y| {
                 let mut destination = Destination { x, rows: &mut strip[y * stride..], stride };
-                output::write_interleaved(job.backend, planes, job.sources, &mut destination);
+                output::write_interleaved(render.backend, planes, render.sources, &mut destination);
             });
         });
         Ok(())
     }
 
-    /// Checks everything and sorts the Gaussians by band; nothing of the output is touched before.
-    fn prepare(&self, options: &RenderOptions, out: usize) -> Result<Job<'a>, DecodeError> {
+    /// Checks the request and the limits, and finds the Gaussians of each band. `found` is the
+    /// length of the output buffer.
+    fn prepare(
+        &self,
+        options: &RenderOptions,
+        found: usize,
+    ) -> Result<PreparedRender<'a>, DecodeError> {
         let wanted = self.output_len(options)?;
-        if wanted != out {
-            return Err(RequestError::BufferLength { found: out, wanted }.into());
+        if wanted != found {
+            return Err(RequestError::BufferLength { found, wanted }.into());
         }
         let view = options.view(self.header, self.limits)?;
         let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
-        let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP;
-        let (held, kernel) = (self.held + strips, self.header.kernel);
-        let (scene, backend) = (Scene { gaussians, view, kernel }, options.backend);
-        let bands = Bands::new(&scene, backend, self.limits, held, options.threads)?;
-        Ok(Job {
-            scene,
+        let strips = u64::from(view.region.height).div_ceil(BAND_HEIGHT as u64) * STRIP_MEMORY;
+        let (memory, kernel) = (self.decoder_memory + strips, self.header.kernel);
+        let (input, backend) = (RenderInput { gaussians, view, kernel }, options.backend);
+        let bands = Bands::new(&input, backend, self.limits, memory, options.threads)?;
+        Ok(PreparedRender {
+            input,
             bands,
             channels: self.header.color.channels(),
             sources: output::sources(self.header.color, color),
@@ -175,27 +190,29 @@ impl<'a> Picture<'a> {
     }
 }
 
-/// A rendering that was checked and can no longer fail.
-struct Job<'a> {
-    scene: Scene<'a>,
+/// A rendering whose request and limits were checked: it cannot fail any more.
+struct PreparedRender<'a> {
+    input: RenderInput<'a>,
     bands: Bands,
+    /// The number of channels of the picture.
     channels: usize,
-    /// See [`output::sources`].
+    /// For each channel of the output the plane that it is copied from; see [`output::sources`].
     sources: &'static [Option<usize>],
     base: [f32; 4],
     backend: Backend,
 }
 
-impl Job<'_> {
-    /// Puts the bands with the most Gaussians first, so that threads end at the same time.
+impl PreparedRender<'_> {
+    /// Puts the bands with the most Gaussians first, so that at the end no thread waits for one of
+    /// them.
     fn sort<T>(&self, strips: &mut [(usize, T)]) {
-        strips.sort_by_cached_key(|&(band, _)| Reverse(self.bands.load(band)));
+        strips.sort_by_cached_key(|&(band, _)| Reverse(self.bands.gaussians_in(band)));
     }
 
-    /// Renders one band in the memory of an earlier one, and hands each pair of tiles over with its
-    /// first column in the region and its first row in the band.
+    /// Renders one band in the memory of an earlier one. Calls `write` with each pair of tiles, and
+    /// with its first column in the region and its first row in the band, in pixels.
     fn band(&self, memory: &mut Band, band: usize, write: impl FnMut(&[PairPlane], usize, usize)) {
-        memory.fill(&self.bands, band, &self.scene, self.backend);
+        memory.prepare(&self.bands, band, &self.input, self.backend);
         match self.channels {
             1 => self.band_of::<1>(memory, band, write),
             2 => self.band_of::<2>(memory, band, write),
@@ -204,6 +221,7 @@ impl Job<'_> {
         }
     }
 
+    /// Renders one band of a picture with `CHANNELS` channels.
     fn band_of<const CHANNELS: usize>(
         &self,
         memory: &mut Band,
@@ -214,15 +232,15 @@ impl Job<'_> {
         let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];
         for row in 0..self.bands.rows(band) {
             let y = row * TILE_HEIGHT;
-            let top = self.scene.view.region.y + (band * BAND_HEIGHT + y) as u32;
-            let (groups, blocks) = memory.row(self.backend, self.bands.columns(), row);
+            let top = self.input.view.region.y + (band * BAND_HEIGHT + y) as u32;
+            let (lists, blocks) = memory.row(self.backend, self.bands.columns(), row);
             let columns = self.bands.columns();
             for first in (0..columns).step_by(2) {
                 for (half, column) in (first..columns.min(first + 2)).enumerate() {
                     let x = (column * TILE_WIDTH) as u32;
-                    let origin = (self.scene.view.region.x + x, top);
-                    let members = groups.members(column);
-                    Tile { origin, base, blocks, members, kernel: self.scene.kernel }.render(
+                    let origin = (self.input.view.region.x + x, top);
+                    let splats = lists.splats(column);
+                    Tile { origin, base, blocks, splats, kernel: self.input.kernel }.render(
                         self.backend,
                         half,
                         &mut planes,

@@ -1,4 +1,4 @@
-//! Float planes to samples (spec, sections 9.5 and 9.6).
+//! From planes of sums to samples (spec, sections 9.5 and 9.6).
 
 #[cfg(feature = "std")]
 use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u8x16, u8x64};
@@ -10,26 +10,26 @@ use crate::simd::Backend;
 
 /// An integer sample type.
 pub(crate) trait Sample: Copy + Send {
-    /// A full sample.
+    /// The full sample, 255 or 65535.
     const OPAQUE: Self;
-    /// The same as a number.
+    /// The full sample as a number.
     const SCALE: f32;
-    /// A sample from a number that it can be.
+    /// The sample with this value, which is 0 to that of the full sample.
     fn from_integer(value: i32) -> Self;
 
-    /// Rounds to the nearest sample: clamp to [0, 1], scale, add one half, drop the fraction.
+    /// The nearest sample: clamps to [0, 1], scales, adds one half and truncates.
     fn from_unit(value: f32) -> Self {
         Self::from_integer((value.clamp(0.0, 1.0) * Self::SCALE + 0.5) as i32)
     }
 
-    /// The pixels of a row of two tiles, from the numbers that the samples of each channel can be.
+    /// The pixels of a row of two tiles, from the integer samples of each channel.
     #[cfg(feature = "std")]
     #[inline(always)]
     fn pixels<S: Simd, const CHANNELS: usize>(
         _: S,
         channels: [i32x16<S>; CHANNELS],
     ) -> [[Self; CHANNELS]; PAIR_WIDTH] {
-        one_by_one(channels)
+        interleave(channels)
     }
 }
 
@@ -41,8 +41,8 @@ impl Sample for u8 {
         value as Self
     }
 
-    /// A word for each pixel: bytes that are put in place one by one become vector code on few
-    /// machines.
+    /// Combines the samples of each pixel in a word, and then moves the bytes of four words with
+    /// one instruction. Compilers vectorize a loop over single bytes on few machines.
     #[cfg(feature = "std")]
     #[inline(always)]
     fn pixels<S: Simd, const CHANNELS: usize>(
@@ -50,7 +50,7 @@ impl Sample for u8 {
         channels: [i32x16<S>; CHANNELS],
     ) -> [[Self; CHANNELS]; PAIR_WIDTH] {
         if CHANNELS < 3 {
-            return one_by_one(channels);
+            return interleave(channels);
         }
         let mut words = channels[0];
         for (channel, samples) in channels.into_iter().enumerate().skip(1) {
@@ -67,7 +67,7 @@ impl Sample for u8 {
     }
 }
 
-/// Of four words, each of a pixel with its first channel lowest: the bytes in the order of samples.
+/// For four pixels, each of which is a word with its first sample lowest: the byte of each sample.
 #[cfg(feature = "std")]
 const fn word_order(channels: usize) -> [u8; 16] {
     let mut order = [0; 16];
@@ -81,9 +81,10 @@ const fn word_order(channels: usize) -> [u8; 16] {
     order
 }
 
+/// The pixels of a row of two tiles, sample by sample.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn one_by_one<S: Simd, T: Sample, const CHANNELS: usize>(
+fn interleave<S: Simd, T: Sample, const CHANNELS: usize>(
     channels: [i32x16<S>; CHANNELS],
 ) -> [[T; CHANNELS]; PAIR_WIDTH] {
     let mut pixels = [[T::OPAQUE; CHANNELS]; PAIR_WIDTH];
@@ -104,7 +105,8 @@ impl Sample for u16 {
     }
 }
 
-/// For each output channel the plane it comes from; `None` is opaque alpha.
+/// For each channel of the output, the plane that it is copied from; `None` for an opaque alpha
+/// channel.
 pub(super) fn sources(stored: ColorModel, output: ColorModel) -> &'static [Option<usize>] {
     use ColorModel::{Gray, GrayAlpha, Rgb, Rgba};
     match (stored, output) {
@@ -115,22 +117,23 @@ pub(super) fn sources(stored: ColorModel, output: ColorModel) -> &'static [Optio
         (Gray, Rgba) => &[Some(0), Some(0), Some(0), None],
         (GrayAlpha, Rgba) => &[Some(0), Some(0), Some(0), Some(1)],
         (Rgb, Rgba) => &[Some(0), Some(1), Some(2), None],
-        // What is left are the stored models themselves; narrower ones were refused before.
+        // The output has the stored channels. Colour models with fewer channels were refused
+        // before.
         (_, output) => &[Some(0), Some(1), Some(2), Some(3)][..output.channels()],
     }
 }
 
-/// Where two tiles go among interleaved samples.
+/// Where a pair of tiles is written among interleaved samples.
 pub(super) struct Destination<'a, T> {
-    /// Their first column.
+    /// The first column of the tiles in the output.
     pub(super) x: usize,
-    /// From their first row on.
+    /// The output from the first row of the tiles on.
     pub(super) rows: &'a mut [T],
     /// Samples per row.
     pub(super) stride: usize,
 }
 
-/// Copies two tiles to interleaved samples.
+/// Converts a pair of tiles to interleaved samples.
 pub(super) fn write_interleaved<T: Sample>(
     backend: Backend,
     planes: &[PairPlane],
@@ -158,7 +161,7 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
         Backend::Simd(level) => dispatch!(level, simd => write_rows(
             destination,
             #[inline(always)]
-            |row| pixels_at_once(simd, planes, sources, row),
+            |row| pixels_simd(simd, planes, sources, row),
         )),
     }
 }
@@ -172,7 +175,7 @@ fn write_rows<T: Sample, const CHANNELS: usize>(
     let rows = rows.chunks_mut(stride).take(TILE_HEIGHT);
     let tiles = rows.map(|samples| samples[x * CHANNELS..].as_chunks_mut().0);
     if stride / CHANNELS - x >= PAIR_WIDTH {
-        // Nearly all: copies of known length.
+        // Nearly all tiles: the length of the copies is known to the compiler.
         for (row, samples) in tiles.enumerate() {
             *samples.first_chunk_mut().expect("whole tiles") = pixels(row);
         }
@@ -183,7 +186,7 @@ fn write_rows<T: Sample, const CHANNELS: usize>(
     }
 }
 
-/// The pixels of a row of two tiles.
+/// The pixels of a row of a pair of tiles.
 fn pixels<T: Sample, const CHANNELS: usize>(
     planes: &[PairPlane],
     sources: [Option<usize>; CHANNELS],
@@ -195,10 +198,10 @@ fn pixels<T: Sample, const CHANNELS: usize>(
     core::array::from_fn(|column| sources.map(|source| sample(source, column)))
 }
 
-/// [`pixels`], all at once and bit for bit.
+/// [`pixels`] with SIMD, with the same bits.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
+fn pixels_simd<S: Simd, T: Sample, const CHANNELS: usize>(
     simd: S,
     planes: &[PairPlane],
     sources: [Option<usize>; CHANNELS],
@@ -215,7 +218,7 @@ fn pixels_at_once<S: Simd, T: Sample, const CHANNELS: usize>(
     T::pixels(simd, channels)
 }
 
-/// Copies two tiles to planes; (x, y) is their first pixel, `width` the length of a row.
+/// Copies a pair of tiles, whose first pixel is (x, y), to planes with rows of `width` samples.
 pub(super) fn write_planes(
     planes: &[PairPlane],
     (x, y): (usize, usize),

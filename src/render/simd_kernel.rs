@@ -1,4 +1,4 @@
-//! The weights of [`Kernel`](crate::kernel::Kernel), sixteen at a time and bit for bit.
+//! The weights of [`Kernel`](crate::kernel::Kernel), sixteen at a time and with the same bits.
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
@@ -6,20 +6,22 @@ use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use crate::kernel::QUARTIC_CUTOFF;
 use crate::math::{EXP2_POLYNOMIAL, LOG2_E, ROUND_MAGIC};
 
-/// A kernel whose parameters are known when the inner loop is compiled.
+/// A kernel as a type, for which the inner loop is compiled.
 pub(crate) trait Weight: Copy {
-    /// What all points with the same u have in common.
+    /// The part of the weight that depends on u only, which all points of a column share.
     fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S>;
 
-    /// The weights of points, from what their columns have in common.
+    /// The weights of points, from that part for their columns and from their v.
     fn weight<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S>;
 }
 
+/// [`Kernel::Exponential`](crate::kernel::Kernel::Exponential).
 #[derive(Clone, Copy)]
 pub(crate) struct Exponential {
     pub(crate) cutoff: f32,
 }
 
+/// [`Kernel::Quartic`](crate::kernel::Kernel::Quartic).
 #[derive(Clone, Copy)]
 pub(crate) struct Quartic;
 
@@ -37,7 +39,8 @@ impl Weight for Quartic {
 }
 
 impl Quartic {
-    /// The root of the weights at squared Mahalanobis distances: 1 - q / 4, and 0 beyond the cut-off.
+    /// The square roots of the weights at squared Mahalanobis distances: 1 - q / 4, and 0 for q
+    /// over 4.
     #[cfg(feature = "encode")]
     #[inline(always)]
     pub(crate) fn root<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
@@ -76,7 +79,7 @@ pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
     for &coefficient in &EXP2_POLYNOMIAL[1..] {
         p = p * f + coefficient;
     }
-    // The low bits of `shifted` are the rounded y itself.
+    // The low bits of `shifted` are y, rounded to an integer.
     let exponent: u32x16<S> = shifted.bitcast();
     let power = (exponent - (ROUND_MAGIC.to_bits() - 127)) << 23;
     p * power.bitcast::<f32x16<S>>()

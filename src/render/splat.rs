@@ -1,4 +1,4 @@
-//! A Gaussian as the inner loop wants it, and where on the output it may be visible.
+//! Gaussians in the form that the inner loop uses.
 
 use super::footprint::Ellipses;
 use super::view::View;
@@ -7,8 +7,8 @@ use crate::gaussian::Gaussian;
 use crate::gaussian::inverse_cholesky;
 use crate::simd::LANES;
 
-/// One Gaussian in output pixels: at a distance of (dx, dy) from its centre (x, y) lies the point
-/// (u, v) = (i11 dx, w dx + i22 dy) of its kernel (spec, sections 9.2 and 9.3).
+/// A Gaussian in output pixels. The kernel's point for a distance of (dx, dy) from the centre (x,
+/// y) is (u, v) = (i11 dx, w dx + i22 dy) (spec, sections 9.2 and 9.3).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Splat {
     pub(crate) x: f32,
@@ -16,16 +16,18 @@ pub(crate) struct Splat {
     pub(crate) i11: f32,
     pub(crate) w: f32,
     pub(crate) i22: f32,
+    /// The amplitude in each channel.
     pub(crate) color: [f32; 4],
 }
 
-/// Splats that stand together in the file; at the end some that touch nothing.
+/// Splats that follow each other in the file. A block with fewer is filled up with
+/// [`Splat::NOWHERE`].
 pub(crate) type Block = [Splat; LANES];
 
-/// Puts the splats of at most so many Gaussians, all of which are drawn, first into a block, with all
-/// distances multiplied by `scale`. Returns their outlines.
+/// Sets the first splats of a block to Gaussians, all of which are drawn. Their distances are
+/// multiplied by `scale`, which is that of the kernel. Returns their ellipses.
 #[inline(always)]
-pub(super) fn fill<'a>(
+pub(super) fn fill_block<'a>(
     block: &mut Block,
     gaussians: impl Iterator<Item = &'a Gaussian> + Clone,
     view: &View,
@@ -51,7 +53,7 @@ pub(super) fn fill<'a>(
     ellipses
 }
 
-/// The outlines of at most so many splats.
+/// The ellipses of at most sixteen splats.
 #[cfg(feature = "encode")]
 #[inline(always)]
 pub(super) fn ellipses_of(splats: &[Splat]) -> Ellipses {
@@ -61,17 +63,17 @@ pub(super) fn ellipses_of(splats: &[Splat]) -> Ellipses {
         (x[lane], y[lane]) = (splat.x, splat.y);
         (i11[lane], w[lane], i22[lane]) = (splat.i11, splat.w, splat.i22);
     }
-    // The inverse of the inverse.
+    // Here `cholesky` has inverses; the inverse of an inverse is the factor itself.
     all.cholesky = all.inverse_cholesky(1.0);
     all
 }
 
 impl Splat {
-    /// A splat that touches no picture: in place of a Gaussian that is not drawn.
+    /// A splat that is far from every picture. It stands for a Gaussian that is not drawn.
     pub(crate) const NOWHERE: Self =
         Self { x: -4e9, y: -4e9, i11: 1.0, w: 0.0, i22: 1.0, color: [0.0; 4] };
 
-    /// A Gaussian in a picture of the stored size; `None` for one that is not drawn.
+    /// The splat of a Gaussian in an output of the stored size; `None` if it is not drawn.
     #[cfg(any(feature = "encode", all(test, feature = "std")))]
     #[inline(always)]
     pub(crate) fn new(gaussian: &Gaussian) -> Option<Self> {
@@ -80,7 +82,7 @@ impl Splat {
         gaussian.is_drawable().then_some(Self { x, y, i11, w, i22, color })
     }
 
-    /// Where the pixel centre (px, py) lies in the kernel.
+    /// The kernel's point (u, v) for the pixel centre (px, py).
     pub(super) fn uv(&self, px: f32, py: f32) -> (f32, f32) {
         let (dx, dy) = (px - self.x, py - self.y);
         (self.i11 * dx, self.w * dx + self.i22 * dy)

@@ -1,5 +1,5 @@
-//! Which splats touch each tile of a row: blocks of sixteen that stand together in the file, and so
-//! mostly in the picture, with a bit for each.
+//! Which splats touch each tile of a row of tiles. An entry stands for several of the sixteen
+//! splats of a block, which are neighbours in the file, and so mostly in the picture as well.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -10,30 +10,32 @@ use fearless_simd::{Simd, dispatch, prelude::*, u32x16};
 use super::tile_grid::Columns;
 use crate::simd::{Backend, LANES};
 
-/// Tiles in a row up to which the splats of a block are looked at together.
-pub(super) const MOST_TOGETHER: u32 = 64;
+/// If the splats of a block lie within this many tiles of a row, each of these tiles is tested for
+/// all of them together.
+pub(super) const MAX_BLOCK_SPAN: u32 = 64;
 
-/// Some splats of a block.
+/// The splats of a block that touch a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TileEntry {
     pub(super) block: u32,
-    /// A bit for each of its splats, the first one lowest.
+    /// A bit for each splat of the block, the first one lowest.
     pub(super) members: u32,
 }
 
-/// The splats of a tile, in order: blocks, and places in them.
+/// The splats that touch a tile, in file order: the index of the block, and that of the splat in
+/// it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileSplats<'a> {
-    /// Those of the tile, none of them empty, and one more.
-    groups: &'a [TileEntry],
+    /// The entries of the tile, none of which is empty, and one more.
+    entries: &'a [TileEntry],
     index: usize,
-    /// What is left of the present one.
+    /// The members of the present entry that are still to come.
     rest: u32,
 }
 
 impl<'a> TileSplats<'a> {
-    pub(super) fn new(groups: &'a [TileEntry]) -> Self {
-        Self { groups, index: 0, rest: groups[0].members }
+    pub(super) fn new(entries: &'a [TileEntry]) -> Self {
+        Self { entries, index: 0, rest: entries[0].members }
     }
 }
 
@@ -42,64 +44,64 @@ impl Iterator for TileSplats<'_> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<(usize, usize)> {
-        if self.index == self.groups.len() - 1 {
+        if self.index == self.entries.len() - 1 {
             return None;
         }
-        let block = self.groups[self.index].block as usize;
+        let block = self.entries[self.index].block as usize;
         let lane = self.rest.trailing_zeros() as usize % LANES;
-        // Whether a group ends is as good as random, so there is no branch to be foreseen.
+        // Branchless: whether an entry ends cannot be predicted.
         let rest = self.rest & (self.rest - 1);
         self.index += usize::from(rest == 0);
-        let next = self.groups[self.index].members;
+        let next = self.entries[self.index].members;
         self.rest = if rest == 0 { next } else { rest };
         Some((block, lane))
     }
 }
 
-/// The groups of each tile of a row.
+/// The entries of each tile of a row.
 #[derive(Debug, Default)]
 pub(crate) struct TileLists {
-    /// `groups[starts[t]..ends[t]]` are those of tile t, in order; there is one more after all.
+    /// `entries[starts[t]..ends[t]]` are those of tile t, in file order. One more follows the last.
     starts: Vec<usize>,
     ends: Vec<usize>,
-    groups: Vec<TileEntry>,
+    entries: Vec<TileEntry>,
 }
 
 impl TileLists {
-    /// Sorts the splats of blocks by which of so many tiles they touch, in the memory of an earlier
-    /// row.
-    pub(crate) fn sort(&mut self, backend: Backend, columns: usize, blocks: &[Columns]) {
+    /// Makes the lists of a row of `columns` tiles, from the tiles that the splats of each block
+    /// touch. The memory of an earlier row is used again.
+    pub(crate) fn fill(&mut self, backend: Backend, columns: usize, blocks: &[Columns]) {
         match backend {
-            Backend::Reference => self.sort_with(columns, blocks, touched, touching),
+            Backend::Reference => self.fill_with(columns, blocks, span, touching),
             #[cfg(feature = "std")]
-            Backend::Simd(level) => dispatch!(level, simd => self.sort_with(
+            Backend::Simd(level) => dispatch!(level, simd => self.fill_with(
                 columns,
                 blocks,
                 #[inline(always)]
-                |block| touched_at_once(simd, block),
+                |block| span_simd(simd, block),
                 #[inline(always)]
-                |block, tile| touching_at_once(simd, block, tile),
+                |block, tile| touching_simd(simd, block, tile),
             )),
         }
     }
 
     #[inline(always)]
-    fn sort_with(
+    fn fill_with(
         &mut self,
         columns: usize,
         blocks: &[Columns],
-        touched: impl Fn(&Columns) -> Range<u32>,
+        span: impl Fn(&Columns) -> Range<u32>,
         touching: impl Fn(&Columns, u32) -> u32,
     ) {
-        // First how many more groups a tile has than the one before it, then how many those before
-        // it have.
+        // First the difference of the number of entries of each tile from that of the tile before
+        // it, which wraps around; then the sum of the numbers of all tiles before it.
         let starts = &mut self.starts;
         starts.clear();
         starts.resize(columns + 1, 0);
         for block in blocks {
-            for_each_part(
+            for_each_span(
                 block,
-                touched(block),
+                span(block),
                 #[inline(always)]
                 |_, tiles: Range<u32>| {
                     starts[tiles.start as usize] = starts[tiles.start as usize].wrapping_add(1);
@@ -113,23 +115,23 @@ impl TileLists {
             *start = total;
             total += count;
         }
-        let groups = &mut self.groups;
-        groups.clear();
-        groups.reserve_exact(total + 1);
-        groups.resize(total + 1, TileEntry::default());
+        let entries = &mut self.entries;
+        entries.clear();
+        entries.reserve_exact(total + 1);
+        entries.resize(total + 1, TileEntry::default());
         let ends = &mut self.ends;
         ends.clear();
         ends.extend_from_slice(&starts[..columns]);
         for (index, block) in (0..).zip(blocks) {
-            for_each_part(
+            for_each_span(
                 block,
-                touched(block),
+                span(block),
                 #[inline(always)]
-                |part, tiles: Range<u32>| {
+                |splats, tiles: Range<u32>| {
                     for tile in tiles {
-                        let members = part & touching(block, tile);
+                        let members = splats & touching(block, tile);
                         let end = &mut ends[tile as usize];
-                        groups[*end] = TileEntry { block: index, members };
+                        entries[*end] = TileEntry { block: index, members };
                         *end += usize::from(members != 0);
                     }
                 },
@@ -137,25 +139,21 @@ impl TileLists {
         }
     }
 
-    /// The splats of a tile.
-    pub(crate) fn members(&self, column: usize) -> TileSplats<'_> {
-        TileSplats::new(&self.groups[self.starts[column]..=self.ends[column]])
+    /// The splats that touch the tile of a column.
+    pub(crate) fn splats(&self, column: usize) -> TileSplats<'_> {
+        TileSplats::new(&self.entries[self.starts[column]..=self.ends[column]])
     }
 }
 
-/// Calls `each` with splats of a block, a bit for each, and the tiles that they may touch: all at
-/// once, or one by one where they are too far from each other.
+/// Calls `each` with splats of a block, a bit for each, and the tiles that they may touch: with all
+/// splats together, or one by one if they are too far from each other.
 #[inline(always)]
-fn for_each_part(
-    [first, end]: &Columns,
-    touched: Range<u32>,
-    mut each: impl FnMut(u32, Range<u32>),
-) {
-    if touched.is_empty() {
+fn for_each_span([first, end]: &Columns, span: Range<u32>, mut each: impl FnMut(u32, Range<u32>)) {
+    if span.is_empty() {
         return;
     }
-    if touched.end - touched.start <= MOST_TOGETHER {
-        each(u32::MAX, touched);
+    if span.end - span.start <= MAX_BLOCK_SPAN {
+        each(u32::MAX, span);
         return;
     }
     for lane in 0..LANES {
@@ -165,8 +163,8 @@ fn for_each_part(
     }
 }
 
-/// From the first tile that splats of a block touch to the last. Empty where none does.
-fn touched([first, end]: &Columns) -> Range<u32> {
+/// The tiles from the first that a splat of a block touches to the last. Empty if none touches any.
+fn span([first, end]: &Columns) -> Range<u32> {
     let (mut low, mut high) = (u32::MAX, 0);
     for lane in 0..LANES {
         low = low.min(if first[lane] < end[lane] { first[lane] } else { u32::MAX });
@@ -175,10 +173,10 @@ fn touched([first, end]: &Columns) -> Range<u32> {
     low..high
 }
 
-/// [`touched`], all at once.
+/// [`span`] with SIMD.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn touched_at_once<S: Simd>(simd: S, [first, end]: &Columns) -> Range<u32> {
+fn span_simd<S: Simd>(simd: S, [first, end]: &Columns) -> Range<u32> {
     let [first, end] = [first, end].map(|tiles| u32x16::load_array_ref(simd, tiles));
     let none = u32x16::splat(simd, u32::MAX);
     first.simd_lt(end).select(first, none).reduce_min()..end.reduce_max()
@@ -194,10 +192,10 @@ fn touching([first, end]: &Columns, tile: u32) -> u32 {
     members
 }
 
-/// [`touching`], all at once.
+/// [`touching`] with SIMD.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn touching_at_once<S: Simd>(simd: S, [first, end]: &Columns, tile: u32) -> u32 {
+fn touching_simd<S: Simd>(simd: S, [first, end]: &Columns, tile: u32) -> u32 {
     let [first, end] = [first, end].map(|tiles| u32x16::load_array_ref(simd, tiles));
     (first.simd_le(tile) & end.simd_gt(tile)).to_bitmask() as u32
 }
@@ -209,7 +207,7 @@ mod tests {
 
     use crate::testing::config;
 
-    /// Blocks whose splats are near each other or anywhere in a row of tiles, some nowhere.
+    /// Blocks whose splats are near each other, or anywhere in a row of tiles. Some touch no tile.
     fn blocks(columns: u32) -> impl Strategy<Value = Vec<Columns>> {
         let near = (0..columns, prop::array::uniform16((0_u32..8, 0_u32..5)));
         let far = (Just(0), prop::array::uniform16((0..columns, 0..columns)));
@@ -225,14 +223,14 @@ mod tests {
         #![proptest_config(config(200))]
 
         #[test]
-        fn every_tile_has_what_touches_it_in_order(
+        fn every_tile_has_the_splats_that_touch_it_in_file_order(
             (columns, blocks) in (1_u32..300).prop_flat_map(|columns| (Just(columns), blocks(columns)))
         ) {
-            let mut groups = TileLists::default();
+            let mut lists = TileLists::default();
             for backend in [Backend::reference(), Backend::fastest()] {
-                groups.sort(backend, columns as usize, &blocks);
+                lists.fill(backend, columns as usize, &blocks);
                 for tile in 0..columns {
-                    let found: Vec<(usize, usize)> = groups.members(tile as usize).collect();
+                    let found: Vec<(usize, usize)> = lists.splats(tile as usize).collect();
                     let expected: Vec<(usize, usize)> = (blocks.iter().enumerate())
                         .flat_map(|(block, [first, end])| {
                             let touches = move |&lane: &usize| (first[lane]..end[lane]).contains(&tile);

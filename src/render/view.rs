@@ -1,4 +1,5 @@
-//! What to render: output size, region, number of Gaussians (spec, section 9.1).
+//! What to render: output size, region, colour model, number of Gaussians (spec, sections 9.1 and
+//! 9.2).
 
 use crate::color::ColorModel;
 use crate::container::Header;
@@ -9,8 +10,9 @@ use crate::region::Region;
 use crate::simd::Backend;
 use crate::threads::Threads;
 
-/// How to render a [`Picture`](crate::Picture). The default is the whole picture at its stored
-/// size with all Gaussians, in the file's own colour model.
+/// How to render a [`Picture`](crate::Picture) (spec, section 9.1). The default is the whole
+/// picture at its stored size with all Gaussians, in the file's own colour model, on the threads of
+/// the current `rayon` pool.
 #[derive(Clone, Debug)]
 #[must_use]
 pub struct RenderOptions {
@@ -36,64 +38,66 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// The whole picture at its stored size.
+    /// The default options.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Renders the whole picture `width` by `height` pixels large. The continuous model is
-    /// evaluated there; nothing is resampled. Where that is smaller than the stored size, each
-    /// Gaussian is first widened by the pixels' own footprint, so that nothing aliases. Each side
-    /// is at most 2^23; [`RenderOptions::with_region`] keeps a close-up affordable.
+    /// Renders the whole picture with `width` x `height` pixels, each 1 to 2^23. The Gaussians are
+    /// evaluated at the centres of these pixels; nothing is resampled. Along an axis that is made
+    /// smaller, each Gaussian is first widened by the variance of the larger pixels, against
+    /// aliasing (spec, section 9.2). For a detail of a very large output, add
+    /// [`RenderOptions::with_region`].
     pub fn with_size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self
     }
 
-    /// Renders only this region of the output, in pixels of the output size. The result equals
-    /// that part of the full output, bit for bit.
+    /// Renders only this region, in pixels of the output size, inside of which it must be. The
+    /// samples are those of the whole output, bit for bit.
     pub fn with_region(mut self, region: Region) -> Self {
         self.region = Some(region);
         self
     }
 
-    /// Renders only the first `count` Gaussians of the file, or as many as there are.
+    /// Renders only the first `count` Gaussians of the file, or all if there are fewer.
     pub fn with_prefix(mut self, count: u32) -> Self {
         self.prefix = Some(count);
         self
     }
 
-    /// Writes the samples in another colour model, one that has all channels of the stored one:
-    /// gray becomes three equal channels, missing alpha becomes opaque.
+    /// Writes the samples in another colour model, which must have all channels of the file's own:
+    /// gray is repeated as red, green and blue, and an alpha channel that is missing is opaque
+    /// (spec, section 9.6).
     pub fn with_color(mut self, color: ColorModel) -> Self {
         self.color = Some(color);
         self
     }
 
-    /// The threads that render, and in a [`Decoder`](crate::Decoder) also decode entropy-coded
-    /// layers. Default [`Threads::Pool`].
+    /// Sets the threads that render, and that in a [`Decoder`](crate::Decoder) also decode
+    /// entropy-coded layers. Default [`Threads::Pool`].
     pub fn with_threads(mut self, threads: Threads) -> Self {
         self.threads = threads;
         self
     }
 
-    /// Whether to use the plain reference code in place of the fast code (default: no). The result is
-    /// the same bit for bit; this is how to find out.
+    /// Whether the scalar reference code renders in place of SIMD code. Default `false`. The
+    /// samples are the same bit for bit, which this is there to check.
     ///
-    /// For study: outside of what the crate promises to keep.
+    /// This is for study, and may change in any release.
     pub fn with_reference(mut self, reference: bool) -> Self {
         self.backend = if reference { Backend::reference() } else { Backend::fastest() };
         self
     }
 
-    /// Uses the code of one level of vector instructions.
+    /// Renders with the code for a SIMD level.
     #[cfg(all(fuzzing, feature = "std"))]
     pub fn with_simd_level(mut self, level: fearless_simd::Level) -> Self {
         self.backend = Backend::Simd(level);
         self
     }
 
-    /// Width and height of what will be written, in pixels.
+    /// The width and height in pixels of what is rendered: of the region, or of the whole output.
     #[must_use]
     pub fn output_size(&self, header: &Header) -> (u32, u32) {
         match (self.region, self.size) {
@@ -103,10 +107,10 @@ impl RenderOptions {
         }
     }
 
-    /// The colour model of what will be written.
+    /// The colour model of the samples.
     ///
     /// # Errors
-    /// When the colour model asked for lacks a channel that the picture has.
+    /// When the colour model of these options lacks a channel of the picture.
     pub fn output_color(&self, header: &Header) -> Result<ColorModel, DecodeError> {
         let color = self.color.unwrap_or(header.color);
         let (from, to) = (header.color, color);
@@ -118,7 +122,7 @@ impl RenderOptions {
         Ok(color)
     }
 
-    /// Checks the request against the picture and the limits.
+    /// The view of a picture, after checks of the output size, the region and the limits.
     pub(crate) fn view(&self, header: &Header, limits: &Limits) -> Result<View, DecodeError> {
         let (width, height) = self.size.unwrap_or((header.width, header.height));
         let sides = 1..=MAX_OUTPUT_SIDE;
@@ -137,17 +141,20 @@ impl RenderOptions {
     }
 }
 
-/// Where the model is evaluated: a scale, the filter that goes with it, and a region.
+/// Where Gaussians are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
     /// Output pixels per stored pixel, along x and y.
     pub(crate) scale: [f32; 2],
-    /// Covariance that minification adds, in square output pixels (spec, section 9.2).
+    /// (fx, fy): what minification adds to the covariance along x and y, in square output pixels
+    /// (spec, section 9.2).
     pub(crate) filter: [f32; 2],
+    /// The region that is rendered, in output pixels.
     pub(crate) region: Region,
 }
 
 impl View {
+    /// The view of a region, with the stored size and the output size in pixels.
     pub(crate) fn new(
         stored: (u32, u32),
         output: (u32, u32),
@@ -155,10 +162,10 @@ impl View {
         kernel: Kernel,
     ) -> Self {
         let scale = [output.0 as f32 / stored.0 as f32, output.1 as f32 / stored.1 as f32];
-        // A box of one output pixel has variance 1/12, of which the stored pixels' own share is
-        // already in the model.
-        let share = 12.0 * kernel.variance();
-        let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / share } else { 0.0 });
+        // The variance of an output pixel is 1/12. That of a stored pixel is in the Gaussians
+        // already.
+        let divisor = 12.0 * kernel.variance();
+        let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / divisor } else { 0.0 });
         Self { scale, filter, region }
     }
 }

@@ -1,35 +1,39 @@
-//! The contexts of symbols: the first of each kind. Contexts of a kind follow each other (spec,
-//! section 7.4).
+//! The numbers of the contexts, which are the numbers of their models: for each kind of symbol that
+//! of its first context. The contexts of a kind follow each other (spec, section 7.4).
 
 use super::lattice::MAX_CLASS;
 use super::symbol::SYMBOLS;
 
-/// Classes of precision.
+/// Precision classes.
 pub(super) const CLASSES: usize = MAX_CLASS as usize + 1;
-/// Kinds of magnitudes that contexts tell apart.
+/// Ranges of a magnitude: 0, 1, 2 to 3, 4 to 7, and more.
 pub(super) const MAGNITUDES: usize = 5;
-/// Geometry is modelled as precisely as class 2 has it; finer classes add plain bits.
-pub(super) const LEVELS: usize = 3;
-/// Kinds of ratios that contexts tell apart.
+/// Precision classes with contexts of their own for the shape. Finer classes share those of the
+/// last, and add plain bits.
+pub(super) const SHAPE_CLASSES: usize = 3;
+/// Ranges of a ratio.
 pub(super) const RATIOS: usize = 7;
-/// Counts below this are coded as they are.
-pub(super) const FEW_COUNT: usize = SYMBOLS;
+/// Cells of fewer Gaussians than this have a context for each number of them.
+pub(super) const SMALL_COUNT: usize = SYMBOLS;
 
-/// Class of precision.
+/// The precision class.
 pub(super) const CLASS: usize = 0;
-/// Magnitude of the first colour axis, by class.
+/// The magnitude of the first colour axis, by precision class.
 pub(super) const FIRST_AXIS: usize = CLASS + 1;
-/// The other colour axes, by axis, class and magnitude of the axis before.
+/// The other colour axes, by axis, precision class and range of the magnitude of the axis before.
 pub(super) const OTHER_AXES: usize = FIRST_AXIS + CLASSES;
-/// Size, ratio and slant, by level of precision; slant by ratio as well.
+/// The size, by precision class.
 pub(super) const SIZE: usize = OTHER_AXES + 3 * CLASSES * MAGNITUDES;
-pub(super) const RATIO: usize = SIZE + LEVELS;
-pub(super) const SLANT: usize = RATIO + LEVELS;
-/// Length of what exceeds the symbols.
-pub(super) const EXCESS: usize = SLANT + LEVELS * RATIOS;
-/// How many of a few Gaussians are in the first part of a cell, by their number.
-pub(super) const FEW: usize = EXCESS + 1;
-/// Which share of many, by the logarithm of their number.
-pub(super) const MANY: usize = FEW + FEW_COUNT;
-/// All contexts.
-pub(super) const COUNT: usize = MANY + 32;
+/// The ratio, by precision class.
+pub(super) const RATIO: usize = SIZE + SHAPE_CLASSES;
+/// The slant, by precision class and range of the ratio.
+pub(super) const SLANT: usize = RATIO + SHAPE_CLASSES;
+/// The number of plain bits of an excess.
+pub(super) const EXCESS: usize = SLANT + SHAPE_CLASSES * RATIOS;
+/// How many of a cell's few Gaussians lie in its first part, by the number of Gaussians.
+pub(super) const SMALL_SPLIT: usize = EXCESS + 1;
+/// The same for many Gaussians: in which 16th of the possible numbers it is, by log2 of the number
+/// of Gaussians.
+pub(super) const LARGE_SPLIT: usize = SMALL_SPLIT + SMALL_COUNT;
+/// The number of contexts.
+pub(super) const COUNT: usize = LARGE_SPLIT + 32;

@@ -6,23 +6,23 @@ use alloc::vec::Vec;
 use fearless_simd::Level;
 
 use super::contexts;
-use super::layer::Models;
 use super::rans::{RansDecoder, RansEncoder, SymbolCoder};
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 use super::symbol::Avx2Search;
-use super::symbol::{Portable, SymbolSearch};
+use super::symbol::{BaselineSearch, SymbolSearch};
+use super::tables;
 
-/// What is coded.
+/// What is coded: a symbol or plain bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
-    /// One of sixteen symbols, by the model of a context.
+    /// One of sixteen symbols, with the model of a context.
     Symbol {
         /// Below [`contexts`].
         context: usize,
         /// Below 16.
         symbol: u32,
     },
-    /// Bits without a model.
+    /// Plain bits.
     Bits {
         /// At most 16.
         count: u32,
@@ -31,7 +31,7 @@ pub enum Item {
     },
 }
 
-/// How many contexts there are.
+/// The number of contexts.
 #[must_use]
 pub const fn contexts() -> usize {
     contexts::COUNT
@@ -40,19 +40,20 @@ pub const fn contexts() -> usize {
 /// The bytes of `items`.
 #[must_use]
 pub fn encode(items: &[Item]) -> Vec<u8> {
-    let mut models = Models::default();
-    let mut encoder = RansEncoder::new(models.all());
+    let mut models = tables::initial_models();
+    let mut encoder = RansEncoder::new(&mut models);
     code(&mut encoder, items);
     encoder.finish()
 }
 
-/// The values that `bytes` have in place of those of `items`, and whether they are sound.
+/// Decodes as many symbols and plain bits as `items` has, with its contexts and counts. Returns
+/// their values, and whether the bytes are valid.
 ///
 /// # Panics
-/// When that depends on how symbols are found.
+/// When SIMD levels give different results.
 #[must_use]
 pub fn decode(bytes: &[u8], items: &[Item]) -> (Vec<u32>, bool) {
-    let decoded = decode_with(Portable, bytes, items);
+    let decoded = decode_with(BaselineSearch, bytes, items);
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(avx2) = Level::new().as_avx2() {
         assert_eq!(decode_with(Avx2Search(avx2), bytes, items), decoded);
@@ -61,8 +62,8 @@ pub fn decode(bytes: &[u8], items: &[Item]) -> (Vec<u32>, bool) {
 }
 
 fn decode_with(search: impl SymbolSearch, bytes: &[u8], items: &[Item]) -> (Vec<u32>, bool) {
-    let mut models = Models::default();
-    let mut decoder = RansDecoder::with_search(bytes, models.all(), search);
+    let mut models = tables::initial_models();
+    let mut decoder = RansDecoder::with_search(bytes, &mut models, search);
     let values = code(&mut decoder, items);
     (values, decoder.is_complete())
 }

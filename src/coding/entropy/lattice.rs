@@ -1,5 +1,5 @@
-//! The lattice of Gaussians that entropy-coded files can store: codes to values, with steps as fine
-//! as a Gaussian is strong (spec, sections 7.4 and 7.5).
+//! The lattice of Gaussians that entropy-coded files can store: integer codes to values and back
+//! (spec, section 7.5). The precision class of a Gaussian scales the steps of its geometry.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -16,29 +16,30 @@ use crate::simd::Backend;
 
 /// Steps of geometry: position, size, ratio, slant.
 const GEOMETRY: usize = 4;
-/// Largest class of precision.
+/// Largest precision class.
 pub(crate) const MAX_CLASS: u32 = 7;
-/// The finest cell of positions is 2^-6 pixel wide.
-const FINEST: i32 = 6;
-/// Steps lie within these.
+/// Most fraction bits of a position: the least position interval is 2^-6 pixels.
+const MAX_FRACTION_BITS: i32 = 6;
+/// Valid steps.
 const STEPS: core::ops::RangeInclusive<f32> = 9.536_743e-7..=1024.0;
-/// Logarithms of size and of ratio are confined to this magnitude, so that their exponentials stay
+/// The logarithms of size and ratio are clamped to this magnitude, so that their exponentials stay
 /// finite.
 const MAX_LOGARITHM: f32 = 20.0;
-/// Red, green and blue by the three colour axes: lightness, red against blue, green against both.
-/// Orthonormal, so that an error is as large in one as in the other.
+/// The red, green and blue of one unit along each of the three colour axes: lightness, red against
+/// blue, and green against both. Orthonormal, so that an error has the same size in axes and
+/// channels.
 const AXES: [[f32; 3]; 3] = [
     [0.577_350_26, 0.577_350_26, 0.577_350_26],
     [0.707_106_77, 0.0, -0.707_106_77],
     [0.408_248_3, -0.816_496_6, 0.408_248_3],
 ];
 
-/// A Gaussian in whole steps.
+/// The integer codes of a Gaussian, in steps of the [`Lattice`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Code {
-    /// Class of precision, up to [`MAX_CLASS`]: steps of geometry are halved so many times.
+    /// Precision class c, 0 to [`MAX_CLASS`]: steps of geometry are 2^-c of those of the file.
     pub(crate) class: u32,
-    /// Amplitudes along the colour axes, times the root of the area.
+    /// Amplitudes along the colour axes, times the geometric mean of l11 and l22.
     pub(crate) color: [i32; 4],
     /// Logarithm of the geometric mean of l11 and l22.
     pub(crate) size: i32,
@@ -46,30 +47,33 @@ pub(crate) struct Code {
     pub(crate) ratio: i32,
     /// l21 / l22.
     pub(crate) slant: i32,
-    /// Centre in units of the [`CenterGrid`].
+    /// Coordinates of the centre, in units of the [`CenterGrid`].
     pub(crate) center: [u32; 2],
 }
 
-/// The shape of a Gaussian.
+/// The shape of a Gaussian, in pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     /// Geometric mean of l11 and l22.
     pub(crate) size: f32,
+    /// (l11, l21, l22).
     pub(crate) cholesky: [f32; 3],
 }
 
-/// The exponentials of whole steps.
+/// Exponentials of codes times steps, with a table of those that are likely.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Exponentials {
+pub(crate) struct ExpTable {
+    /// The step of precision class 0.
     step: f32,
-    /// Those of the codes that are likely, class by class: the coder waits for them.
+    /// The table, precision class by precision class: decoding cannot go on until it has the shape.
     likely: Vec<f32>,
 }
 
-impl Exponentials {
-    /// Codes of class 0 in the table: from minus half of that on. Every class has twice as many.
+impl ExpTable {
+    /// How many codes of precision class 0 are in the table: half of them negative. Every class has
+    /// twice as many as the one before.
     const LIKELY: u32 = 16;
-    /// Classes in the table.
+    /// Precision classes in the table.
     const CLASSES: u32 = 6;
 
     fn new(step: f32) -> Self {
@@ -79,7 +83,7 @@ impl Exponentials {
             || {
                 let mut rest = likely.as_mut_slice();
                 for class in 0..Self::CLASSES {
-                    let (count, step) = (Self::LIKELY << class, step * fineness(class));
+                    let (count, step) = (Self::LIKELY << class, step * class_scale(class));
                     let (values, later) = rest.split_at_mut(count as usize);
                     rest = later;
                     let first = -(count as i32 / 2);
@@ -97,58 +101,63 @@ impl Exponentials {
         math::exp((code as f32 * step).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
     }
 
-    /// The step of class 0.
+    /// The step of precision class 0.
     pub(crate) fn step(&self) -> f32 {
         self.step
     }
 
+    /// The exponential of a code of a precision class.
     fn of(&self, code: i32, class: u32) -> f32 {
         let count = Self::LIKELY << class;
         let index = code.wrapping_add(count as i32 / 2) as u32;
         if class < Self::CLASSES && index < count {
             return self.likely[(count - Self::LIKELY + index) as usize];
         }
-        Self::exp(code, self.step * fineness(class))
+        Self::exp(code, self.step * class_scale(class))
     }
 }
 
-/// The steps of an entropy-coded file (spec, section 7.5): what a unit of each code stands for in
-/// class 0 of precision; steps of geometry are halved from one class to the next.
+/// The quantizer steps of a file with [`Coding::Entropy`](crate::Coding), each from 2^-20 to 2^10
+/// (spec, section 7.5).
+///
+/// Each Gaussian has a precision class c, 0 to 7. The steps of position, size, ratio and slant are
+/// those of class 0; for the others they are multiplied by 2^-c.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LatticeSteps {
-    /// Of the centre, relative to the Gaussian's own extent.
+    /// Of the centre, along x in units of l11 and along y in units of l22. The intervals in pixels
+    /// are then rounded to powers of two.
     pub position: f32,
-    /// Of the logarithm of the geometric mean of l11 and l22.
+    /// Of the natural logarithm of the geometric mean of l11 and l22, in pixels.
     pub size: f32,
-    /// Of half of the logarithm of l11 / l22.
+    /// Of half of the natural logarithm of l11 / l22.
     pub ratio: f32,
     /// Of l21 / l22.
     pub slant: f32,
-    /// Of the amplitude along each colour axis, times the root of the area: one per channel.
+    /// Of the amplitude (1.0 is a full sample) times the geometric mean of l11 and l22 in pixels:
+    /// one for each colour axis, which are as many as channels.
     pub color: Vec<f32>,
 }
 
-/// The lattice of a file: its steps, ready for use.
+/// The lattice of a file: the [`LatticeSteps`], with tables of exponentials.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lattice {
-    /// Of the position, relative to the Gaussian's own extent.
     pub(crate) position: f32,
-    pub(crate) size: Exponentials,
-    pub(crate) ratio: Exponentials,
+    pub(crate) size: ExpTable,
+    pub(crate) ratio: ExpTable,
     pub(crate) slant: f32,
-    /// Of each colour axis.
     pub(crate) color: Vec<f32>,
 }
 
 impl Lattice {
-    /// With steps of position, size, ratio and slant, and one for each colour axis.
+    /// The lattice with these steps: of position, size, ratio and slant, and of each colour axis.
     pub(crate) fn new([position, size, ratio, slant]: [f32; GEOMETRY], color: Vec<f32>) -> Self {
-        let [size, ratio] = [size, ratio].map(Exponentials::new);
+        let [size, ratio] = [size, ratio].map(ExpTable::new);
         Self { position, size, ratio, slant, color }
     }
 
-    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel.
+    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel (spec, section
+    /// 5.3).
     pub(crate) fn parse(payload: &[u8], channels: usize) -> Result<Self, DecodeError> {
         let malformed = |reason| DecodeError::malformed(ChunkType::QNTZ, reason);
         if payload.len() != (GEOMETRY + channels) * size_of::<f32>() {
@@ -162,7 +171,7 @@ impl Lattice {
         Ok(Self::new(*geometry, color.to_vec()))
     }
 
-    /// All steps.
+    /// The steps.
     pub(crate) fn steps(&self) -> LatticeSteps {
         LatticeSteps {
             position: self.position,
@@ -180,28 +189,29 @@ impl Lattice {
         geometry.iter().chain(&self.color).flat_map(|step| step.to_le_bytes()).collect()
     }
 
-    /// The shape that a code stands for.
+    /// The shape of a Gaussian with this code.
     #[inline]
     pub(crate) fn shape(&self, code: &Code) -> Shape {
         let size = self.size.of(code.size, code.class);
         let ratio = self.ratio.of(code.ratio, code.class);
         let (l11, l22) = (size * ratio, size / ratio);
-        let l21 = code.slant as f32 * (self.slant * fineness(code.class)) * l22;
+        let l21 = code.slant as f32 * (self.slant * class_scale(code.class)) * l22;
         Shape { size, cholesky: [l11, l21, l22] }
     }
 
-    /// How fine the position is along x and y: cells are 2^-n pixels wide.
-    pub(crate) fn fineness_of_position(&self, class: u32, shape: &Shape) -> [i32; 2] {
+    /// The fraction bits f of the coordinates along x and y: the position interval is 2^-f pixels,
+    /// more than a pixel if f is negative.
+    pub(crate) fn fraction_bits(&self, class: u32, shape: &Shape) -> [i32; 2] {
         let [l11, _, l22] = shape.cholesky;
         [l11, l22].map(|extent| {
-            // The nearest power of two, from the exponent of the number.
-            let step = self.position * fineness(class) * extent * core::f32::consts::SQRT_2;
+            // With the factor sqrt(2), the exponent is that of the nearest power of two.
+            let step = self.position * class_scale(class) * extent * core::f32::consts::SQRT_2;
             let exponent = (step.to_bits() >> 23) as i32 - 127;
-            (-exponent).min(FINEST)
+            (-exponent).min(MAX_FRACTION_BITS)
         })
     }
 
-    /// The Gaussian that a code and its shape stand for.
+    /// The Gaussian with this code, whose shape was computed before.
     #[inline(always)]
     pub(crate) fn gaussian(
         &self,
@@ -221,7 +231,8 @@ impl Lattice {
 
 #[cfg(feature = "encode")]
 impl Code {
-    /// What the Gaussian adds to the picture: the sum of its squares, in steps of colour.
+    /// How much the Gaussian adds to the picture: the sum of the squares of its colour codes. Their
+    /// steps are relative to the Gaussian's size, so this follows its energy.
     pub(crate) fn strength(&self) -> i64 {
         self.color.iter().map(|&code| i64::from(code) * i64::from(code)).sum()
     }
@@ -229,10 +240,10 @@ impl Code {
 
 #[cfg(feature = "encode")]
 impl Lattice {
-    /// The code nearest to a Gaussian, with the precision of a class.
+    /// The code of a precision class that is nearest to a Gaussian.
     ///
-    /// Rounding errors of one component are made good by the next where they can be: what counts
-    /// is the covariance and the place, not the components.
+    /// Where possible, a component compensates for the rounding errors of those before it: what
+    /// matters is the covariance and the centre, not each component by itself.
     pub(crate) fn code(
         &self,
         gaussian: &Gaussian,
@@ -240,16 +251,16 @@ impl Lattice {
         grid: &CenterGrid,
         model: ColorModel,
     ) -> Code {
-        let fine = fineness(class);
+        let scale = class_scale(class);
         let nearest = |value: f32, step: f32| (value / step).round().clamp(-30_000.0, 30_000.0);
         let [l11, l21, l22] = gaussian.cholesky;
-        let size = nearest(0.5 * (l11 * l22).ln(), self.size.step * fine) as i32;
-        let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio.step * fine) as i32;
+        let size = nearest(0.5 * (l11 * l22).ln(), self.size.step * scale) as i32;
+        let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio.step * scale) as i32;
         let mut code = Code { class, size, ratio, ..Code::default() };
-        // With L (1 + D) for the rounded factor, the slant is to make D21 zero.
+        // With L (I + D) for the rounded Cholesky factor, this slant makes D21 zero.
         let Shape { size, cholesky: [c11, _, c22] } = self.shape(&code);
         let slant = l21 / l22 * (1.0 + (c11 / l11).ln() - (c22 / l22).ln());
-        code.slant = nearest(slant, self.slant * fine) as i32;
+        code.slant = nearest(slant, self.slant * scale) as i32;
         code.center = self.placed(&code, gaussian.center, grid);
         let axes = to_axes(gaussian.color, model);
         for ((code, axis), step) in code.color.iter_mut().zip(axes).zip(&self.color) {
@@ -258,19 +269,19 @@ impl Lattice {
         code
     }
 
-    /// What stands for a point with a code's precision; an error along x is followed along the
-    /// Gaussian's slant.
+    /// The coordinates, in units and with the precision of a code, that are nearest to a centre in
+    /// pixels. The rounding error along x moves y along the Gaussian's slant.
     pub(crate) fn placed(&self, code: &Code, [x, y]: [f32; 2], grid: &CenterGrid) -> [u32; 2] {
         let shape = self.shape(code);
         let [l11, l21, _] = shape.cholesky;
-        let fineness = self.fineness_of_position(code.class, &shape);
-        let column = grid.snapped(grid.units([x, y])[0], fineness[0]);
+        let fraction_bits = self.fraction_bits(code.class, &shape);
+        let column = grid.snapped(grid.units([x, y])[0], fraction_bits[0]);
         let error = grid.center([column, 0])[0] - x;
-        let row = grid.snapped(grid.units([x, y + l21 / l11 * error])[1], fineness[1]);
+        let row = grid.snapped(grid.units([x, y + l21 / l11 * error])[1], fraction_bits[1]);
         [column, row]
     }
 
-    /// The amplitudes along the colour axes that a unit of a code stands for.
+    /// The amplitude along each colour axis of one step, for the size that a code has.
     pub(crate) fn color_units(&self, code: &Code) -> [f32; 4] {
         let Shape { size, .. } = self.shape(code);
         let mut units = [0.0; 4];
@@ -280,7 +291,8 @@ impl Lattice {
         units
     }
 
-    /// Moves a code by one cell along an axis; `None` at the end of the grid.
+    /// A code whose centre is moved by one position interval along an axis; `None` at the edge of
+    /// the grid.
     pub(crate) fn moved(
         &self,
         code: &Code,
@@ -288,8 +300,8 @@ impl Lattice {
         forward: bool,
         grid: &CenterGrid,
     ) -> Option<Code> {
-        let fineness = self.fineness_of_position(code.class, &self.shape(code))[axis];
-        let step = 1 << grid.cell_bits(fineness);
+        let fraction_bits = self.fraction_bits(code.class, &self.shape(code))[axis];
+        let step = 1 << grid.interval_bits(fraction_bits);
         let center = code.center[axis];
         let center = if forward { center.checked_add(step)? } else { center.checked_sub(step)? };
         let mut code = *code;
@@ -298,7 +310,7 @@ impl Lattice {
     }
 }
 
-/// Gaussians as an entropy-coded file stores them.
+/// The Gaussians of an entropy-coded file, as codes.
 #[cfg(feature = "encode")]
 #[derive(Clone, Debug)]
 pub(crate) struct LatticeCodes {
@@ -306,13 +318,13 @@ pub(crate) struct LatticeCodes {
     pub(crate) codes: Vec<Code>,
 }
 
-/// 2^-class.
-pub(crate) fn fineness(class: u32) -> f32 {
+/// What the steps of a precision class are multiplied by: 2^-class.
+pub(super) fn class_scale(class: u32) -> f32 {
     f32::from_bits((127 - class) << 23)
 }
 
 /// Channels from colour axes. Gray and alpha are axes of their own.
-pub(crate) fn from_axes(axes: [f32; 4], model: ColorModel) -> [f32; 4] {
+fn from_axes(axes: [f32; 4], model: ColorModel) -> [f32; 4] {
     match model {
         ColorModel::Gray | ColorModel::GrayAlpha => axes,
         ColorModel::Rgb | ColorModel::Rgba => {
@@ -340,14 +352,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_has_what_would_be_computed() {
+    fn the_table_has_the_values_that_are_computed_without_it() {
         for step in [0.9, 0.013, 700.0] {
-            let exponentials = Exponentials::new(step);
+            let exponentials = ExpTable::new(step);
             for class in 0..=MAX_CLASS {
-                let step = step * fineness(class);
+                let step = step * class_scale(class);
                 for code in (-1000..1000).chain([i32::MIN, i32::MAX]) {
                     let found = exponentials.of(code, class);
-                    let computed = Exponentials::exp(code, step);
+                    let computed = ExpTable::exp(code, step);
                     assert_eq!(found.to_bits(), computed.to_bits(), "{step} {class} {code}");
                 }
             }

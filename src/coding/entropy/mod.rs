@@ -1,16 +1,21 @@
-//! The entropy coding: the Gaussians of a layer as a set, in the order of a tree of cells, every
-//! attribute entropy coded (spec, sections 7.3 to 7.5).
+//! The entropy coding (coding 1): the Gaussians of a layer as a set, in the order of a tree of
+//! cells, with every attribute entropy coded (spec, sections 7.3 to 7.5).
 
+mod attributes;
 mod cells;
 mod contexts;
 #[cfg(all(fuzzing, feature = "encode"))]
 pub mod fuzzing;
 mod lattice;
 mod layer;
+mod numbers;
 mod rans;
 mod statistics;
 mod symbol;
 mod tables;
+#[cfg(all(test, feature = "encode"))]
+mod tables_fit;
+mod tree_walk;
 
 #[cfg(feature = "encode")]
 pub(crate) use cells::CenterGrid;

@@ -1,23 +1,25 @@
-//! Statistics: what the bits of a file are spent on.
+//! How many bits of a file each attribute takes.
 
 #[cfg(feature = "std")]
 use super::rans::{Attribute, RansDecoder, SymbolCoder};
 
-/// Bits that Gaussians take in a file, by what they are for.
+/// How many bits of a file each attribute takes, in all of its Gaussians together.
+///
+/// With [`Coding::Entropy`](crate::Coding) a symbol counts as -log2 of its probability.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct AttributeBits {
-    /// Of the centres.
+    /// Bits of the centres, the tree of cells included.
     pub position: f64,
-    /// Of how precisely each Gaussian is stored; none with [`Coding::Packed`](crate::Coding).
+    /// Bits of the precision classes; 0 with [`Coding::Packed`](crate::Coding).
     pub precision: f64,
-    /// Of the covariances.
+    /// Bits of the covariances.
     pub shape: f64,
-    /// Of the amplitudes in all channels.
+    /// Bits of the amplitudes in all channels.
     pub color: f64,
 }
 
-/// A decoder that counts the bits of what it reads.
+/// A decoder that counts the bits that it reads.
 #[cfg(feature = "std")]
 #[derive(Debug)]
 pub(crate) struct CountingDecoder<'a> {

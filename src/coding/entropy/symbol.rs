@@ -1,70 +1,72 @@
-//! Which symbol a share stands for: what entropy decoding waits for most.
+//! From slots to symbols and back (spec, section 7.3). Finding the symbol of a slot is the step
+//! that decoding time depends on most.
 
 #[cfg(feature = "std")]
 use fearless_simd::{Level, Simd, dispatch, i16x16, prelude::*};
 
 /// Symbols of a model.
 pub(crate) const SYMBOLS: usize = 16;
-/// Probabilities of a model are shares of 2^15.
+/// A model divides 2^15 slots among its symbols.
 pub(crate) const SCALE_BITS: u32 = 15;
 
-/// The shares of all symbols before each one, summed up, and at the end those of all: from 0 to
-/// 2^15, whose bits are those of the smallest `i16`.
-pub(crate) type Starts = [i16; SYMBOLS + 1];
+/// The first slot of each symbol, which is its cumulative frequency, then the number of all slots.
+/// They increase from 0 to 2^15, which as an `i16` is -2^15.
+pub(crate) type CumulativeFrequencies = [i16; SYMBOLS + 1];
 
-/// The last of [`Starts`].
+/// The last of the [`CumulativeFrequencies`].
 pub(crate) const END: i16 = i16::MIN;
 
-/// The symbol of a share.
+/// The symbol of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Found {
+pub(crate) struct SlotSymbol {
     pub(crate) symbol: u32,
-    /// The symbol's shares before this one.
+    /// The number of the symbol's slots that come before this slot.
     pub(crate) offset: u32,
-    /// All of the symbol's shares.
-    pub(crate) size: u32,
+    /// The number of the symbol's slots.
+    pub(crate) frequency: u32,
 }
 
-impl Found {
-    fn new(starts: &Starts, share: u32, symbol: usize) -> Self {
-        let (start, size) = shares_of(starts, symbol);
-        Self { symbol: symbol as u32, offset: share - start, size }
+impl SlotSymbol {
+    fn new(starts: &CumulativeFrequencies, slot: u32, symbol: usize) -> Self {
+        let (start, frequency) = slots_of(starts, symbol);
+        Self { symbol: symbol as u32, offset: slot - start, frequency }
     }
 }
 
-/// The first of a symbol's shares, and how many they are.
-pub(crate) fn shares_of(starts: &Starts, symbol: usize) -> (u32, u32) {
+/// The first slot of a symbol, and the number of its slots.
+pub(crate) fn slots_of(starts: &CumulativeFrequencies, symbol: usize) -> (u32, u32) {
     let [start, end] = [symbol, symbol + 1].map(|index| u32::from(starts[index] as u16));
     (start, end - start)
 }
 
-/// A way to find symbols.
+/// The instructions with which symbols are found and models adapted. All give the same results.
 pub(crate) trait SymbolSearch: Copy {
-    /// The symbol of a share below 2^15.
-    fn find(self, starts: &Starts, share: u32) -> Found;
+    /// The symbol of a slot below 2^15.
+    fn find(self, starts: &CumulativeFrequencies, slot: u32) -> SlotSymbol;
 
-    /// Moves starts towards others by 2^-rate of the distance, rounded down.
-    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8);
+    /// Moves the starts of all symbols towards `targets` by 2^-rate of the difference, rounded
+    /// down.
+    fn adapt(self, starts: &mut CumulativeFrequencies, targets: &[i16; SYMBOLS], rate: u8);
 }
 
-/// With what every machine of the kind has.
+/// SIMD at the level that the whole program is compiled for; scalar code without `std`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Portable;
+pub(crate) struct BaselineSearch;
 
-impl SymbolSearch for Portable {
+impl SymbolSearch for BaselineSearch {
     #[inline(always)]
-    fn find(self, starts: &Starts, share: u32) -> Found {
+    fn find(self, starts: &CumulativeFrequencies, slot: u32) -> SlotSymbol {
         #[cfg(feature = "std")]
-        let symbol = dispatch!(Level::baseline(), simd => symbol_at(simd, starts, share));
+        let symbol = dispatch!(Level::baseline(), simd => symbol_of_slot(simd, starts, slot));
         #[cfg(not(feature = "std"))]
-        let symbol = plain_symbol_at(starts, share);
-        Found::new(starts, share, symbol)
+        let symbol = scalar_symbol_of_slot(starts, slot);
+        SlotSymbol::new(starts, slot, symbol)
     }
 
     #[inline(always)]
-    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
+    fn adapt(self, starts: &mut CumulativeFrequencies, targets: &[i16; SYMBOLS], rate: u8) {
         #[cfg(feature = "std")]
-        dispatch!(Level::baseline(), simd => approach(simd, starts, targets, rate));
+        dispatch!(Level::baseline(), simd => adapt(simd, starts, targets, rate));
         #[cfg(not(feature = "std"))]
         for (start, target) in starts.iter_mut().zip(targets) {
             *start += (target - *start) >> rate;
@@ -74,7 +76,7 @@ impl SymbolSearch for Portable {
 
 #[cfg(feature = "std")]
 #[inline(always)]
-fn approach<S: Simd>(simd: S, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
+fn adapt<S: Simd>(simd: S, starts: &mut CumulativeFrequencies, targets: &[i16; SYMBOLS], rate: u8) {
     let starts = starts.first_chunk_mut().expect("one for each symbol");
     let old = i16x16::load_array_ref(simd, starts);
     let change = (i16x16::load_array_ref(simd, targets) - old) >> u32::from(rate);
@@ -83,20 +85,20 @@ fn approach<S: Simd>(simd: S, starts: &mut Starts, targets: &[i16; SYMBOLS], rat
 
 #[cfg(feature = "std")]
 #[inline(always)]
-fn symbol_at<S: Simd>(simd: S, starts: &Starts, share: u32) -> usize {
+fn symbol_of_slot<S: Simd>(simd: S, starts: &CumulativeFrequencies, slot: u32) -> usize {
     let starts = starts.first_chunk().expect("one for each symbol");
-    let later = i16x16::load_array_ref(simd, starts).simd_gt(share as i16);
-    // Symbol 0 starts at 0.
+    let later = i16x16::load_array_ref(simd, starts).simd_gt(slot as i16);
+    // At least one, since symbol 0 starts at 0.
     (later.to_bitmask() | 1 << SYMBOLS).trailing_zeros() as usize - 1
 }
 
 #[cfg(any(not(feature = "std"), all(test, feature = "encode")))]
-fn plain_symbol_at(starts: &Starts, share: u32) -> usize {
-    starts[..SYMBOLS].iter().filter(|&&start| start as u32 <= share).count() - 1
+fn scalar_symbol_of_slot(starts: &CumulativeFrequencies, slot: u32) -> usize {
+    starts[..SYMBOLS].iter().filter(|&&start| start as u32 <= slot).count() - 1
 }
 
-/// With an instruction for the least of eight numbers: the distances of the starts on either side
-/// are there before the symbol is.
+/// AVX2, with the instruction of SSE4.1 for the least of eight numbers. It gives the distances from
+/// the slot to the starts before and after it directly, without waiting for the symbol.
 #[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Avx2Search(pub(crate) fearless_simd::Avx2);
@@ -104,20 +106,20 @@ pub(crate) struct Avx2Search(pub(crate) fearless_simd::Avx2);
 #[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
 impl SymbolSearch for Avx2Search {
     #[inline(always)]
-    fn find(self, starts: &Starts, share: u32) -> Found {
-        nearest(self.0, starts, share)
+    fn find(self, starts: &CumulativeFrequencies, slot: u32) -> SlotSymbol {
+        find_by_distance(self.0, starts, slot)
     }
 
     #[inline(always)]
-    fn approach(self, starts: &mut Starts, targets: &[i16; SYMBOLS], rate: u8) {
-        approach(self.0, starts, targets, rate);
+    fn adapt(self, starts: &mut CumulativeFrequencies, targets: &[i16; SYMBOLS], rate: u8) {
+        adapt(self.0, starts, targets, rate);
     }
 }
 
 #[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
 fearless_simd::kernel!(
     #[inline]
-    fn nearest(avx2: Avx2, starts: &Starts, share: u32) -> Found {
+    fn find_by_distance(avx2: Avx2, starts: &CumulativeFrequencies, slot: u32) -> SlotSymbol {
         #[cfg(target_arch = "x86")]
         use core::arch::x86 as arch;
         #[cfg(target_arch = "x86_64")]
@@ -138,20 +140,21 @@ fearless_simd::kernel!(
             let least = _mm_cvtsi128_si32(_mm_minpos_epu16(distances));
             least as u32 & ((1 << SCALE_BITS) - 1)
         };
-        let at = _mm_set1_epi16(share as i16);
+        let at = _mm_set1_epi16(slot as i16);
         let (low, high) = (eight_from(0), eight_from(8));
-        // How far each start lies before the share; of one that lies after it this wraps around, to
-        // 2^15 and more. All bits turned, it is how many shares lie between, and the other way
-        // round.
+        // How many slots each start lies before this one, modulo 2^16: starts after it give 2^15 or
+        // more. The least is the offset within the symbol.
         let (before_low, before_high) = (_mm_sub_epi16(at, low), _mm_sub_epi16(at, high));
         let offset = least(_mm_min_epu16(before_low, before_high));
-        let turned = _mm_xor_si128(_mm_max_epu16(before_low, before_high), _mm_set1_epi16(-1));
-        // No start lies after the last symbol's shares: the largest distance is that from 0, and
-        // without its highest bit that to 2^15.
-        let rest = least(turned);
+        // The complement of such a difference counts the slots between this one and a start after
+        // it. The least of them is the number of the symbol's slots after this one.
+        let between = _mm_xor_si128(_mm_max_epu16(before_low, before_high), _mm_set1_epi16(-1));
+        // In the last symbol no start lies after the slot. The largest difference is then that to
+        // start 0, and its complement without the highest bit counts the slots up to 2^15.
+        let rest = least(between);
         let later = _mm_packs_epi16(_mm_cmpgt_epi16(low, at), _mm_cmpgt_epi16(high, at));
         let symbol = (SYMBOLS as u32 - 1) - (_mm_movemask_epi8(later) as u32).count_ones();
-        Found { symbol, offset, size: offset + rest + 1 }
+        SlotSymbol { symbol, offset, frequency: offset + rest + 1 }
     }
 );
 
@@ -162,26 +165,26 @@ mod tests {
     use crate::testing::simd_levels;
 
     #[test]
-    fn the_symbol_of_every_share_is_found() {
+    fn the_symbol_of_every_slot_is_found() {
         let mut model = Model::new(core::array::from_fn(|index| (index * 2048) as i16));
-        // Shares of one and of nearly all among them.
+        // Some symbols have one slot left, one has nearly all.
         for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
-            model.update(Portable, symbol);
+            model.update(BaselineSearch, symbol);
         }
         let starts = model.starts();
-        for share in 0..1 << SCALE_BITS {
-            let symbol = plain_symbol_at(starts, share);
-            let (start, size) = shares_of(starts, symbol);
-            assert!((start..start + size).contains(&share), "{share}: {symbol}");
+        for slot in 0..1 << SCALE_BITS {
+            let symbol = scalar_symbol_of_slot(starts, slot);
+            let (start, frequency) = slots_of(starts, symbol);
+            assert!((start..start + frequency).contains(&slot), "{slot}: {symbol}");
             for (name, level) in simd_levels() {
-                let found = dispatch!(level, simd => symbol_at(simd, starts, share));
-                assert_eq!(found, symbol, "{name}: {share}");
+                let found = dispatch!(level, simd => symbol_of_slot(simd, starts, slot));
+                assert_eq!(found, symbol, "{name}: {slot}");
             }
-            let found = Found::new(starts, share, symbol);
-            assert_eq!(Portable.find(starts, share), found, "{share}");
+            let found = SlotSymbol::new(starts, slot, symbol);
+            assert_eq!(BaselineSearch.find(starts, slot), found, "{slot}");
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             if let Some(avx2) = Level::new().as_avx2() {
-                assert_eq!(Avx2Search(avx2).find(starts, share), found, "{share}");
+                assert_eq!(Avx2Search(avx2).find(starts, slot), found, "{slot}");
             }
         }
     }

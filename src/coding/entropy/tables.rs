@@ -1,10 +1,18 @@
-//! What the models of the entropy coding expect before they learn (spec, section 7.4): fitted to photographs
-//! by the test `fit_the_tables` of [`super::layer`].
+//! The models of the entropy coding as each layer begins with them (spec, section 7.3). They are
+//! fitted to photographs by the test `fit_the_tables`.
+
+use alloc::vec::Vec;
 
 use super::contexts;
+use super::rans::Model;
 use super::symbol::SYMBOLS;
 
-/// For each context the shares, out of 2^15, of all symbols before each one.
+/// The models of all contexts, before anything is coded.
+pub(super) fn initial_models() -> Vec<Model> {
+    STARTS.iter().map(|&starts| Model::new(starts)).collect()
+}
+
+/// For each context the first slot of each symbol, out of 2^15 slots.
 #[rustfmt::skip]
 pub(super) const STARTS: [[i16; SYMBOLS]; contexts::COUNT] = [
     [0, 34, 7998, 20676, 28474, 30356, 31630, 32089, 32704, 32712, 32720, 32728, 32736, 32744, 32752, 32760],
@@ -213,3 +221,23 @@ pub(super) const STARTS: [[i16; SYMBOLS]; contexts::COUNT] = [
     [0, 913, 2433, 4318, 6464, 8795, 11255, 13799, 16384, 18969, 21513, 23973, 26304, 28450, 30335, 31855],
     [0, 913, 2433, 4318, 6464, 8795, 11255, 13799, 16384, 18969, 21513, 23973, 26304, 28450, 30335, 31855],
 ];
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use super::*;
+
+    /// `BLESS=1 cargo test the_specification_has_the_models` writes the file.
+    #[test]
+    fn the_specification_has_the_models() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/spec/entropy-models.tsv");
+        let lines = STARTS.iter().enumerate().map(|(context, starts)| {
+            let starts = starts.map(|start| start.to_string()).join("\t");
+            format!("{context}\t{starts}\n")
+        });
+        let text: String = lines.collect();
+        if std::env::var_os("BLESS").is_some() {
+            std::fs::write(path, &text).expect("the folder can be written");
+        }
+        assert_eq!(std::fs::read_to_string(path).expect("a text"), text);
+    }
+}

@@ -3,18 +3,19 @@
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-/// Takes bits from bytes that arrive piece by piece.
+/// Reads bits from bytes that arrive in pieces.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BitReader {
-    /// Bits that have arrived and are not taken yet, the next one lowest.
+    /// The bits that were taken from the input and are not read yet, the next one lowest.
     window: u64,
+    /// The number of these bits.
     available: u32,
 }
 
 impl BitReader {
-    /// Takes the next `count` <= 32 bits, pulling whole bytes from `input` as needed. `None` when
-    /// the input ends before; what was pulled is kept.
-    pub(crate) fn take(&mut self, count: u32, input: &mut &[u8]) -> Option<u32> {
+    /// Reads the next `count` <= 32 bits, and takes as many bytes from `input` as they need. `None`
+    /// if the input ends before; the bytes that were taken are kept.
+    pub(crate) fn read(&mut self, count: u32, input: &mut &[u8]) -> Option<u32> {
         while self.available < count {
             let (&byte, rest) = input.split_first()?;
             *input = rest;
@@ -27,25 +28,27 @@ impl BitReader {
         Some(value as u32)
     }
 
-    /// Whether only zero bits, fewer than eight, remain: the padding of a last byte.
+    /// Whether only the padding of a last byte is left: fewer than eight bits, all zero.
     pub(crate) fn is_padding(&self) -> bool {
         self.available < 8 && self.window == 0
     }
 }
 
-/// Packs bits into bytes.
+/// Writes bits into bytes.
 #[cfg(feature = "encode")]
 #[derive(Debug, Default)]
 pub(crate) struct BitWriter {
     bytes: Vec<u8>,
+    /// The bits that do not fill a byte yet.
     window: u64,
+    /// The number of these bits.
     pending: u32,
 }
 
 #[cfg(feature = "encode")]
 impl BitWriter {
-    /// Appends the low `count` <= 32 bits of `value`.
-    pub(crate) fn put(&mut self, value: u32, count: u32) {
+    /// Appends `count` <= 32 bits: a value below 2^count.
+    pub(crate) fn write(&mut self, value: u32, count: u32) {
         assert!(count == 32 || value >> count == 0, "a code wider than its bit depth");
         self.window |= u64::from(value) << self.pending;
         self.pending += count;
@@ -85,20 +88,20 @@ mod tests {
                 .map(|(value, count)| (value & (u32::MAX >> (32 - count)), count))
                 .collect();
             for &(value, count) in &fields {
-                writer.put(value, count);
+                writer.write(value, count);
             }
             let bytes = writer.finish();
             let mut reader = BitReader::default();
             let mut pieces = bytes.chunks(slice);
             let mut input: &[u8] = &[];
             for &(value, count) in &fields {
-                let taken = loop {
-                    match reader.take(count, &mut input) {
-                        Some(taken) => break taken,
+                let found = loop {
+                    match reader.read(count, &mut input) {
+                        Some(found) => break found,
                         None => input = pieces.next().expect("the writer wrote every bit"),
                     }
                 };
-                prop_assert_eq!(taken, value);
+                prop_assert_eq!(found, value);
             }
             prop_assert!(reader.is_padding() && input.is_empty() && pieces.next().is_none());
         }

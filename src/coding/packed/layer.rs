@@ -1,4 +1,4 @@
-//! Layers of packed codes (spec, section 7.2).
+//! Layers of the packed coding (spec, section 7.2).
 
 use super::bits::BitReader;
 use super::quantizer::Quantizer;
@@ -8,30 +8,33 @@ use crate::gaussian::MAX_COMPONENTS;
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-/// Bytes of payload before the packed codes: the number of Gaussians in the layer.
+/// Bytes of payload before the codes: the number of Gaussians in the layer.
 pub(crate) const LAYER_PREFIX: u64 = 4;
 
-/// Bytes that the codes of `count` Gaussians take.
+/// The number of bytes of the codes of `count` Gaussians.
 pub(crate) fn packed_length(quantizers: &[Quantizer], count: u32) -> u64 {
     let bits = quantizers.iter().map(|quantizer| u64::from(quantizer.bits())).sum::<u64>();
     (bits * u64::from(count)).div_ceil(8)
 }
 
-/// Unpacks one layer as its bytes arrive.
+/// Reads one layer as its bytes arrive.
 #[derive(Debug)]
-pub(crate) struct LayerReader {
+pub(crate) struct PackedLayerReader {
     bits: BitReader,
     /// The number of Gaussians in this layer, once its four bytes have arrived.
     count: Option<u32>,
+    /// The number of Gaussians that were read.
     done: u32,
     /// The components of the Gaussian that is arriving.
     values: [f32; MAX_COMPONENTS],
+    /// The number of its components that have arrived.
     filled: usize,
     /// Bytes of payload that the chunk declares.
     length: u32,
 }
 
-impl LayerReader {
+impl PackedLayerReader {
+    /// A reader for a payload of `length` bytes.
     pub(crate) fn new(length: u32) -> Self {
         Self {
             bits: BitReader::default(),
@@ -43,8 +46,8 @@ impl LayerReader {
         }
     }
 
-    /// Reads the layer's number of Gaussians if it has not been read: at most `allowed`, and
-    /// just as many as the chunk has bytes for. `None` while bytes are missing.
+    /// The number of Gaussians in this layer: 1 to `allowed`, and just as many as the payload has
+    /// bytes for. `None` until its bytes have arrived.
     pub(crate) fn count(
         &mut self,
         input: &mut &[u8],
@@ -52,7 +55,7 @@ impl LayerReader {
         allowed: u32,
     ) -> Result<Option<u32>, DecodeError> {
         if self.count.is_none() {
-            let Some(count) = self.bits.take(32, input) else { return Ok(None) };
+            let Some(count) = self.bits.read(32, input) else { return Ok(None) };
             if count == 0 {
                 return Err(malformed("no Gaussians"));
             }
@@ -67,8 +70,8 @@ impl LayerReader {
         Ok(self.count)
     }
 
-    /// The components of the next Gaussian: two of position, three of shape, one per channel.
-    /// `None` while bytes are missing and after the last Gaussian.
+    /// Reads the components of the next Gaussian: two of position, three of shape, one per channel.
+    /// `None` until all its bytes have arrived, and after the last Gaussian.
     pub(crate) fn next(
         &mut self,
         input: &mut &[u8],
@@ -79,7 +82,7 @@ impl LayerReader {
         }
         while self.filled < quantizers.len() {
             let quantizer = &quantizers[self.filled];
-            let Some(code) = self.bits.take(quantizer.bits().into(), input) else {
+            let Some(code) = self.bits.read(quantizer.bits().into(), input) else {
                 return Ok(None);
             };
             let value = quantizer.value(code);
@@ -94,7 +97,8 @@ impl LayerReader {
         Ok(Some(&self.values))
     }
 
-    /// Checks that the layer was complete and its padding zero.
+    /// Checks, after the last byte of the payload, that all Gaussians were read and the padding is
+    /// zero.
     pub(crate) fn finish(&self) -> Result<(), DecodeError> {
         if self.count != Some(self.done) {
             return Err(malformed("too short for its number of Gaussians"));
@@ -110,23 +114,23 @@ fn malformed(reason: &'static str) -> DecodeError {
     DecodeError::malformed(ChunkType::GAUS, reason)
 }
 
-/// Gaussians as a packed file stores them.
+/// The Gaussians of a file with the packed coding, as codes.
 #[cfg(feature = "encode")]
 #[derive(Clone, Debug)]
 pub(crate) struct PackedCodes {
     pub(crate) quantizers: Vec<Quantizer>,
-    /// Of every component of each Gaussian, in file order.
+    /// For each Gaussian in file order, the code of each component.
     pub(crate) codes: Vec<[u32; MAX_COMPONENTS]>,
 }
 
-/// Packs the codes of one layer, with its number of Gaussians in front.
+/// The payload of a layer with these codes.
 #[cfg(feature = "encode")]
 pub(crate) fn write_layer(codes: &[[u32; MAX_COMPONENTS]], quantizers: &[Quantizer]) -> Vec<u8> {
     let mut writer = super::bits::BitWriter::default();
-    writer.put(codes.len() as u32, 32);
+    writer.write(codes.len() as u32, 32);
     for gaussian in codes {
         for (&code, quantizer) in gaussian.iter().zip(quantizers) {
-            writer.put(code, quantizer.bits().into());
+            writer.write(code, quantizer.bits().into());
         }
     }
     writer.finish()

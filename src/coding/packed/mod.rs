@@ -1,11 +1,11 @@
-//! The packed coding: every component at its fixed bit depth, Gaussian after Gaussian (spec, sections
-//! 6 and 7.2).
+//! The packed coding (coding 0): Gaussian after Gaussian, every component with the bit depth of its
+//! quantizer (spec, sections 6, 7.1 and 7.2).
 
 mod bits;
 mod layer;
 mod quantizer;
 
-pub(crate) use layer::LayerReader;
+pub(crate) use layer::PackedLayerReader;
 #[cfg(feature = "encode")]
 pub(crate) use layer::{LAYER_PREFIX, PackedCodes, packed_length, write_layer};
 #[cfg(feature = "encode")]

@@ -1,4 +1,4 @@
-//! LSQ+ quantizers: `value = code * scale + offset`, optionally of a logarithm (spec, section 6;
+//! LSQ+ quantizers: `value = code * scale + offset`, or the exponential of that (spec, section 6;
 //! paper, section "Compression Framework").
 
 use alloc::vec::Vec;
@@ -14,26 +14,28 @@ pub(crate) const ENTRY_LENGTH: usize = 12;
 /// Largest magnitude of a scale and of an offset.
 pub(crate) const MAX_PARAMETER: f32 = 4_294_967_296.0;
 
-/// How the value of one attribute component comes from its code.
+/// How a file with [`Coding::Packed`](crate::Coding) stores one component of its Gaussians (spec,
+/// section 6). Codes are unsigned integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Quantizer {
-    /// The code is the value: 32 bits, an IEEE 754 single.
+    /// The value itself: the code has the 32 bits of an IEEE 754 binary32.
     Float,
-    /// `code * scale + offset`.
+    /// `value = code * scale + offset`.
     Linear(UniformQuantizer),
-    /// `exp(code * scale + offset)`: for components that are positive and span decades.
+    /// `value = exp(code * scale + offset)`: for positive components of widely different sizes.
     Log(UniformQuantizer),
 }
 
-/// The uniform steps of a quantizer: LSQ+'s learnable scale and offset, and a bit depth.
+/// A uniform quantizer: the scale and offset that LSQ+ learns, and a bit depth. `value = code *
+/// scale + offset`, in units of the component or of its logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformQuantizer {
-    /// Bit depth, 1 to 16: codes go from 0 to 2^bits - 1.
+    /// Bit depth, 1 to 16: codes are 0 to 2^bits - 1.
     pub bits: u8,
-    /// Distance between neighbouring codes; positive, at most 2^32.
+    /// Difference of the values of neighbouring codes; positive, at most 2^32.
     pub scale: f32,
-    /// What code 0 stands for; at most 2^32 in magnitude.
+    /// Value of code 0; from -2^32 to 2^32.
     pub offset: f32,
 }
 
@@ -44,13 +46,13 @@ impl UniformQuantizer {
         (1 << self.bits) - 1
     }
 
-    /// What `code` stands for.
+    /// The value of a code.
     pub(crate) fn value(&self, code: u32) -> f32 {
         // Codes have at most 16 bits, so the conversion is exact.
         code as f32 * self.scale + self.offset
     }
 
-    /// The code whose value is nearest to `value`; ties to the even code.
+    /// The code whose value is nearest to `value`; of two, the even one.
     #[cfg(feature = "encode")]
     pub(crate) fn code(&self, value: f32) -> u32 {
         ((value - self.offset) / self.scale).clamp(0.0, self.max_code() as f32).round_ties_even()
@@ -59,7 +61,7 @@ impl UniformQuantizer {
 }
 
 impl Quantizer {
-    /// Bits that one code takes in the file, 1 to 16 or 32.
+    /// Bits of one code in the file: 1 to 16, or 32 for [`Quantizer::Float`].
     #[must_use]
     pub const fn bits(&self) -> u8 {
         match self {
@@ -68,7 +70,7 @@ impl Quantizer {
         }
     }
 
-    /// What `code` stands for. Not finite only for a `Float` that is not.
+    /// The value of a code. Always finite, except that a `Float` may be infinite or NaN.
     pub(crate) fn value(&self, code: u32) -> f32 {
         match self {
             Self::Float => f32::from_bits(code),
@@ -77,7 +79,7 @@ impl Quantizer {
         }
     }
 
-    /// Reads the payload of `QNTZ`: one entry per component.
+    /// Reads the payload of `QNTZ`: one entry per component (spec, section 5.3).
     pub(crate) fn parse_all(payload: &[u8], components: usize) -> Result<Vec<Self>, DecodeError> {
         if payload.len() != components * ENTRY_LENGTH {
             return Err(malformed("the length is not 12 bytes per component"));

@@ -1,0 +1,311 @@
+//! Decodes the chunks of a file one after the other: checks their order and their sizes, and keeps
+//! what they contain (spec, sections 4.3 to 5).
+
+use alloc::vec::Vec;
+
+use super::memory::{peak_memory, reserve};
+use super::pending::PendingLayers;
+use crate::chunk::ChunkType;
+use crate::coding::entropy::{AttributeBits, Lattice};
+use crate::coding::packed::{PackedLayerReader, Quantizer};
+use crate::container::{Coding, Header, Metadata};
+use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
+use crate::layers::bounds::LayerBounds;
+use crate::limits::Limits;
+#[cfg(feature = "std")]
+use crate::render::RenderOptions;
+use crate::threads::Threads;
+
+/// Most bytes in the payload of `GHDR` and of `QNTZ`: nine quantizers of twelve bytes (spec,
+/// section 4.5).
+const MAX_SMALL_CHUNK: u32 = 108;
+
+/// What the chunks of a file contain, as far as they have arrived.
+#[derive(Debug, Default)]
+pub(super) struct ChunkDecoder {
+    pub(super) limits: Limits,
+    stage: Stage,
+    pub(super) header: Option<Header>,
+    /// The quantizers of the packed coding, one per component.
+    pub(super) quantizers: Vec<Quantizer>,
+    /// The lattice of the entropy coding.
+    pub(super) lattice: Option<Lattice>,
+    /// The bounds of every layer that the header declares, if the file has them.
+    bounds: Option<Vec<LayerBounds>>,
+    /// Entropy-coded layers that have arrived and are not decoded yet.
+    pending: PendingLayers,
+    pub(super) metadata: Metadata,
+    /// The Gaussians that are decoded, in file order.
+    pub(super) gaussians: Vec<Gaussian>,
+    /// The bits of entropy-coded Gaussians, if they are to be counted.
+    pub(super) statistics: Option<AttributeBits>,
+    /// The number of layers that have arrived.
+    layers: u16,
+}
+
+/// What becomes of the bytes of the current chunk.
+#[derive(Debug, Default)]
+enum Stage {
+    /// There is no current chunk.
+    #[default]
+    Idle,
+    /// The payload is skipped.
+    Skip,
+    /// The payload is collected, and read as a whole.
+    Collect {
+        /// The bytes that have arrived.
+        payload: Vec<u8>,
+        /// The number of bytes that the chunk declares.
+        length: usize,
+    },
+    /// The payload is a layer of the packed coding, whose Gaussians are decoded as they arrive. The
+    /// number is that of the Gaussians before it.
+    Layer(PackedLayerReader, usize),
+    /// `GEND` was read.
+    Complete,
+    /// There was an error.
+    Failed,
+}
+
+impl Stage {
+    /// Collects a payload of `length` bytes.
+    fn collect(length: u32) -> Self {
+        Self::Collect { payload: Vec::new(), length: length as usize }
+    }
+}
+
+impl ChunkDecoder {
+    /// Whether `GEND` was read.
+    pub(super) fn is_complete(&self) -> bool {
+        matches!(self.stage, Stage::Complete)
+    }
+
+    /// Whether there was an error.
+    pub(super) fn has_failed(&self) -> bool {
+        matches!(self.stage, Stage::Failed)
+    }
+
+    /// Ends decoding after an error, and drops the Gaussians of an incomplete layer.
+    pub(super) fn fail(&mut self) {
+        if let Stage::Layer(_, before) = self.stage {
+            self.gaussians.truncate(before);
+        }
+        self.stage = Stage::Failed;
+    }
+
+    /// Whether a layer or `GEND` has arrived, at least in part: header and metadata are complete
+    /// then.
+    #[cfg(feature = "std")]
+    pub(super) fn has_reached_layers(&self, current: Option<ChunkType>) -> bool {
+        matches!(self.stage, Stage::Layer(..) | Stage::Complete)
+            || self.layers > 0
+            || current == Some(ChunkType::GAUS)
+    }
+
+    /// The number of Gaussians that have arrived, those of pending layers included.
+    pub(super) fn arrived(&self) -> usize {
+        self.gaussians.len() + self.pending.count()
+    }
+
+    /// The memory that is held, in bytes.
+    pub(super) fn memory(&self) -> u64 {
+        let gaussians = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
+        self.preamble_memory() + self.pending.memory() + gaussians
+    }
+
+    /// The memory of what stands before the layers, in bytes: metadata and bounds.
+    fn preamble_memory(&self) -> u64 {
+        let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<LayerBounds>();
+        self.metadata.memory() + bounds as u64
+    }
+
+    /// Checks what a header declares against the limits.
+    pub(super) fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
+        self.limits.check_size(header.width, header.height)?;
+        self.limits.check_gaussians(header.gaussians)?;
+        let gaussians = peak_memory::<Gaussian>(header.gaussians);
+        self.limits.check_memory(self.preamble_memory() + gaussians)
+    }
+
+    /// Begins a chunk with a payload of `length` bytes.
+    pub(super) fn begin(&mut self, chunk: ChunkType, length: u32) -> Result<(), DecodeError> {
+        self.stage = match self.stage_of(chunk, length) {
+            Err(DecodeError::Limit { .. }) if self.pending.count() > 0 => {
+                // Decoding the pending layers frees their memory.
+                self.decode_pending(Threads::One)?;
+                self.stage_of(chunk, length)?
+            }
+            stage => stage?,
+        };
+        Ok(())
+    }
+
+    /// Checks that a chunk may stand here, and decides what becomes of its payload.
+    fn stage_of(&self, chunk: ChunkType, length: u32) -> Result<Stage, DecodeError> {
+        let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
+        if self.header.is_none() && chunk != ChunkType::GHDR {
+            return malformed("stands before the header");
+        }
+        match chunk {
+            ChunkType::GHDR if self.header.is_some() => malformed("appears twice"),
+            ChunkType::QNTZ if self.has_quantizers() => malformed("appears twice"),
+            ChunkType::GHDR | ChunkType::QNTZ if length > MAX_SMALL_CHUNK => {
+                malformed("is too long")
+            }
+            ChunkType::GAUS if !self.has_quantizers() => malformed("stands before QNTZ"),
+            ChunkType::GAUS if Some(self.layers) == self.header.as_ref().map(|h| h.layers) => {
+                malformed("more layers than the header declares")
+            }
+            ChunkType::GAUS if self.lattice.is_some() => self.collect_within_limits(length),
+            ChunkType::GAUS => {
+                Ok(Stage::Layer(PackedLayerReader::new(length), self.gaussians.len()))
+            }
+            ChunkType::GEND if length != 0 => malformed("is not empty"),
+            ChunkType::BNDS if self.layers == 0 && self.bounds.is_some() => {
+                malformed("appears twice")
+            }
+            // After the first layer, these have no meaning in version 1.
+            ChunkType::BNDS if self.layers == 0 => self.collect_within_limits(length),
+            _ if Metadata::includes(chunk) && self.layers == 0 => {
+                self.collect_within_limits(length)
+            }
+            ChunkType::GHDR | ChunkType::QNTZ => Ok(Stage::collect(length)),
+            ChunkType::GEND => Ok(Stage::Skip),
+            _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
+            _ => Ok(Stage::Skip),
+        }
+    }
+
+    /// Whether `QNTZ` was read.
+    fn has_quantizers(&self) -> bool {
+        self.lattice.is_some() || !self.quantizers.is_empty()
+    }
+
+    /// Collects a payload, if there is memory for it and for all Gaussians.
+    fn collect_within_limits(&self, length: u32) -> Result<Stage, DecodeError> {
+        let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
+        let declared = peak_memory::<Gaussian>(gaussians) + peak_memory::<u8>(length);
+        self.limits.check_memory(self.preamble_memory() + self.pending.memory() + declared)?;
+        Ok(Stage::collect(length))
+    }
+
+    /// Takes the next bytes of the payload of the current chunk.
+    pub(super) fn payload(&mut self, mut bytes: &[u8]) -> Result<(), DecodeError> {
+        match &mut self.stage {
+            Stage::Collect { payload, length } => {
+                reserve(payload, bytes.len(), *length);
+                payload.extend_from_slice(bytes);
+            }
+            Stage::Layer(layer, _) => {
+                let Some(header) = &self.header else { return Ok(()) };
+                let allowed = header.gaussians - self.gaussians.len() as u32;
+                if layer.count(&mut bytes, &self.quantizers, allowed)?.is_none() {
+                    return Ok(());
+                }
+                while let Some(values) = layer.next(&mut bytes, &self.quantizers)? {
+                    let values = &values[..self.quantizers.len()];
+                    reserve(&mut self.gaussians, 1, header.gaussians as usize);
+                    self.gaussians.push(Gaussian::from_components(values, header.parameterization));
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Ends the current chunk, whose CRC is right.
+    pub(super) fn complete(&mut self, chunk: ChunkType) -> Result<(), DecodeError> {
+        match (chunk, &mut self.stage) {
+            (ChunkType::GHDR, Stage::Collect { payload, .. }) => {
+                let header = Header::parse(payload)?;
+                self.check_header(&header)?;
+                self.header = Some(header);
+            }
+            (ChunkType::QNTZ, Stage::Collect { payload, .. }) => {
+                let Some(header) = &self.header else { return Ok(()) };
+                match header.coding {
+                    Coding::Packed => {
+                        self.quantizers = Quantizer::parse_all(payload, header.components())?;
+                    }
+                    Coding::Entropy => {
+                        let lattice = Lattice::parse(payload, header.color.channels())?;
+                        self.lattice = Some(lattice);
+                    }
+                }
+            }
+            (ChunkType::GAUS, Stage::Collect { payload, .. }) => {
+                let payload = core::mem::take(payload);
+                let declared = self.header.as_ref().map_or(0, |header| header.gaussians);
+                let allowed = declared - self.arrived() as u32;
+                let number = usize::from(self.layers);
+                let bounds = self.bounds.as_ref().and_then(|bounds| bounds.get(number).copied());
+                self.pending.push(payload, bounds, allowed)?;
+                self.layers += 1;
+            }
+            (ChunkType::BNDS, Stage::Collect { payload, .. }) => {
+                let Some(header) = &self.header else { return Ok(()) };
+                self.bounds = Some(LayerBounds::parse_all(payload, header)?);
+            }
+            (_, Stage::Collect { payload, .. }) => {
+                let payload = core::mem::take(payload);
+                self.metadata.insert(chunk, payload)?;
+            }
+            (_, Stage::Layer(layer, _)) => {
+                layer.finish()?;
+                self.layers += 1;
+            }
+            (ChunkType::GEND, _) => {
+                let declared = self.header.as_ref().map(|h| (h.layers, h.gaussians as usize));
+                if declared != Some((self.layers, self.arrived())) {
+                    let reason = "fewer layers or Gaussians than the header declares";
+                    return Err(DecodeError::malformed(chunk, reason));
+                }
+                self.stage = Stage::Complete;
+                return Ok(());
+            }
+            _ => {}
+        }
+        self.stage = Stage::Idle;
+        Ok(())
+    }
+
+    /// Decodes the pending layers up to the first that is malformed.
+    pub(super) fn decode_pending(&mut self, threads: Threads) -> Result<(), DecodeError> {
+        let (Some(header), Some(lattice)) = (&self.header, &self.lattice) else {
+            return Ok(());
+        };
+        let pending = core::mem::take(&mut self.pending);
+        let layers = pending.select(|_| true);
+        reserve(&mut self.gaussians, layers.count(), header.gaussians as usize);
+        let statistics = self.statistics.as_mut();
+        let decoded = layers.decode(header, lattice, statistics, threads, &mut self.gaussians);
+        if decoded.is_err() {
+            self.stage = Stage::Failed;
+        }
+        decoded
+    }
+
+    /// The Gaussians that an output needs: those that are decoded, and those of the pending layers
+    /// that may show in its region. The layers remain pending.
+    ///
+    /// `None` if all pending layers must be decoded in any case: if no layer can be skipped, or if
+    /// one that cannot be is malformed, so that its error is reported.
+    #[cfg(feature = "std")]
+    pub(super) fn visible_gaussians(&self, options: &RenderOptions) -> Option<Vec<Gaussian>> {
+        let (header, lattice) = (self.header.as_ref()?, self.lattice.as_ref()?);
+        let view = options.view(header, &self.limits).ok()?;
+        let may_show = |bounds: LayerBounds| bounds.may_show_in(&view, header);
+        let layers = self.pending.select(|bounds| bounds.is_none_or(may_show));
+        if layers.count() == self.pending.count() || options.prefix.is_some() {
+            return None;
+        }
+        let count = self.gaussians.len() + layers.count();
+        let copies = count as u64 * size_of::<Gaussian>() as u64;
+        self.limits.check_memory(self.memory() + copies).ok()?;
+        let mut gaussians = Vec::with_capacity(count);
+        gaussians.extend_from_slice(&self.gaussians);
+        layers.decode(header, lattice, None, options.threads, &mut gaussians).ok()?;
+        Some(gaussians)
+    }
+}
