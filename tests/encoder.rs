@@ -496,12 +496,22 @@ fn what_a_target_does_not_reach_is_told() {
     let small = encoded(&flat, Target::Bytes(5000));
     let bytes = small.bytes.len();
     assert_eq!(small.report.shortfall, Some(Shortfall::SizeBelow { bytes, gaussians: 0 }));
-    // So it is with more than the model can use, and then training ends as early as otherwise.
+    // So it is with more than the model can use. A smaller file was tried as well, in two runs of 60
+    // iterations, and it is not nearly as good.
     let large = encoded(&noise, Target::BitsPerPixel(1000.0));
     let report = &large.report;
     let as_large = Shortfall::SizeBelow { bytes: large.bytes.len(), gaussians: report.gaussians };
     assert_eq!(report.shortfall, Some(as_large));
-    assert_eq!(report.iterations, 60);
+    assert_eq!(report.iterations, 120);
+    // Where Gaussians bring nothing, a large file is not written.
+    let wave =
+        |i: i32| 128.0 + 60.0 * ((i % 64) as f32 / 9.0).sin() + 50.0 * (i as f32 / 448.0).cos();
+    let waves: Vec<u8> = (0..64 * 64).map(|i| wave(i) as u8).collect();
+    let source = Source::new_u8(64, 64, ColorModel::Gray, &waves).expect("sizes agree");
+    let useless = quick(Target::BitsPerPixel(40.0)).encode(&source).expect("it encodes");
+    let (bytes, gaussians) = (useless.bytes.len(), useless.report.gaussians);
+    assert!(bytes < 64 * 64 * 4 / 8, "{bytes}");
+    assert_eq!(useless.report.shortfall, Some(Shortfall::SizeUseless { bytes, gaussians }));
     // A number of Gaussians is a bound, not a target.
     assert_eq!(encoded(&flat, Target::Gaussians(50)).report.shortfall, None);
     assert_eq!(encoded(&noise, Target::Auto).report.shortfall, None);
