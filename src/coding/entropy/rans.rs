@@ -59,6 +59,7 @@ const TARGETS: [[i16; SYMBOLS]; SYMBOLS] = {
 
 impl Model {
     /// A model with these first slots of the symbols: increasing from 0, all below 2^15.
+    #[inline]
     pub(crate) fn new(starts: [i16; SYMBOLS]) -> Self {
         let mut model = Self { starts: [END; SYMBOLS + 1], seen: 0 };
         model.starts[..SYMBOLS].copy_from_slice(&starts);
