@@ -120,7 +120,7 @@ impl<R: Read> GipDecoder<R> {
         let depth = self.decoder.header().depth;
         let row = region.width as usize * usize::from(self.color_type().bytes_per_pixel());
         let samples = self.decoder.output_len()?;
-        // The memory of a copy of the output is checked by itself, next to what the decoder holds.
+        // The decoder does not know of a copy of the output, which is checked by itself.
         let copy = (samples as u64).saturating_mul(depth.bytes() as u64);
         let scratch = || self.limits.check_memory(copy);
         match depth {

@@ -1,7 +1,7 @@
 //! The attributes of a Gaussian: all that is coded of it but its position (spec, section 7.4).
 //!
-//! As everywhere in this coding, one function codes and decodes: what is `known` of a Gaussian
-//! counts for an encoder only.
+//! As everywhere in this coding, the same functions encode and decode. Only an encoder uses the
+//! codes that are `known`.
 
 use super::contexts::{self, CLASSES, MAGNITUDES, RATIOS, SHAPE_CLASSES};
 use super::lattice::{Code, Lattice, MAX_CLASS, class_scale};

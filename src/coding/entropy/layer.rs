@@ -45,7 +45,7 @@ pub(crate) struct EncodedLayer {
     pub(crate) costs: SymbolCosts,
 }
 
-/// Reads and writes layers, and tells the cost of Gaussians in them.
+/// Reads and writes layers, and computes the cost of Gaussians in them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerCoder<'a> {
     pub(crate) lattice: &'a Lattice,
@@ -144,7 +144,7 @@ impl<'a> LayerCoder<'a> {
         EncodedLayer { payload, levels, costs }
     }
 
-    /// Moves those `first` codes to the front that come first in the order of the tree.
+    /// Moves the `first` codes in the order of the tree to the front, in any order.
     #[cfg(feature = "encode")]
     pub(crate) fn cut(&self, codes: &mut [Code], first: usize) {
         let mut range = 0..codes.len();

@@ -59,6 +59,7 @@ const TARGETS: [[i16; SYMBOLS]; SYMBOLS] = {
 
 impl Model {
     /// A model with these first slots of the symbols: increasing from 0, all below 2^15.
+    #[inline]
     pub(crate) fn new(starts: [i16; SYMBOLS]) -> Self {
         let mut model = Self { starts: [END; SYMBOLS + 1], seen: 0 };
         model.starts[..SYMBOLS].copy_from_slice(&starts);
@@ -113,8 +114,8 @@ pub(crate) enum Attribute {
     Color,
 }
 
-/// Reads what a [`RansEncoder`] wrote. Malformed bytes give values of some kind as well; at the
-/// end, [`RansDecoder::is_complete`] says whether they were valid.
+/// Reads what a [`RansEncoder`] wrote. Malformed bytes are decoded to arbitrary values. At the
+/// end, [`RansDecoder::is_complete`] says whether the bytes were valid.
 #[derive(Debug)]
 pub(crate) struct RansDecoder<'a, S = BaselineSearch> {
     models: &'a mut [Model],
@@ -316,30 +317,30 @@ mod tests {
 
     /// What is coded in a test: a symbol with one of three models, or plain bits.
     #[derive(Clone, Copy, Debug)]
-    enum Item {
+    enum Operation {
         Symbol(usize, u32),
         Bits(u32, u32),
     }
 
-    fn items() -> impl Strategy<Value = Vec<Item>> {
+    fn items() -> impl Strategy<Value = Vec<Operation>> {
         let symbol = (0_usize..3, prop_oneof![0_u32..2, 0_u32..16])
-            .prop_map(|(model, symbol)| Item::Symbol(model, symbol));
+            .prop_map(|(model, symbol)| Operation::Symbol(model, symbol));
         let bits = (0_u32..=MAX_BITS, any::<u32>())
-            .prop_map(|(count, value)| Item::Bits(count, value & ((1 << count) - 1)));
+            .prop_map(|(count, value)| Operation::Bits(count, value & ((1 << count) - 1)));
         prop::collection::vec(prop_oneof![4 => symbol, 1 => bits], 0..400)
     }
 
     /// Codes the items, as an encoder that knows their values or as a decoder that does not.
-    fn code(coder: &mut impl SymbolCoder, items: &[Item], known: bool) -> Vec<u32> {
+    fn code(coder: &mut impl SymbolCoder, items: &[Operation], known: bool) -> Vec<u32> {
         let given = |value| if known { value } else { 0 };
-        let code_item = |item: &Item| match *item {
-            Item::Symbol(context, symbol) => coder.symbol(context, given(symbol)),
-            Item::Bits(count, value) => coder.bits(count, given(value)),
+        let code_item = |item: &Operation| match *item {
+            Operation::Symbol(context, symbol) => coder.symbol(context, given(symbol)),
+            Operation::Bits(count, value) => coder.bits(count, given(value)),
         };
         items.iter().map(code_item).collect()
     }
 
-    fn encoded(items: &[Item]) -> (Vec<u8>, Vec<u32>) {
+    fn encoded(items: &[Operation]) -> (Vec<u8>, Vec<u32>) {
         let mut models = [flat(); 3];
         let mut encoder = RansEncoder::new(&mut models);
         let values = code(&mut encoder, items, true);

@@ -8,14 +8,15 @@ use super::numbers::plain;
 use super::rans::{Attribute, SymbolCoder};
 use super::symbol::SYMBOLS;
 
-/// Most cells on the stack of a walk: each split leaves one second part there, and each of the two
-/// sides of 2^32 units at most is halved at most 32 times.
+/// Most cells on the stack of a walk. Each split leaves its second part there, and each of the two
+/// sides, which are shorter than 2^32 units, is halved at most 32 times.
 const MAX_STACK: usize = 2 * 32 + 2;
 
-/// The Gaussians of a layer, in the order of the tree as far as the walk has come.
+/// The Gaussians of a layer. Those that were coded are in the order of the tree.
 pub(super) trait TreeGaussians {
-    /// Moves those of the Gaussians in `range` to the front whose centre lies before `middle` along
-    /// an axis. Returns how many they are: in a decoder, which does not know yet, any number.
+    /// Moves the Gaussians in `range` whose centre lies before `middle` along an axis to the front
+    /// of the range. Returns how many they are. A decoder, which does not know the Gaussians yet,
+    /// returns any number.
     fn partition(&mut self, range: Range<usize>, axis: usize, middle: u32) -> usize;
 
     /// Codes a Gaussian that lies in `cell`. The indices are 0, 1, 2 and so on.
