@@ -10,7 +10,7 @@ use super::progress::Observer;
 use super::raster::Raster;
 use super::rate_model;
 use super::shortfall::Shortfall;
-use super::verify::{Distortion, Verified};
+use super::verify::{FilePsnr, Verified};
 use super::{entropy, packed};
 
 /// A file for a size with more Gaussians than one for so many pixels is compared with one that has
@@ -28,7 +28,7 @@ pub(crate) struct Outcome {
     pub(crate) file: Vec<u8>,
     pub(crate) work: Work,
     pub(crate) gaussians: u32,
-    pub(crate) distortion: Distortion,
+    pub(crate) distortion: FilePsnr,
     pub(crate) shortfall: Option<Shortfall>,
 }
 

@@ -20,7 +20,7 @@ pub(crate) struct Verified<'a> {
 
 /// The distortion of the decoded picture.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Distortion {
+pub(crate) struct FilePsnr {
     /// PSNR in dB of samples rounded to the source's depth.
     pub(crate) psnr: f64,
     /// PSNR in dB of samples that are clamped, but not rounded.
@@ -49,7 +49,7 @@ impl<'a> Verified<'a> {
         &self,
         count: u32,
         observer: &mut Observer<'_>,
-    ) -> Result<Distortion, EncodeError> {
+    ) -> Result<FilePsnr, EncodeError> {
         match self.source.samples() {
             SourceSamples::Eight(samples) => self.distortion_from(samples, count, observer),
             SourceSamples::Sixteen(samples) => self.distortion_from(samples, count, observer),
@@ -61,7 +61,7 @@ impl<'a> Verified<'a> {
         samples: &[T],
         count: u32,
         observer: &mut Observer<'_>,
-    ) -> Result<Distortion, EncodeError> {
+    ) -> Result<FilePsnr, EncodeError> {
         let (width, height) = (self.source.width(), self.source.height());
         let channels = self.source.color().channels();
         let stride = width as usize * channels;
@@ -96,7 +96,7 @@ impl<'a> Verified<'a> {
             }
         }
         let most = full_scale * full_scale * samples.len() as f64;
-        Ok(Distortion {
+        Ok(FilePsnr {
             psnr: 10.0 * (most / rounded).log10(),
             psnr_float: 10.0 * (most / exact).log10(),
         })

@@ -37,7 +37,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     let encoded = args.threads.pool()?.install(|| encode(&encoder, &source))?;
     output.write(&encoded.bytes)?;
 
-    let report = Report::new(&source, &encoded);
+    let report = JsonReport::new(&source, &encoded);
     let text = if args.json {
         serde_json::to_string(&report)?
     } else {
@@ -76,7 +76,7 @@ fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct Report {
+struct JsonReport {
     width: u32,
     height: u32,
     gaussians: u32,
@@ -91,7 +91,7 @@ struct Report {
     shortfall: Option<String>,
 }
 
-impl Report {
+impl JsonReport {
     fn new(source: &Source<'_>, encoded: &Encoded) -> Self {
         let (width, height) = (source.width(), source.height());
         let bytes = encoded.bytes.len();

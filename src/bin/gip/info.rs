@@ -18,14 +18,14 @@ pub(crate) fn run(args: &args::Info) -> Result<()> {
     let mut stream = StreamDecoder::new().with_statistics();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
-    let info = Info::new(header, &stream, bytes.len());
+    let info = FileInfo::new(header, &stream, bytes.len());
     let text = if args.json { serde_json::to_string(&info)? } else { info.to_string() };
     files::print(text.trim_end(), None)
 }
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
-struct Info {
+struct FileInfo {
     bytes: usize,
     bpp: f64,
     version: u8,
@@ -46,8 +46,8 @@ struct Info {
     /// Of the packed coding; empty with the entropy coding.
     components: Vec<Component>,
     /// Of the entropy coding; `None` with the packed coding.
-    lattice_steps: Option<LatticeSteps>,
-    metadata: Metadata,
+    lattice_steps: Option<StepSizes>,
+    metadata: MetadataSizes,
 }
 
 /// The chunks of one type. Their bytes include length, type and CRC.
@@ -84,7 +84,7 @@ struct Component {
 
 /// The quantization steps of the entropy coding (spec, section 7.5).
 #[derive(Debug, Serialize)]
-struct LatticeSteps {
+struct StepSizes {
     position: f32,
     size: f32,
     ratio: f32,
@@ -92,7 +92,7 @@ struct LatticeSteps {
     color: Vec<f32>,
 }
 
-impl From<image_gip::LatticeSteps> for LatticeSteps {
+impl From<image_gip::LatticeSteps> for StepSizes {
     fn from(steps: image_gip::LatticeSteps) -> Self {
         let image_gip::LatticeSteps { position, size, ratio, slant, color, .. } = steps;
         Self { position, size, ratio, slant, color }
@@ -101,20 +101,20 @@ impl From<image_gip::LatticeSteps> for LatticeSteps {
 
 /// Sizes in bytes of each kind of metadata.
 #[derive(Debug, Serialize)]
-struct Metadata {
+struct MetadataSizes {
     icc_profile: Option<usize>,
     exif: Option<usize>,
     xmp: Option<usize>,
-    texts: Vec<Text>,
+    texts: Vec<TextSize>,
 }
 
 #[derive(Debug, Serialize)]
-struct Text {
+struct TextSize {
     keyword: String,
     bytes: usize,
 }
 
-impl Info {
+impl FileInfo {
     fn new(header: &Header, stream: &StreamDecoder, bytes: usize) -> Self {
         let channels = header.color.channels();
         let components = components(header, stream.quantizers());
@@ -173,15 +173,15 @@ impl Info {
                 .collect(),
             bits_per_gaussian,
             components,
-            lattice_steps: stream.lattice_steps().map(LatticeSteps::from),
-            metadata: Metadata {
+            lattice_steps: stream.lattice_steps().map(StepSizes::from),
+            metadata: MetadataSizes {
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
                 xmp: size(&metadata.xmp),
                 texts: metadata
                     .texts
                     .iter()
-                    .map(|text| Text { keyword: text.keyword.clone(), bytes: text.text.len() })
+                    .map(|text| TextSize { keyword: text.keyword.clone(), bytes: text.text.len() })
                     .collect(),
             },
         }
@@ -226,7 +226,7 @@ fn components(header: &Header, quantizers: &[Quantizer]) -> Vec<Component> {
         .collect()
 }
 
-impl Display for Info {
+impl Display for FileInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { width, height, color, depth, kernel, cutoff, .. } = self;
         let bits = &self.bits_per_gaussian;
@@ -250,7 +250,7 @@ impl Display for Info {
         if let Some(coded) = bits.coded {
             row("  with framing", &format_args!("{coded:.2}"))?;
         }
-        if let Some(LatticeSteps { position, size, ratio, slant, color }) = &self.lattice_steps {
+        if let Some(StepSizes { position, size, ratio, slant, color }) = &self.lattice_steps {
             row(
                 "  steps",
                 &format_args!(
@@ -271,13 +271,13 @@ impl Display for Info {
         for Chunk { kind, count, bytes } in &self.chunks {
             row(&format!("chunk {kind}"), &format_args!("{count}, {bytes} bytes"))?;
         }
-        let Metadata { icc_profile, exif, xmp, texts } = &self.metadata;
+        let MetadataSizes { icc_profile, exif, xmp, texts } = &self.metadata;
         for (name, bytes) in [("ICC profile", icc_profile), ("Exif", exif), ("XMP", xmp)] {
             if let Some(bytes) = bytes {
                 row(name, &format_args!("{bytes} bytes"))?;
             }
         }
-        for Text { keyword, bytes } in texts {
+        for TextSize { keyword, bytes } in texts {
             row("text", &format_args!("{}, {bytes} bytes", keyword.escape_debug()))?;
         }
         Ok(())
