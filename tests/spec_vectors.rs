@@ -1,7 +1,7 @@
 //! The test vectors of the specification: `spec/vectors` holds what this builds, byte for byte,
 //! and every way to decode it gives the pixels that `index.tsv` lists.
 //!
-//! `BLESS=1 cargo test --test spec_vectors` writes the folder anew.
+//! `BLESS=1 cargo test --test spec_vectors` writes the folder again.
 
 mod common;
 #[path = "vectors/entropy.rs"]

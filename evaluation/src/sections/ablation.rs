@@ -4,7 +4,7 @@ use anyhow::Result;
 use image_gip::training::Training;
 use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
-use super::methods::{self, CHARTS};
+use super::methods::{self, PARAMETERIZATIONS};
 use super::positions;
 use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
@@ -106,7 +106,7 @@ impl Ablation<'_> {
         let mut table =
             Table::new(&["parameterization", "neither", "CAF alone", "D3 alone", "D3 and CAF"]);
         let mut comparisons = String::new();
-        for (name, chart) in CHARTS {
+        for (name, parameterization) in PARAMETERIZATIONS {
             let mut cells = vec![name.to_owned()];
             let mut compared: Vec<NamedFigures> = Vec::new();
             for (part, d3, caf) in [
@@ -115,7 +115,7 @@ impl Ablation<'_> {
                 ("D3 alone", true, false),
                 ("both", true, true),
             ] {
-                let training = methods::paper(self.iterations, chart, d3, caf);
+                let training = methods::paper(self.iterations, parameterization, d3, caf);
                 let variant = format!("{name}, D3 {d3}, CAF {caf}");
                 let outcome = self.float(&variant, training)?;
                 cells.push(format!("{:.2} dB, {:.4}", outcome.psnr, outcome.ms_ssim));

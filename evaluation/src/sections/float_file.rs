@@ -18,7 +18,7 @@ pub(super) struct FloatFile {
     pub(super) kernel: Kernel,
     /// The colour behind the Gaussians; 65535 is a full sample.
     pub(super) base: [u16; 3],
-    /// In the Cholesky chart: x, y, l11, l21, l22 and three amplitudes.
+    /// In the Cholesky parameterization: x, y, l11, l21, l22 and three amplitudes.
     pub(super) gaussians: Vec<[f32; COMPONENTS]>,
 }
 
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn covariances_without_a_cholesky_factor_are_left_out() {
-        // In the covariance chart: x, y, xx, xy, yy and three amplitudes.
+        // In the covariance parameterization: x, y, xx, xy, yy and three amplitudes.
         let sound = [3.0, 2.0, 4.0, 2.0, 2.0, 0.5, 0.0, -0.5];
         let indefinite = [3.0, 2.0, 4.0, 2.0, 0.5, 0.5, 0.0, -0.5];
         let mut bytes = FloatFile::new((6, 4), Kernel::Quartic, vec![sound, indefinite]).to_bytes();

@@ -11,7 +11,7 @@ const HALVING: f64 = 0.4;
 const GAUSSIAN_IMAGE_FILTER: GaussianFilter = GaussianFilter::Constant(0.5);
 
 /// The parameterizations, as tables call them.
-pub(crate) const CHARTS: [(&str, Parameterization); 3] = [
+pub(crate) const PARAMETERIZATIONS: [(&str, Parameterization); 3] = [
     ("direct covariance", Parameterization::Covariance),
     ("Cholesky", Parameterization::Cholesky),
     ("rotation and scale", Parameterization::RotationScale),
@@ -30,10 +30,15 @@ pub(crate) fn description(iterations: u32) -> String {
 
 /// GaussianImage++ with fewer iterations, with or without its two components: distortion-driven
 /// densification (D3) and the context-aware filter (CAF).
-pub(crate) fn paper(iterations: u32, chart: Parameterization, d3: bool, caf: bool) -> Training {
+pub(crate) fn paper(
+    iterations: u32,
+    parameterization: Parameterization,
+    d3: bool,
+    caf: bool,
+) -> Training {
     let mut training = Training::paper();
     training.iterations = iterations;
-    training.parameterization = chart;
+    training.parameterization = parameterization;
     let interval = (f64::from(iterations) * HALVING).round() as u32;
     training.optimizer.schedule = LearningRateSchedule::Halving(interval.max(1));
     if !d3 {

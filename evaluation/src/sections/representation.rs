@@ -59,7 +59,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let pictures = bench.sample(if bench.quick { QUICK_PICTURES } else { usize::MAX });
     let counts: &[u32] = if bench.quick { &QUICK_GAUSSIANS } else { &GAUSSIANS };
     let full = methods::paper(iterations, Parameterization::Covariance, true, true);
-    let without = |chart| methods::paper(iterations, chart, false, false);
+    let without = |parameterization| methods::paper(iterations, parameterization, false, false);
     let all = [
         (gip::NAME, Method::Own(gip::EFFORT)),
         ("gip, more effort", Method::Own(BEST_EFFORT)),
