@@ -30,6 +30,7 @@ pub enum Quantizer {
 /// A uniform quantizer: the scale and offset that LSQ+ learns, and a bit depth. `value = code *
 /// scale + offset`, in units of the component or of its logarithm.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct UniformQuantizer {
     /// Bit depth, 1 to 16: codes are 0 to 2^bits - 1.
     pub bits: u8,
