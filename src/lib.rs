@@ -145,7 +145,7 @@ pub use decode::{ChunkStatistics, Decoded, Samples, StreamDecoder, decode};
 #[cfg(feature = "encode")]
 pub use encode::{
     EncodeError, Encoded, Encoder, OptionError, Precision, Progress, Report, Shortfall, Source,
-    SourceError, Target, encode,
+    SourceError, Target, Tune, encode,
 };
 #[cfg(feature = "decode")]
 pub use error::{DecodeError, LimitKind, Reason, RequestError, Unsupported};

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::error::{EncodeError, OptionError};
 use super::fit::training::Training;
 use super::job::Job;
-use super::options::{Precision, Target};
+use super::options::{Precision, Target, Tune};
 use super::pipeline;
 use super::progress::{Observer, Progress};
 use super::shortfall::Shortfall;
@@ -78,6 +78,7 @@ pub fn encode(
 #[must_use]
 pub struct Encoder {
     target: Target,
+    tune: Tune,
     effort: u8,
     precision: Precision,
     seed: u64,
@@ -93,10 +94,12 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder with the default options: [`Target::Auto`], effort 5, [`Precision::Entropy`].
+    /// An encoder with the default options: [`Target::Auto`], [`Tune::Visual`], effort 5,
+    /// [`Precision::Entropy`].
     pub fn new() -> Self {
         Self {
             target: Target::default(),
+            tune: Tune::default(),
             effort: 5,
             precision: Precision::Entropy,
             seed: 0,
@@ -110,6 +113,12 @@ impl Encoder {
     /// quality. Default [`Target::Auto`].
     pub fn with_target(mut self, target: Target) -> Self {
         self.target = target;
+        self
+    }
+
+    /// What to minimize for the size of the file. Default [`Tune::Visual`].
+    pub fn with_tune(mut self, tune: Tune) -> Self {
+        self.tune = tune;
         self
     }
 
@@ -178,6 +187,7 @@ impl Encoder {
         let job = Job {
             source,
             target: self.target,
+            tune: self.tune,
             precision: self.precision,
             seed: self.seed,
             metadata: &self.metadata,

@@ -1,7 +1,7 @@
 //! The input of the pipeline.
 
 use super::fit::training::Training;
-use super::options::{Precision, Target};
+use super::options::{Precision, Target, Tune};
 use super::source::Source;
 use crate::container::Metadata;
 
@@ -10,6 +10,7 @@ use crate::container::Metadata;
 pub(crate) struct Job<'a> {
     pub(crate) source: &'a Source<'a>,
     pub(crate) target: Target,
+    pub(crate) tune: Tune,
     pub(crate) precision: Precision,
     pub(crate) seed: u64,
     pub(crate) metadata: &'a Metadata,

@@ -3,6 +3,7 @@
 //! `fit` turns pixels into Gaussians, `rdo` turns Gaussians into codes of the entropy coding, and
 //! `file` writes codes as bytes; `pipeline` runs these stages one after the other.
 
+mod distortion;
 mod encoder;
 mod entropy;
 mod error;
@@ -16,6 +17,7 @@ mod progress;
 mod raster;
 mod rate_model;
 mod rdo;
+mod sensitivity;
 mod shortfall;
 mod source;
 mod strips;
@@ -24,7 +26,7 @@ mod verify;
 pub use encoder::{Encoded, Encoder, Report, encode};
 pub use error::{EncodeError, OptionError, SourceError};
 pub(crate) use fit::training;
-pub use options::{Precision, Target};
+pub use options::{Precision, Target, Tune};
 pub use progress::Progress;
 pub use shortfall::Shortfall;
 pub use source::Source;

@@ -89,6 +89,18 @@ impl Target {
     }
 }
 
+/// What the encoder minimizes for the size of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Tune {
+    /// The error that a person sees. Squared errors count less where the picture varies, and more
+    /// where they shift the means of small blocks of pixels.
+    #[default]
+    Visual,
+    /// The squared error. It gives the highest PSNR.
+    Psnr,
+}
+
 /// How the attributes of the Gaussians are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]

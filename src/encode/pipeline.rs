@@ -60,7 +60,7 @@ fn encode_for_target(
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
     let Job { source, target, precision, training, .. } = *job;
-    let raster = Raster::new(source);
+    let raster = Raster::new(source, job.tune);
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, raster.mean(), kernel, parameterization, job.metadata);
 
@@ -91,7 +91,7 @@ fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Bud
     if let Some(bytes) = target.bytes(raster.pixels()) {
         let most = raster.pixels();
         let count = if is_coded {
-            entropy::count_for_size(bytes, most, layout)
+            entropy::count_for_size(bytes, most, job.tune, layout)
         } else {
             packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
         };

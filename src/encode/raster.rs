@@ -3,6 +3,8 @@
 use fearless_simd::{Simd, f32x16, prelude::*};
 use rayon::prelude::*;
 
+use super::options::Tune;
+use super::sensitivity::Sensitivity;
 use super::source::Source;
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -27,11 +29,13 @@ pub(crate) struct Raster {
     pub(crate) channels: usize,
     /// Half of the quantization step of the source's depth, where a full sample is 1.
     pub(crate) half_step: f32,
+    /// How much errors count by their place and scale; `None` if all count the same.
+    pub(crate) sensitivity: Option<Sensitivity>,
     planes: Vec<SamplePlane>,
 }
 
 impl Raster {
-    pub(crate) fn new(source: &Source<'_>) -> Self {
+    pub(crate) fn new(source: &Source<'_>, tune: Tune) -> Self {
         let (width, height) = (source.width() as usize, source.height() as usize);
         let channels = source.color().channels();
         let columns = width.div_ceil(TILE_WIDTH);
@@ -49,7 +53,8 @@ impl Raster {
             }
         });
         let half_step = 0.5 / f32::from(source.depth().max_sample());
-        Self { width, height, channels, half_step, planes }
+        let sensitivity = (tune == Tune::Visual).then(|| Sensitivity::new(source));
+        Self { width, height, channels, half_step, sensitivity, planes }
     }
 
     /// All channels of a tile.
@@ -78,6 +83,18 @@ impl Raster {
         samples.take(self.width).map(|&sample| f32::from(sample) / FULL_SCALE)
     }
 
+    /// How much a squared error of a pixel counts.
+    pub(crate) fn sensitivity(&self, x: usize, y: usize) -> f32 {
+        self.sensitivity.as_ref().map_or(1.0, |sensitivity| sensitivity.at(x, y))
+    }
+
+    /// How much a squared error counts at a position in pixels, or at the nearest one inside the
+    /// picture.
+    pub(crate) fn sensitivity_near(&self, [x, y]: [f32; 2]) -> f32 {
+        // Casts saturate.
+        self.sensitivity((x as usize).min(self.width - 1), (y as usize).min(self.height - 1))
+    }
+
     /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) fn mean(&self) -> [f32; 4] {
         let mut sums = [0_u64; 4];
@@ -100,7 +117,7 @@ impl Raster {
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        size_of_val(&self.planes[..])
+        size_of_val(&self.planes[..]) + self.sensitivity.as_ref().map_or(0, Sensitivity::memory)
     }
 }
 

@@ -1,22 +1,29 @@
 //! The rate model of the entropy coding: what training, rounding to the lattice and the choice of
-//! codes assume about rate (bits) and distortion (squared error, where a full sample is 1).
+//! codes assume about rate (bits) and distortion (squared error, where a full sample is 1, weighted
+//! by the eye's sensitivity if the encoder is tuned for it).
 //!
 //! All steps follow from one, the step of colour, which is proportional to the square root of the
-//! squared error per Gaussian. The *strength* of a Gaussian is the Euclidean length of its colour
+//! distortion per Gaussian. The *strength* of a Gaussian is the Euclidean length of its colour
 //! times the square root of its area l11 l22: the squared strength is proportional to the sum of
 //! the squares that it adds to the picture.
 
+use super::options::Tune;
 use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
 /// Bits that an entropy-coded Gaussian takes on average. A file of a given size is fitted with as
 /// many Gaussians as fit in at this rate.
-pub(crate) const BITS_PER_GAUSSIAN: f64 = 29.0;
+pub(crate) const fn bits_per_gaussian(tune: Tune) -> f64 {
+    match tune {
+        Tune::Visual => 32.0,
+        Tune::Psnr => 29.0,
+    }
+}
 /// The share of a target's squared error that the fit may have; quantization adds the rest.
 pub(crate) const SHARE_OF_FIT: f64 = 0.8;
-/// The squared step of colour, as a share of the squared error per Gaussian: with it, a Gaussian
-/// takes about [`BITS_PER_GAUSSIAN`].
+/// The squared step of colour, as a share of the distortion per Gaussian: with it, a Gaussian takes
+/// about [`bits_per_gaussian`].
 const SQUARED_STEP: f64 = 0.22;
 /// The range of the step of colour.
 const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
@@ -35,10 +42,10 @@ const RATE_WEIGHT: f32 = 0.4;
 /// Components of a Gaussian's geometry: two of position, three of shape.
 const GEOMETRY: usize = 5;
 
-/// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has the squared
-/// error `error`.
-pub(crate) fn step_for(error: f64, count: usize) -> f64 {
-    0.5 * (SQUARED_STEP * error / count.max(1) as f64).log2()
+/// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has this
+/// distortion.
+pub(crate) fn step_for(distortion: f64, count: usize) -> f64 {
+    0.5 * (SQUARED_STEP * distortion / count.max(1) as f64).log2()
 }
 
 /// The lattice for a step of colour, given by its base-2 logarithm.
@@ -52,12 +59,17 @@ pub(crate) fn lambda(lattice: &Lattice) -> f32 {
     LAMBDA * lattice.color[0] * lattice.color[0]
 }
 
-/// The precision class for a Gaussian: the base-2 logarithm of its strength in steps of colour,
-/// rounded and clamped to 0 to [`MAX_CLASS`].
-pub(crate) fn class_of(gaussian: &Gaussian, lattice: &Lattice, model: ColorModel) -> u32 {
+/// The precision class for a Gaussian where squared errors count `sensitivity` times: the base-2
+/// logarithm of its strength in steps of colour, rounded and clamped to 0 to [`MAX_CLASS`].
+pub(crate) fn class_of(
+    gaussian: &Gaussian,
+    sensitivity: f32,
+    lattice: &Lattice,
+    model: ColorModel,
+) -> u32 {
     let [l11, _, l22] = gaussian.cholesky;
     let squared = to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
-    let steps = (squared * l11 * l22).sqrt() / lattice.color[0];
+    let steps = (squared * l11 * l22 * sensitivity).sqrt() / lattice.color[0];
     steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
 }
 
@@ -72,9 +84,9 @@ pub(crate) struct RateTerm {
 }
 
 impl RateTerm {
-    /// The term for `count` Gaussians whose picture has the squared error `error`.
-    pub(crate) fn new(error: f64, count: usize, channels: usize) -> Self {
-        let squared_step = (2.0 * step_for(error, count)).exp2() as f32;
+    /// The term for `count` Gaussians whose picture has this distortion.
+    pub(crate) fn new(distortion: f64, count: usize, channels: usize) -> Self {
+        let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
         let components = (GEOMETRY + channels) as f32;
         let weight = RATE_WEIGHT * LAMBDA * components * (0.5 * core::f32::consts::LOG2_E);
         Self { squared_step, weight: weight * squared_step }
@@ -102,15 +114,15 @@ mod tests {
             cholesky: [2.0, 0.3, 1.5],
             color: [0.3, -0.1, 0.2, 0.0],
         };
-        let (error, count) = (3.0, 20);
-        let lattice = lattice(step_for(error, count), ColorModel::Rgb);
+        let (distortion, count) = (3.0, 20);
+        let lattice = lattice(step_for(distortion, count), ColorModel::Rgb);
         let rate_term = |color: [f64; 4]| {
             let squared = color.iter().map(|color| color * color).sum::<f64>() * 2.0 * 1.5;
             let steps = squared / f64::from(lattice.color[0]).powi(2);
             let bits = 8.0 * 0.5 * (1.0 + steps).log2();
             f64::from(RATE_WEIGHT) * f64::from(lambda(&lattice)) * bits
         };
-        let gradient = RateTerm::new(error, count, 3).gradient(&gaussian);
+        let gradient = RateTerm::new(distortion, count, 3).gradient(&gaussian);
         for channel in 0..3 {
             let at = |offset: f64| {
                 let mut color = gaussian.color.map(f64::from);
@@ -130,7 +142,7 @@ mod tests {
         let class = |color: f32| {
             let cholesky = [4.0, 1.0, 1.0];
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
-            class_of(&gaussian, &lattice, ColorModel::Gray)
+            class_of(&gaussian, 1.0, &lattice, ColorModel::Gray)
         };
         assert_eq!([0.0, 0.1, 0.5, 1.0, 2.0, 4.0, 1e6].map(class), [0, 0, 0, 1, 2, 3, MAX_CLASS]);
     }

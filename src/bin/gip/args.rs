@@ -4,7 +4,7 @@ use core::num::NonZeroU32;
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use image_gip::{Precision, Region, Target};
+use image_gip::{Precision, Region, Target, Tune};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 /// Encodes, decodes, inspects and compares .gip files: pictures made of 2D Gaussians.
@@ -58,6 +58,9 @@ pub(crate) struct Encode {
     pub(crate) output: PathBuf,
     #[command(flatten)]
     pub(crate) target: TargetArgs,
+    /// What to minimize for the size of the file.
+    #[arg(long, value_enum, default_value_t = TuneArg::Visual)]
+    pub(crate) tune: TuneArg,
     /// Time to spend, from 1 (least) to 9 (most).
     #[arg(long, value_name = "E", default_value_t = 5,
           value_parser = clap::value_parser!(u8).range(1..=9))]
@@ -119,6 +122,24 @@ impl TargetArgs {
             .or(self.psnr.map(Target::Psnr))
             .or(self.quality.map(Target::Quality))
             .unwrap_or_default()
+    }
+}
+
+/// What the encoder minimizes.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum TuneArg {
+    /// The error that a person sees
+    Visual,
+    /// The squared error, for the highest PSNR
+    Psnr,
+}
+
+impl From<TuneArg> for Tune {
+    fn from(arg: TuneArg) -> Self {
+        match arg {
+            TuneArg::Visual => Self::Visual,
+            TuneArg::Psnr => Self::Psnr,
+        }
     }
 }
 

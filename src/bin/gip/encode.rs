@@ -30,6 +30,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     }?;
     let encoder = Encoder::new()
         .with_target(args.target.target())
+        .with_tune(args.tune.into())
         .with_effort(args.effort)
         .with_precision(args.precision.into())
         .with_seed(args.seed)

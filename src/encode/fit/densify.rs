@@ -77,7 +77,9 @@ impl Densifier<'_> {
             NewShape::Random => random_shape(parameterization, variance, rng),
         };
         row[2..5].copy_from_slice(&shape.to_array());
-        let residual = self.pass.residual(x, y, self.raster.channels);
+        let sensitivity = self.raster.sensitivity(x, y);
+        let weighted = self.pass.residual(x, y, self.raster.channels);
+        let residual = weighted.map(|value| value / sensitivity);
         let source = self.raster.sample(x, y);
         for channel in 0..self.raster.channels {
             row[5 + channel] = match self.options.color {
@@ -138,11 +140,16 @@ impl Densifier<'_> {
             }
         };
         let largest = over_channels(&f32::max);
-        let pixels = distortions.as_flattened_mut().iter_mut().zip(largest.as_flattened());
-        for (value, &largest) in pixels {
-            // A residual of less than half a quantization step disappears when samples are rounded.
-            if largest < self.raster.half_step {
-                *value = 0.0;
+        let [columns, _] = self.tile_grid();
+        let (left, top) = (tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT);
+        for (y, (values, largest)) in distortions.iter_mut().zip(&largest).enumerate() {
+            for (x, (value, &largest)) in values.iter_mut().zip(largest).enumerate() {
+                // A residual of less than half a quantization step disappears when samples are
+                // rounded.
+                let position = [(left + x) as f32, (top + y) as f32];
+                if largest < self.raster.half_step * self.raster.sensitivity_near(position) {
+                    *value = 0.0;
+                }
             }
         }
         distortions

@@ -23,6 +23,7 @@ use pass::Pass;
 use row::{Row, RowBounds, shape_of};
 use schedule::TrainingSchedule;
 use training::{Portion, Training};
+use training_tile::RenderingError;
 
 use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
@@ -69,8 +70,8 @@ pub(crate) struct Fit<'a> {
     /// Passes for which the present bins remain valid.
     binned_for: u32,
     splats: Vec<Splat>,
-    /// The sum of squared errors of the last pass.
-    error: f64,
+    /// The error of the last pass.
+    error: RenderingError,
     work: Work,
     rng: fastrand::Rng,
 }
@@ -78,7 +79,7 @@ pub(crate) struct Fit<'a> {
 /// A state of training that can be written to a file.
 #[derive(Clone, Debug)]
 struct Snapshot {
-    error: f64,
+    error: RenderingError,
     rows: Vec<Row>,
     quantizers: Option<LsqQuantizers>,
 }
@@ -110,7 +111,7 @@ impl<'a> Fit<'a> {
             pass: Pass::new(raster),
             binned_for: 0,
             splats: Vec::new(),
-            error: 0.0,
+            error: RenderingError::default(),
             work,
             rng: fastrand::Rng::with_seed(seed),
         }
@@ -178,7 +179,7 @@ impl<'a> Fit<'a> {
     /// The best Gaussians so far as codes of the packed coding: those of the trained quantizers, or
     /// floats.
     pub(crate) fn fitted(&self) -> PackedCodes {
-        let empty = Snapshot { error: 0.0, rows: Vec::new(), quantizers: None };
+        let empty = Snapshot { error: self.error, rows: Vec::new(), quantizers: None };
         let Snapshot { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
         match quantizers {
             Some(quantizers) => PackedCodes {
@@ -201,8 +202,8 @@ impl<'a> Fit<'a> {
         rows.iter().map(gaussian).collect()
     }
 
-    /// The sum of squared errors of the best Gaussians so far.
-    pub(crate) fn best_error(&self) -> f64 {
+    /// The error of the best Gaussians so far.
+    pub(crate) fn best_error(&self) -> RenderingError {
         self.best.as_ref().map_or(self.error, |best| best.error)
     }
 
@@ -224,7 +225,7 @@ impl<'a> Fit<'a> {
     /// The number of Gaussians that the budget sets, if training changes the error by the factor
     /// `foreseen`.
     fn wanted(&self, foreseen: f64) -> usize {
-        self.budget.wanted(self.parameters.len(), self.error * foreseen, self.most())
+        self.budget.wanted(self.parameters.len(), self.error.squared * foreseen, self.most())
     }
 
     /// How many Gaussians this growth step adds. `kept` Gaussians remain when the surplus has been
@@ -303,7 +304,7 @@ impl<'a> Fit<'a> {
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let options = &self.training.optimizer;
         let rate_term = (self.precision == Precision::Entropy)
-            .then(|| RateTerm::new(self.error, self.len(), channels));
+            .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
             self.parameters.step(options, self.bounds, factor, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
@@ -375,7 +376,10 @@ impl<'a> Fit<'a> {
             (self.bounds.parameterization, 5 + self.raster.channels);
         let rows = self.parameters.values.par_iter();
         let importances: Vec<f32> = rows
-            .map(|row| Gaussian::from_components(&row[..components], parameterization).importance())
+            .map(|row| {
+                let gaussian = Gaussian::from_components(&row[..components], parameterization);
+                gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
+            })
             .collect();
         let mut order: Vec<u32> = (0..importances.len() as u32).collect();
         order.select_nth_unstable_by(count - 1, |a, b| {
@@ -441,9 +445,10 @@ impl<'a> Fit<'a> {
 
     /// Keeps a copy of the values of the last pass if their error is the least so far.
     fn keep_if_best(&mut self) {
-        if self.best.as_ref().is_none_or(|best| self.error < best.error) {
+        let is_better = |best: &Snapshot| self.error.distortion < best.error.distortion;
+        if self.best.as_ref().is_none_or(is_better) {
             let best = self.best.get_or_insert_with(|| Snapshot {
-                error: 0.0,
+                error: self.error,
                 rows: Vec::new(),
                 quantizers: None,
             });
@@ -459,7 +464,7 @@ impl<'a> Fit<'a> {
     /// PSNR of the last pass, in dB.
     fn psnr(&self) -> f64 {
         let samples = (self.raster.pixels() * self.raster.channels) as f64;
-        10.0 * (samples / self.error).log10()
+        10.0 * (samples / self.error.squared).log10()
     }
 
     /// Size in bytes.

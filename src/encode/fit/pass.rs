@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::bins::{RowBins, TileRow};
 use super::parameterization::GeometrySums;
-use super::training_tile::{Slot, TrainingTile, slots_per_span};
+use super::training_tile::{RenderingError, Slot, TrainingTile, slots_per_span};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
@@ -26,7 +26,7 @@ const WORK_PER_POLL: usize = 1 << 18;
 /// The cost of a tile without splats, in such pairs.
 const WORK_PER_TILE: usize = 4;
 
-/// The gradient of the loss, half the sum of squared residuals, by one splat.
+/// The gradient of the loss, half the distortion, by one splat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SplatGradient {
     /// The sums from which the gradients by centre and shape follow.
@@ -47,10 +47,11 @@ pub(crate) struct Pass {
     /// the spans of all rows.
     span_indices: Vec<u32>,
     span_ends: Vec<u32>,
-    /// Rendering minus source, in the layout of the [`Raster`].
+    /// Half the gradient of the distortion by the samples of the rendering, in the layout of the
+    /// [`Raster`].
     residuals: Vec<TilePlane>,
-    /// The sum of squared errors of every row of tiles.
-    row_errors: Vec<f64>,
+    /// The error of every row of tiles.
+    row_errors: Vec<RenderingError>,
 }
 
 impl Pass {
@@ -67,7 +68,7 @@ impl Pass {
             span_indices: Vec::new(),
             span_ends: Vec::new(),
             residuals: vec![[[0.0; TILE_WIDTH]; TILE_HEIGHT]; tiles * raster.channels],
-            row_errors: vec![0.0; rows],
+            row_errors: vec![RenderingError::default(); rows],
         }
     }
 
@@ -114,8 +115,7 @@ impl Pass {
     }
 
     /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
-    /// computes residuals and gradients. Returns the sum of squared errors over all samples,
-    /// clamped as in the output.
+    /// computes residuals and gradients. Returns the error of the rendering.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels; `observer` is polled every few
@@ -127,14 +127,14 @@ impl Pass {
         kernel: Kernel,
         base: [f32; 4],
         observer: &mut Observer<'_>,
-    ) -> Result<f64, EncodeError> {
+    ) -> Result<RenderingError, EncodeError> {
         match raster.channels {
             1 => self.run_of::<1>(raster, splats, kernel, base, observer),
             2 => self.run_of::<2>(raster, splats, kernel, base, observer),
             3 => self.run_of::<3>(raster, splats, kernel, base, observer),
             _ => self.run_of::<4>(raster, splats, kernel, base, observer),
         }?;
-        Ok(self.row_errors.iter().sum())
+        Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
 
     /// The gradient of the last pass by a splat: the sum of its slots, in the order of the rows.
@@ -154,8 +154,9 @@ impl Pass {
         }
     }
 
-    /// Rendering minus source at a pixel, by channel; 0 where the source is black or white and the
-    /// rendering lies beyond it, because the output is clamped.
+    /// The residual at a pixel, rendering minus source, by channel, times its sensitivity: half the
+    /// gradient of the distortion. It is 0 where the source is black or white and the rendering
+    /// lies beyond it, because the output is clamped.
     pub(crate) fn residual(&self, x: usize, y: usize, channels: usize) -> [f32; 4] {
         let tile = y / TILE_HEIGHT * self.bins.columns() + x / TILE_WIDTH;
         let mut residual = [0.0; 4];
@@ -227,7 +228,7 @@ impl Pass {
                 let splats = &bins.splats(row, splats);
                 let mut states = Vec::new();
                 slots.fill(Slot::default());
-                *error = 0.0;
+                *error = RenderingError::default();
                 for (column, residual) in residuals.chunks_exact_mut(CHANNELS).enumerate() {
                     let indices = tiles.splats(column);
                     let tile = TrainingTile::<CHANNELS> {
@@ -236,13 +237,14 @@ impl Pass {
                         columns: TILE_WIDTH.min(raster.width - column * TILE_WIDTH),
                         rows: TILE_HEIGHT.min(raster.height - row * TILE_HEIGHT),
                         target: raster.tile(row * bins.columns() + column),
+                        sensitivity: raster.sensitivity.as_ref(),
                         base,
                         splats,
                         indices,
                     };
                     states.resize(indices.len(), [[0.0; TILE_WIDTH]; TILE_HEIGHT]);
                     let residual = residual.try_into().expect("a tile has all channels");
-                    *error += tile.run(level, kernel, &mut states, slots, residual);
+                    *error = *error + tile.run(level, kernel, &mut states, slots, residual);
                 }
             });
         }

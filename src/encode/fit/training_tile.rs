@@ -2,7 +2,9 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
+use crate::encode::distortion::differentiate;
 use crate::encode::raster::{FULL_SCALE, SamplePlane, TILE_WIDTH, TilePlane, centers};
+use crate::encode::sensitivity::Sensitivity;
 use crate::kernel::Kernel;
 use crate::render::simd_kernel;
 use crate::render::splat::Splat;
@@ -51,6 +53,27 @@ impl TrainingKernel for simd_kernel::Quartic {
     }
 }
 
+/// The error of a rendering, where a full sample is 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct RenderingError {
+    /// The sum of squared errors over all samples, clamped as in the output.
+    pub(crate) squared: f64,
+    /// What training minimizes: the sum of squared errors, weighted by the eye's sensitivity if the
+    /// encoder is tuned for it.
+    pub(crate) distortion: f64,
+}
+
+impl core::ops::Add for RenderingError {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            squared: self.squared + other.squared,
+            distortion: self.distortion + other.distortion,
+        }
+    }
+}
+
 /// One tile of the pass.
 pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     /// Column and row of its first pixel.
@@ -60,6 +83,8 @@ pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     pub(super) columns: usize,
     pub(super) rows: usize,
     pub(super) target: &'a [SamplePlane; CHANNELS],
+    /// How much errors count; `None` if all count the same.
+    pub(super) sensitivity: Option<&'a Sensitivity>,
     /// The base colour.
     pub(super) base: [f32; 4],
     /// The splats of the row of tiles.
@@ -69,11 +94,11 @@ pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
 }
 
 impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
-    /// Forward pass, residuals, backward pass. Returns the sum of squared errors.
+    /// Forward pass, residuals, backward pass. Returns the error.
     ///
     /// `states` is scratch memory with one plane for each splat of the tile. The gradient sums are
     /// added to `slots`, which has [`slots_per_span`] slots for each of `splats`. `planes` receives
-    /// the residuals.
+    /// half the gradient of the distortion by the samples of the rendering.
     pub(super) fn run(
         &self,
         level: Level,
@@ -81,7 +106,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
         states: &mut [TilePlane],
         slots: &mut [Slot],
         planes: &mut [TilePlane; CHANNELS],
-    ) -> f64 {
+    ) -> RenderingError {
         match kernel {
             Kernel::Exponential { cutoff } => {
                 let kernel = simd_kernel::Exponential { cutoff };
@@ -102,7 +127,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
         states: &mut [TilePlane],
         slots: &mut [Slot],
         planes: &mut [TilePlane; CHANNELS],
-    ) -> f64 {
+    ) -> RenderingError {
         let px = centers(simd, self.x);
         let py: [f32; TILE_HEIGHT] =
             core::array::from_fn(|row| (self.y as usize + row) as f32 + 0.5);
@@ -125,6 +150,10 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
             }
         }
         let squared = self.residual(simd, planes);
+        let distortion = self.sensitivity.map_or(squared, |sensitivity| {
+            let corner = [self.x as usize, self.y as usize];
+            differentiate(sensitivity, corner, [self.columns, self.rows], planes)
+        });
         for (&index, state) in self.indices.iter().zip(states) {
             let splat = &self.splats[index as usize];
             let zero = f32x16::splat(simd, 0.0);
@@ -158,7 +187,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
                 *slot = core::array::from_fn(|lane| slot[lane] + sums[lane]);
             }
         }
-        squared
+        RenderingError { squared, distortion }
     }
 
     /// Turns the rendering in `planes` into residuals; returns the sum of squared errors.

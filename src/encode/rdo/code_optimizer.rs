@@ -47,7 +47,8 @@ impl<'a> CodeOptimizer<'a> {
     pub(super) fn rounded(&self, gaussians: &[Gaussian], step: f64) -> LatticeCodes {
         let lattice = rate_model::lattice(step, self.model);
         let codes = gaussians.par_iter().map(|gaussian| {
-            let class = rate_model::class_of(gaussian, &lattice, self.model);
+            let sensitivity = self.raster.sensitivity_near(gaussian.center);
+            let class = rate_model::class_of(gaussian, sensitivity, &lattice, self.model);
             lattice.code(gaussian, class, &self.grid, self.model)
         });
         let codes = codes.collect();
@@ -127,6 +128,10 @@ impl<'a> CodeOptimizer<'a> {
             let options = RenderOptions::new().with_region(region);
             rendering.render_planes(&options, &mut planes).expect("there are no limits");
             residuals.set(self.raster, region.y as usize, &planes);
+        }
+        if let Some(sensitivity) = &self.raster.sensitivity {
+            observer.poll()?;
+            residuals.shift(sensitivity);
         }
         observer.poll()
     }

@@ -190,6 +190,7 @@ impl CoordinateDescent<'_> {
         let amplitudes = code.color.iter().zip(&lattice.color);
         let squared_strength: f32 =
             amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
+        let squared_strength = squared_strength * gradient.sensitivity;
         let recolored = self.with_best_colors(&gradient.change, code, context.costs);
         let error = gradient.change.with_color(recolored.color, lattice.color_units(&recolored));
         let mut found = Vec::new();

@@ -7,9 +7,12 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, Lanes};
-use crate::encode::raster::Raster;
+use crate::encode::distortion::differentiate;
+use crate::encode::raster::{Raster, TILE_WIDTH};
+use crate::encode::sensitivity::{BLOCK, Sensitivity};
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
+use crate::render::tile_grid::TILE_HEIGHT;
 
 /// Rows that one task changes.
 const BAND: usize = 64;
@@ -17,7 +20,12 @@ const BAND: usize = 64;
 /// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
 
-/// The residuals of a picture, rendering minus source, before the rendering is clamped.
+/// The residuals of a picture, rendering minus source, before the rendering is clamped, and how much
+/// their squares count.
+///
+/// The descent minimizes the sum of squared residuals, each times the sensitivity of its pixel. The
+/// distortion counts the means of blocks too: [`Residuals::shift`] moves the residuals such that the
+/// gradient of that sum is the gradient of the distortion.
 #[derive(Debug)]
 pub(crate) struct Residuals {
     width: usize,
@@ -28,6 +36,8 @@ pub(crate) struct Residuals {
     /// Whether positive or negative residuals are ignored, because the output is clamped; in the
     /// layout of `residuals`.
     ignored: Vec<u8>,
+    /// The sensitivities of pixels, padded as `residuals`; one line for each row of blocks.
+    sensitivities: Vec<f32>,
     stride: usize,
     level: Level,
 }
@@ -82,8 +92,17 @@ impl Residuals {
                 };
             }
         });
+        let mut sensitivities = vec![1.0; stride * height.div_ceil(BLOCK)];
+        if let Some(sensitivity) = &raster.sensitivity {
+            for (row, line) in sensitivities.chunks_exact_mut(stride).enumerate() {
+                for (x, value) in line[..width].iter_mut().enumerate() {
+                    *value = sensitivity.at(x, row * BLOCK);
+                }
+            }
+        }
         let residuals = vec![0.0; ignored.len()];
-        Self { width, height, channels, residuals, ignored, stride, level: Level::new() }
+        let level = Level::new();
+        Self { width, height, channels, residuals, ignored, sensitivities, stride, level }
     }
 
     /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
@@ -101,11 +120,68 @@ impl Residuals {
         });
     }
 
+    /// Moves every residual such that, times its sensitivity, it is half the gradient of the
+    /// distortion.
+    pub(crate) fn shift(&mut self, sensitivity: &Sensitivity) {
+        match self.channels {
+            1 => self.shift_of::<1>(sensitivity),
+            2 => self.shift_of::<2>(sensitivity),
+            3 => self.shift_of::<3>(sensitivity),
+            _ => self.shift_of::<4>(sensitivity),
+        }
+    }
+
+    fn shift_of<const CHANNELS: usize>(&mut self, sensitivity: &Sensitivity) {
+        let (level, stride, width) = (self.level, self.stride, self.width);
+        let band = TILE_HEIGHT * CHANNELS * stride;
+        let sensitivities = self.sensitivities.par_chunks(TILE_HEIGHT / BLOCK * stride);
+        let bands = self.residuals.par_chunks_mut(band).zip(self.ignored.par_chunks(band));
+        bands.zip(sensitivities).enumerate().for_each(|(row, ((residuals, ignored), by_pixel))| {
+            let rows = residuals.len() / (CHANNELS * stride);
+            for x in (0..width).step_by(TILE_WIDTH) {
+                let columns = TILE_WIDTH.min(width - x);
+                let at = |y: usize, channel: usize| (y * CHANNELS + channel) * stride + x;
+                let mut clamped = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+                for (channel, plane) in clamped.iter_mut().enumerate() {
+                    for (y, line) in plane.iter_mut().enumerate().take(rows) {
+                        let samples =
+                            residuals[at(y, channel)..].iter().zip(&ignored[at(y, channel)..]);
+                        for (value, (&residual, &ignored)) in
+                            line[..columns].iter_mut().zip(samples)
+                        {
+                            *value = match ignored {
+                                IGNORE_NEGATIVE => residual.max(0.0),
+                                IGNORE_POSITIVE => residual.min(0.0),
+                                _ => residual,
+                            };
+                        }
+                    }
+                }
+                let mut gradients = clamped;
+                let corner = [x, row * TILE_HEIGHT];
+                dispatch!(level, _ => {
+                    differentiate(sensitivity, corner, [columns, rows], &mut gradients)
+                });
+                for channel in 0..CHANNELS {
+                    for y in 0..rows {
+                        let residuals = &mut residuals[at(y, channel)..][..columns];
+                        let by_pixel = &by_pixel[y / BLOCK * stride + x..];
+                        for (column, residual) in residuals.iter_mut().enumerate() {
+                            let shifted = gradients[channel][y][column] / by_pixel[column];
+                            *residual += shifted - clamped[channel][y][column];
+                        }
+                    }
+                }
+            }
+        });
+    }
+
     /// Size in bytes of the residuals of a source, and of the windows of one batch of Gaussians,
     /// which do not overlap.
     pub(crate) fn memory(raster: &Raster) -> usize {
         let samples = (raster.width + LANES) * raster.height * raster.channels;
         samples * (2 * size_of::<f32>() + size_of::<u8>())
+            + (raster.width + LANES) * raster.height.div_ceil(BLOCK) * size_of::<f32>()
     }
 
     pub(crate) fn width(&self) -> usize {
@@ -180,6 +256,12 @@ impl Residuals {
         let ignored = self.ignored[at..at + LANES].try_into();
         (residuals.expect("whole vectors"), ignored.expect("whole vectors"))
     }
+
+    /// The sensitivities of the sixteen pixels of a row from column x on.
+    pub(crate) fn sensitivities(&self, x: usize, y: usize) -> &Lanes {
+        let at = y / BLOCK * self.stride + x;
+        self.sensitivities[at..at + LANES].try_into().expect("whole vectors")
+    }
 }
 
 /// Adds a Gaussian of one colour to the vectors of a span of a row of one channel. The span is
@@ -201,5 +283,63 @@ fn draw<S: Simd>(
         let residuals: &mut Lanes =
             (&mut residuals[x..x + LANES]).try_into().expect("whole vectors");
         (f32x16::load_array_ref(simd, residuals) + weight * color).store_array(residuals);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::distortion::plain_distortion;
+    use crate::encode::options::Tune;
+    use crate::encode::source::Source;
+
+    #[test]
+    fn shifted_residuals_have_the_gradient_of_the_distortion() {
+        let (width, height) = (TILE_WIDTH + 5, 2 * TILE_HEIGHT + 3);
+        let mut rng = fastrand::Rng::with_seed(5);
+        for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
+            let channels = model.channels();
+            let samples: Vec<u8> =
+                (0..width * height * channels).map(|_| rng.u8(..).saturating_mul(2)).collect();
+            let source = Source::new_u8(width as u32, height as u32, model, &samples)
+                .expect("the sizes agree");
+            let raster = Raster::new(&source, Tune::Visual);
+            let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
+            let mut residuals = Residuals::new(&raster);
+            residuals.set(&raster, 0, &rendering);
+            let sensitivity = raster.sensitivity.as_ref().expect("it is tuned");
+            residuals.shift(sensitivity);
+
+            let mut plain: Vec<f64> = (0..samples.len())
+                .map(|at| {
+                    let value = rendering[at % channels * width * height + at / channels];
+                    let residual = f64::from(value) - f64::from(samples[at]) / 255.0;
+                    match samples[at] {
+                        0 => residual.max(0.0),
+                        255 => residual.min(0.0),
+                        _ => residual,
+                    }
+                })
+                .collect();
+            for at in 0..plain.len() {
+                let (pixel, channel) = (at / channels, at % channels);
+                let (x, y) = (pixel % width, pixel / width);
+                if plain[at] == 0.0 {
+                    // Where the residual is ignored, so is its shift.
+                    continue;
+                }
+                let here = plain[at];
+                let mut with = |residual: f64| {
+                    plain[at] = residual;
+                    plain_distortion(sensitivity, [width, height], &plain)
+                };
+                let half = (with(here + 0.1) - with(here - 0.1)) / 0.4;
+                with(here);
+                let (lanes, _) = residuals.vector(x, y, channel);
+                let found = f64::from(lanes[0]) * f64::from(residuals.sensitivities(x, y)[0]);
+                assert!((found - half).abs() < 1e-4, "{model:?} {at}: {found}, {half}");
+            }
+        }
     }
 }

@@ -61,15 +61,15 @@ impl<'a> TargetSearch<'a> {
         Self { source, raster, layout, passes, codes: CodeOptimizer::new(raster, layout) }
     }
 
-    /// The codes of `gaussians`, whose rendering has the squared error `error`, for a target.
+    /// The codes of `gaussians`, whose rendering has this distortion, for a target.
     pub(crate) fn run(
         &self,
         gaussians: &[Gaussian],
-        error: f64,
+        distortion: f64,
         target: Target,
         observer: &mut Observer<'_>,
     ) -> Result<LatticeCodes, EncodeError> {
-        let step = rate_model::step_for(error, gaussians.len());
+        let step = rate_model::step_for(distortion, gaussians.len());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let mut coded = self.codes.rounded(gaussians, step);
             self.codes.descend(&mut coded, 0.0, self.passes, observer)?;

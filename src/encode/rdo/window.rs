@@ -1,4 +1,5 @@
-//! The residuals around one Gaussian, and how their squared error depends on it.
+//! The residuals around one Gaussian, and how the error, the sum of their squares times their
+//! sensitivities, depends on it.
 
 use core::ops::Range;
 
@@ -23,17 +24,20 @@ pub(crate) struct Window {
     residuals: Vec<Lanes>,
     /// In the layout of `residuals`; empty if no residuals are ignored.
     masks: Vec<ClampMask>,
+    /// The sensitivities of pixels, row by row, in each row vector by vector.
+    sensitivities: Vec<Lanes>,
     level: Option<Level>,
 }
 
-/// How much a Gaussian changes the squared error of its window, and the derivatives by its colour.
+/// How much a Gaussian changes the error of its window, and the derivatives by its colour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorChange {
-    /// The sum of squared errors with the Gaussian, minus that without it.
+    /// The error with the Gaussian, minus that without it.
     pub(crate) error: f32,
     /// Half of the derivative of `error` by the amplitude along each colour axis.
     pub(crate) by_axis: [f32; 4],
-    /// The sum of squared weights, which is half of the second derivative by each amplitude.
+    /// The sum of squared weights times sensitivities, which is half of the second derivative by each
+    /// amplitude.
     pub(crate) squared_weights: f32,
     /// The Gaussian's amplitudes along the colour axes.
     amplitudes: [f32; 4],
@@ -60,6 +64,8 @@ pub(crate) struct ErrorGradient {
     pub(crate) change: ErrorChange,
     /// The derivatives by the components of a [`GeometryChange`].
     pub(crate) by_geometry: GeometryChange,
+    /// The mean sensitivity of the pixels, each weighted by the squared weight of the Gaussian.
+    pub(crate) sensitivity: f32,
 }
 
 impl Window {
@@ -76,11 +82,12 @@ impl Window {
         self.residuals.clear();
         self.residuals.reserve_exact(length);
         self.masks.clear();
-        let lines = rows.flat_map(|y| (0..vectors).map(move |vector| (y, vector)));
-        let parts = lines.flat_map(|(y, vector)| {
-            let x = columns.start + vector * LANES;
-            (0..channels).map(move |channel| residuals.vector(x, y, channel))
-        });
+        let vectors =
+            rows.flat_map(|y| (0..vectors).map(move |vector| (columns.start + vector * LANES, y)));
+        self.sensitivities.clear();
+        self.sensitivities.extend(vectors.clone().map(|(x, y)| *residuals.sensitivities(x, y)));
+        let parts = vectors
+            .flat_map(|(x, y)| (0..channels).map(move |channel| residuals.vector(x, y, channel)));
         let mut is_clamped = false;
         for (residuals, ignored) in parts.clone() {
             self.residuals.push(*residuals);
@@ -156,11 +163,14 @@ impl Window {
             let y = self.corner[1] + row;
             let span = weights.span(self.corner[0], y, vectors);
             let x = self.corner[0] + span.start * LANES;
-            for (index, residuals) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
+            let lines =
+                self.line::<CHANNELS>(row, &span).iter().zip(self.sensitivities(row, &span));
+            for (index, (residuals, sensitivities)) in lines.enumerate() {
                 let weight = weights.at(simd, x + index * LANES, y);
-                squares += weight * weight;
+                let counted = weight * f32x16::load_array_ref(simd, sensitivities);
+                squares += counted * weight;
                 for (product, residuals) in products.iter_mut().zip(residuals) {
-                    *product += weight * f32x16::load_array_ref(simd, residuals);
+                    *product += counted * f32x16::load_array_ref(simd, residuals);
                 }
             }
         }
@@ -191,17 +201,19 @@ impl Window {
             let x = self.corner[0] + span.start * LANES;
             let lines =
                 self.line::<CHANNELS>(row, &span).iter().zip(self.masks::<CHANNELS>(row, &span));
-            for (index, (residuals, masks)) in lines.enumerate() {
+            let lines = lines.zip(self.sensitivities(row, &span));
+            for (index, ((residuals, masks), sensitivities)) in lines.enumerate() {
                 let weight = weights.at(simd, x + index * LANES, y);
+                let sensitivity = f32x16::load_array_ref(simd, sensitivities);
                 for channel in 0..CHANNELS {
                     let without = f32x16::load_array_ref(simd, &residuals[channel]);
                     let with = without + weight * gaussian.color[channel];
                     let clamped = masks[channel].clamped(simd, with);
                     let before = masks[channel].clamped(simd, without);
-                    change += clamped * clamped - before * before;
-                    products[channel] += weight * clamped;
+                    change += (clamped * clamped - before * before) * sensitivity;
+                    products[channel] += weight * sensitivity * clamped;
                     let counts = clamped.simd_eq(with);
-                    squares += counts.select(weight * weight, zero);
+                    squares += counts.select(weight * sensitivity * weight, zero);
                 }
             }
         }
@@ -216,16 +228,16 @@ impl Window {
         }
     }
 
-    /// The derivatives of the squared error by a Gaussian that is part of the rendering.
+    /// The derivatives of the error by a Gaussian that is part of the rendering.
     pub(crate) fn gradient(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorGradient {
         let level = self.level.unwrap_or_else(Level::new);
-        let (sums, by_geometry) = match self.channels {
+        let (sums, by_geometry, sensitivity) = match self.channels {
             1 => dispatch!(level, simd => self.gradient_with::<_, 1>(simd, gaussian)),
             2 => dispatch!(level, simd => self.gradient_with::<_, 2>(simd, gaussian)),
             3 => dispatch!(level, simd => self.gradient_with::<_, 3>(simd, gaussian)),
             _ => dispatch!(level, simd => self.gradient_with::<_, 4>(simd, gaussian)),
         };
-        ErrorGradient { change: sums.change(gaussian, model), by_geometry }
+        ErrorGradient { change: sums.change(gaussian, model), by_geometry, sensitivity }
     }
 
     /// [`Window::gradient`] for a number of channels.
@@ -234,37 +246,44 @@ impl Window {
         &self,
         simd: S,
         gaussian: &Gaussian,
-    ) -> (WindowSums, GeometryChange) {
+    ) -> (WindowSums, GeometryChange, f32) {
         let weights = KernelWeights::new(gaussian);
         let [vectors, rows] = self.size;
         let zero = f32x16::splat(simd, 0.0);
         let (mut squares, mut products) = (zero, [zero; CHANNELS]);
         let (mut first, mut second) = ([zero; 2], [zero; 3]);
+        let (mut all, mut all_counted) = (zero, zero);
         for row in 0..rows {
             let y = self.corner[1] + row;
             let span = weights.span(self.corner[0], y, vectors);
             let x = self.corner[0] + span.start * LANES;
             let masks = self.masks::<CHANNELS>(row, &span);
-            for (index, residuals) in self.line::<CHANNELS>(row, &span).iter().enumerate() {
+            let lines =
+                self.line::<CHANNELS>(row, &span).iter().zip(self.sensitivities(row, &span));
+            for (index, (residuals, sensitivities)) in lines.enumerate() {
                 let [u, v] = weights.local(simd, x + index * LANES, y);
                 let root = kernel_root(simd, [u, v]);
                 let weight = root * root;
-                let mut square = weight * weight;
+                let sensitivity = f32x16::load_array_ref(simd, sensitivities);
+                let counted = weight * sensitivity;
+                let mut square = counted * weight;
+                all += weight * weight;
+                all_counted += square;
                 let mut along = zero;
                 for channel in 0..CHANNELS {
                     let mut residual = f32x16::load_array_ref(simd, &residuals[channel]);
                     if let Some(masks) = masks.get(index) {
                         let clamped = masks[channel].clamped(simd, residual);
                         let counts = clamped.simd_eq(residual);
-                        square -= counts.select(zero, weight * weight * (1.0 / CHANNELS as f32));
+                        square -= counts.select(zero, counted * weight * (1.0 / CHANNELS as f32));
                         residual = clamped;
                     }
-                    products[channel] += weight * residual;
+                    products[channel] += counted * residual;
                     along += residual * gaussian.color[channel];
                 }
                 squares += square;
                 // dweight/dq = -root / 2, and q = u^2 + v^2.
-                let slope = along * root;
+                let slope = along * sensitivity * root;
                 let (by_u, by_v) = (slope * u, slope * v);
                 first[0] += by_u;
                 first[1] += by_v;
@@ -286,7 +305,18 @@ impl Window {
             second: second.map(lane_sum),
             weighted,
         };
-        (sums, geometry.gradient(gaussian))
+        // Without any weight in the picture, nothing depends on it.
+        let all = lane_sum(all);
+        let sensitivity = if all > 0.0 { lane_sum(all_counted) / all } else { 1.0 };
+        (sums, geometry.gradient(gaussian), sensitivity)
+    }
+
+    /// The sensitivities of a span of a row.
+    #[inline(always)]
+    fn sensitivities(&self, row: usize, span: &Range<usize>) -> &[Lanes] {
+        self.sensitivities[row * self.size[0]..][..self.size[0]]
+            .get(span.clone())
+            .unwrap_or_default()
     }
 
     /// The residuals of a span of a row.

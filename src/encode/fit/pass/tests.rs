@@ -6,7 +6,9 @@ use glam::Vec3;
 
 use super::*;
 use crate::color::ColorModel;
+use crate::encode::distortion::plain_distortion;
 use crate::encode::fit::parameterization;
+use crate::encode::options::Tune;
 use crate::encode::source::Source;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::testing::simd_levels;
@@ -18,22 +20,29 @@ const PARAMETERIZATIONS: [Parameterization; 3] =
     [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
 /// Runs a pass with an observer that never cancels.
-fn run(pass: &mut Pass, raster: &Raster, splats: &[Splat], kernel: Kernel, base: [f32; 4]) -> f64 {
+fn run(
+    pass: &mut Pass,
+    raster: &Raster,
+    splats: &[Splat],
+    kernel: Kernel,
+    base: [f32; 4],
+) -> RenderingError {
     let mut silent = |_: &_| ControlFlow::Continue(());
     let mut observer = Observer::new(&mut silent, 0);
     pass.bin(raster, splats, kernel);
     pass.run(raster, splats, kernel, base, &mut observer).expect("not cancelled")
 }
 
-/// Half the sum of squared residuals in f64, directly from the formulas of the paper.
+/// Half the distortion in f64, directly from the formulas of the paper.
 fn loss(
     rows: &[[f64; MAX_COMPONENTS]],
     parameterization: Parameterization,
     kernel: Kernel,
     source: &Source<'_>,
+    raster: &Raster,
 ) -> f64 {
     let channels = source.color().channels();
-    let mut loss = 0.0;
+    let mut residuals = Vec::new();
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
             let mut sums = BASE.map(f64::from);
@@ -67,11 +76,16 @@ fn loss(
             for (channel, sum) in sums[..channels].iter().enumerate() {
                 let index = (y * WIDTH + x) as usize * channels + channel;
                 let sample = f64::from(source.wide_sample(index)) / 65535.0;
-                loss += 0.5 * (sum - sample).powi(2);
+                residuals.push(sum - sample);
             }
         }
     }
-    loss
+    let size = [WIDTH as usize, HEIGHT as usize];
+    let distortion = match &raster.sensitivity {
+        Some(sensitivity) => plain_distortion(sensitivity, size, &residuals),
+        None => residuals.iter().map(|residual| residual * residual).sum(),
+    };
+    0.5 * distortion
 }
 
 /// Gaussians of many shapes: round, rotated, very elongated, and across the border of the picture.
@@ -140,9 +154,9 @@ fn every_gradient_equals_its_finite_difference() {
     // that the discontinuity there is below the resolution of f32.
     let kernels = [Kernel::Quartic, Kernel::Exponential { cutoff: 40.0 }];
     let colors = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
-    for (parameterization, kernel) in
-        PARAMETERIZATIONS.into_iter().flat_map(|c| kernels.map(|k| (c, k)))
-    {
+    let cases = PARAMETERIZATIONS.into_iter().flat_map(|c| kernels.map(|k| (c, k, Tune::Psnr)));
+    let visual = (Parameterization::Cholesky, Kernel::Quartic, Tune::Visual);
+    for (parameterization, kernel, tune) in cases.chain([visual]) {
         for color in colors {
             let channels = color.channels();
             let samples: Vec<u8> =
@@ -150,14 +164,15 @@ fn every_gradient_equals_its_finite_difference() {
             let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
             let rows = scene(parameterization, channels, &mut rng);
             let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
-            let found = gradients(&rows, parameterization, kernel, &Raster::new(&source));
+            let raster = Raster::new(&source, tune);
+            let found = gradients(&rows, parameterization, kernel, &raster);
             for (index, found) in found.iter().enumerate() {
                 for component in 0..5 + channels {
                     let step = 1e-5 * exact[index][component].abs().max(1.0);
                     let moved = |by: f64| {
                         let mut rows = exact.clone();
                         rows[index][component] += by;
-                        loss(&rows, parameterization, kernel, &source)
+                        loss(&rows, parameterization, kernel, &source, &raster)
                     };
                     let expected = (moved(step) - moved(-step)) / (2.0 * step);
                     let error = (f64::from(found[component]) - expected).abs();
@@ -165,8 +180,8 @@ fn every_gradient_equals_its_finite_difference() {
                     let error = error / (expected.abs() + 0.1);
                     assert!(
                         error <= 2e-3,
-                        "{parameterization:?} {kernel:?} {color:?}, Gaussian {index}, component \
-                         {component}: {} against {expected}",
+                        "{parameterization:?} {kernel:?} {tune:?} {color:?}, Gaussian {index}, \
+                         component {component}: {} against {expected}",
                         found[component]
                     );
                 }
@@ -180,7 +195,6 @@ fn every_simd_level_gives_the_same_bits() {
     let mut rng = fastrand::Rng::with_seed(2);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
-    let raster = Raster::new(&source);
     let rows = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats: Vec<_> = rows
         .iter()
@@ -188,27 +202,33 @@ fn every_simd_level_gives_the_same_bits() {
             Splat::new(&Gaussian::from_components(&row[..8], Parameterization::Cholesky))
         })
         .collect();
-    let run = |level| {
-        let mut pass = Pass { level, ..Pass::new(&raster) };
-        let error = run(&mut pass, &raster, &splats, Kernel::Quartic, BASE);
+    let run = |level, raster: &Raster| {
+        let mut pass = Pass { level, ..Pass::new(raster) };
+        let error = run(&mut pass, raster, &splats, Kernel::Quartic, BASE);
         let gradients = (0..splats.len()).map(|splat| pass.gradient(splat, 3));
         (error, gradients.collect())
     };
-    let bits = |(error, gradients): (f64, Vec<SplatGradient>)| -> Vec<u64> {
+    let bits = |(error, gradients): (RenderingError, Vec<SplatGradient>)| -> Vec<u64> {
         let gradients = gradients.iter().flat_map(|gradient| {
             let GeometrySums { first, second } = gradient.geometry;
             first.into_iter().chain(second).chain(gradient.color).map(f32::to_bits)
         });
-        gradients.map(u64::from).chain([error.to_bits()]).collect()
+        gradients
+            .map(u64::from)
+            .chain([error.squared, error.distortion].map(f64::to_bits))
+            .collect()
     };
-    let expected = run(Level::baseline());
-    assert!(expected.0 > 0.0);
-    let expected = bits(expected);
-    for (name, level) in simd_levels() {
-        let found = bits(run(level));
-        assert_eq!(found.len(), expected.len(), "{name}");
-        let differing = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
-        assert_eq!(differing, 0, "{name}: of {} values", expected.len());
+    for tune in [Tune::Visual, Tune::Psnr] {
+        let raster = Raster::new(&source, tune);
+        let expected = run(Level::baseline(), &raster);
+        assert!(expected.0.squared > 0.0 && expected.0.distortion > 0.0);
+        let expected = bits(expected);
+        for (name, level) in simd_levels() {
+            let found = bits(run(level, &raster));
+            assert_eq!(found.len(), expected.len(), "{tune:?} {name}");
+            let differing = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
+            assert_eq!(differing, 0, "{tune:?} {name}: of {} values", expected.len());
+        }
     }
 }
 
@@ -216,12 +236,12 @@ fn every_simd_level_gives_the_same_bits() {
 fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let white = [255; 5 * 3 * 3];
     let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
-    let raster = Raster::new(&source);
+    let raster = Raster::new(&source, Tune::Visual);
     let gaussian =
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
     let mut pass = Pass::new(&raster);
     let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
-    assert_eq!(error, 0.0);
+    assert_eq!(error, RenderingError::default());
     assert_eq!(pass.gradient(0, 3), SplatGradient::default());
 }

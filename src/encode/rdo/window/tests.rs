@@ -2,17 +2,28 @@
 
 use super::*;
 use crate::color::ColorModel;
+use crate::encode::options::Tune;
 use crate::encode::raster::Raster;
 use crate::encode::source::Source;
 
 const WIDTH: usize = 45;
 const HEIGHT: usize = 37;
 
-/// A random source and a random rendering of it. If `clamped`, the source has black and white
-/// samples.
-fn scene(channels: usize, clamped: bool) -> (Vec<u8>, Vec<f32>) {
+/// A source and a rendering of it.
+struct Scene {
+    model: ColorModel,
+    source: Vec<u8>,
+    /// Plane after plane.
+    rendering: Vec<f32>,
+    raster: Raster,
+}
+
+/// A random source, with even ground on the left, and a random rendering of it. If `clamped`, the
+/// source has black and white samples.
+fn scene(model: ColorModel, clamped: bool) -> Scene {
+    let channels = model.channels();
     let mut random = fastrand::Rng::with_seed(3);
-    let source = (0..WIDTH * HEIGHT * channels)
+    let mut source: Vec<u8> = (0..WIDTH * HEIGHT * channels)
         .map(|_| match random.u8(..) {
             value @ (0..40 | 216..) if clamped => {
                 if value < 40 {
@@ -24,8 +35,16 @@ fn scene(channels: usize, clamped: bool) -> (Vec<u8>, Vec<f32>) {
             value => value.clamp(1, 254),
         })
         .collect();
+    for (at, sample) in source.iter_mut().enumerate() {
+        if at / channels % WIDTH < WIDTH / 3 && (1..255).contains(sample) {
+            *sample = 128;
+        }
+    }
     let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
-    (source, rendering)
+    let size = [WIDTH, HEIGHT].map(|length| length as u32);
+    let of_raster = Source::new_u8(size[0], size[1], model, &source).expect("the sizes agree");
+    let raster = Raster::new(&of_raster, Tune::Visual);
+    Scene { model, source, rendering, raster }
 }
 
 fn gaussians() -> Vec<Gaussian> {
@@ -47,36 +66,40 @@ fn plain_weight(gaussian: &Gaussian, pixel: usize) -> f64 {
     (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
 }
 
-/// The sum of squared errors in f64 with a Gaussian, times `factor`, added to the rendering.
-fn plain_error(
-    (source, rendering): &(Vec<u8>, Vec<f32>),
-    channels: usize,
-    gaussian: &Gaussian,
-    factor: f64,
-) -> f64 {
-    let mut sum = 0.0;
-    for (at, &sample) in source.iter().enumerate() {
+/// The residuals in f64 with a Gaussian, times `factor`, added to the rendering, in interleaved
+/// order.
+fn plain_residuals(scene: &Scene, gaussian: &Gaussian, factor: f64) -> Vec<f64> {
+    let channels = scene.model.channels();
+    let samples = scene.source.iter().enumerate();
+    let residuals = samples.map(|(at, &sample)| {
         let (pixel, channel) = (at / channels, at % channels);
         let weight = plain_weight(gaussian, pixel);
-        let value = f64::from(rendering[channel * WIDTH * HEIGHT + pixel])
+        let value = f64::from(scene.rendering[channel * WIDTH * HEIGHT + pixel])
             + factor * weight * f64::from(gaussian.color[channel]);
-        let error = value - f64::from(sample) / 255.0;
-        let counts = match sample {
-            0 => error.max(0.0),
-            255 => error.min(0.0),
-            _ => error,
-        };
-        sum += counts * counts;
-    }
-    sum
+        let residual = value - f64::from(sample) / 255.0;
+        match sample {
+            0 => residual.max(0.0),
+            255 => residual.min(0.0),
+            _ => residual,
+        }
+    });
+    residuals.collect()
 }
 
-fn residuals((source, rendering): &(Vec<u8>, Vec<f32>), model: ColorModel) -> Residuals {
-    let source =
-        Source::new_u8(WIDTH as u32, HEIGHT as u32, model, source).expect("the sizes agree");
-    let raster = Raster::new(&source);
-    let mut residuals = Residuals::new(&raster);
-    residuals.set(&raster, 0, rendering);
+/// The error in f64 with a Gaussian, times `factor`, added to the rendering.
+fn plain_error(scene: &Scene, gaussian: &Gaussian, factor: f64) -> f64 {
+    let residuals = plain_residuals(scene, gaussian, factor);
+    let terms = residuals.iter().enumerate().map(|(at, residual)| {
+        let pixel = at / scene.model.channels();
+        let sensitivity = scene.raster.sensitivity(pixel % WIDTH, pixel / WIDTH);
+        f64::from(sensitivity) * residual * residual
+    });
+    terms.sum()
+}
+
+fn residuals(scene: &Scene) -> Residuals {
+    let mut residuals = Residuals::new(&scene.raster);
+    residuals.set(&scene.raster, 0, &scene.rendering);
     residuals
 }
 
@@ -87,16 +110,15 @@ const MODELS: [ColorModel; 4] =
 fn changes_are_those_of_the_plain_error() {
     for model in MODELS {
         for clamped in [false, true] {
-            let scene = scene(model.channels(), clamped);
-            let residuals = residuals(&scene, model);
+            let scene = scene(model, clamped);
+            let residuals = residuals(&scene);
             for gaussian in gaussians() {
                 let mut window = Window::default();
                 assert!(window.load(&residuals, &gaussian));
                 window.remove(&gaussian);
                 let found = f64::from(window.change(&gaussian, model).error);
-                let channels = model.channels();
-                let without = plain_error(&scene, channels, &gaussian, -1.0);
-                let with = plain_error(&scene, channels, &gaussian, 0.0);
+                let without = plain_error(&scene, &gaussian, -1.0);
+                let with = plain_error(&scene, &gaussian, 0.0);
                 let error = (found - (with - without)).abs();
                 assert!(
                     error < 1e-4 * with,
@@ -111,8 +133,8 @@ fn changes_are_those_of_the_plain_error() {
 fn gradients_are_those_of_the_plain_error() {
     for model in MODELS {
         for clamped in [false, true] {
-            let scene = scene(model.channels(), clamped);
-            let residuals = residuals(&scene, model);
+            let scene = scene(model, clamped);
+            let residuals = residuals(&scene);
             for gaussian in gaussians() {
                 let mut window = Window::default();
                 assert!(window.load(&residuals, &gaussian));
@@ -126,7 +148,7 @@ fn gradients_are_those_of_the_plain_error() {
                     (gradient.slant, GeometryChange { slant: 1.0, ..none }),
                 ];
                 for (found, direction) in directions {
-                    let expected = derivative(&scene, model.channels(), &gaussian, &direction);
+                    let expected = derivative(&scene, &gaussian, &direction);
                     let error = (f64::from(found) - expected).abs();
                     assert!(
                         error < 2e-2 + 1e-2 * expected.abs(),
@@ -138,16 +160,9 @@ fn gradients_are_those_of_the_plain_error() {
     }
 }
 
-/// The derivative of the sum of squared errors along a direction, by a central difference.
-fn derivative(
-    scene: &(Vec<u8>, Vec<f32>),
-    channels: usize,
-    gaussian: &Gaussian,
-    direction: &GeometryChange,
-) -> f64 {
+/// The derivative of the error along a direction, by a central difference.
+fn derivative(scene: &Scene, gaussian: &Gaussian, direction: &GeometryChange) -> f64 {
     const STEP: f32 = 1e-3;
-    // The Gaussian is part of the rendering, where the changed one replaces it.
-    let mut without = scene.clone();
     let present = *gaussian;
     let at = |step: f32| {
         let change = GeometryChange {
@@ -158,25 +173,27 @@ fn derivative(
         };
         change.applied(&present)
     };
-    subtract(&mut without.1, channels, gaussian);
-    let ends = [STEP, -STEP].map(|step| plain_error(&without, channels, &at(step), 1.0));
+    // The Gaussian is part of the rendering, where the changed one replaces it.
+    let without = without(scene, gaussian);
+    let ends = [STEP, -STEP].map(|step| plain_error(&without, &at(step), 1.0));
     (ends[0] - ends[1]) / f64::from(2.0 * STEP)
 }
 
-/// Removes a Gaussian from a rendering.
-fn subtract(rendering: &mut [f32], channels: usize, gaussian: &Gaussian) {
-    for channel in 0..channels {
-        for pixel in 0..WIDTH * HEIGHT {
-            let weight = plain_weight(gaussian, pixel);
-            rendering[channel * WIDTH * HEIGHT + pixel] -= weight as f32 * gaussian.color[channel];
+/// A scene whose rendering is without a Gaussian.
+fn without(scene: &Scene, gaussian: &Gaussian) -> Scene {
+    let mut without = self::scene(scene.model, scene.source.contains(&0));
+    for (channel, plane) in without.rendering.chunks_exact_mut(WIDTH * HEIGHT).enumerate() {
+        for (pixel, value) in plane.iter_mut().enumerate() {
+            *value -= plain_weight(gaussian, pixel) as f32 * gaussian.color[channel];
         }
     }
+    without
 }
 
 #[test]
 fn what_is_added_can_be_removed() {
-    let scene = scene(3, true);
-    let mut residuals = residuals(&scene, ColorModel::Rgb);
+    let scene = scene(ColorModel::Rgb, true);
+    let mut residuals = residuals(&scene);
     for gaussian in gaussians() {
         residuals.add(&[(gaussian, 1.0)]);
         let mut window = Window::default();
@@ -184,8 +201,7 @@ fn what_is_added_can_be_removed() {
         window.remove(&gaussian);
         let found = f64::from(window.change(&gaussian, ColorModel::Rgb).error);
         residuals.add(&[(gaussian, -1.0)]);
-        let expected =
-            plain_error(&scene, 3, &gaussian, 1.0) - plain_error(&scene, 3, &gaussian, 0.0);
+        let expected = plain_error(&scene, &gaussian, 1.0) - plain_error(&scene, &gaussian, 0.0);
         assert!((found - expected).abs() < 1e-3, "{gaussian:?}: {found}, {expected}");
     }
     let outside = Gaussian { center: [-90.0, 3.0], ..gaussians()[0] };

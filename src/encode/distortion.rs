@@ -1,0 +1,191 @@
+//! The distortion of a tile: its squared error, weighted by the eye's sensitivity.
+//!
+//! With the residual r of a sample, and the means m of luma over the blocks of each coarser scale,
+//! the distortion is the sum over all samples of s r^2, plus the sum over all pixels and coarser
+//! scales of s m^2, where s is the sensitivity on the scale. Blocks are whole: outside the picture,
+//! residuals are 0. The distortion is quadratic in the residuals.
+
+use super::raster::{TILE_WIDTH, TilePlane};
+use super::sensitivity::{BLOCK, BlockSensitivity, SCALES, Sensitivity};
+use crate::render::tile_grid::TILE_HEIGHT;
+
+/// One row of a tile.
+type Line = [f32; TILE_WIDTH];
+/// The sensitivities of the blocks of a tile, row by row.
+type TileSensitivity = [[BlockSensitivity; TILE_WIDTH / BLOCK]; TILE_HEIGHT / BLOCK];
+
+/// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
+/// distortion by them, and returns the distortion. `size` is the number of columns and rows inside
+/// the picture; residuals outside are 0, and so are their gradients.
+///
+/// The compiler turns the loops into code of the SIMD level that the caller is dispatched to.
+#[inline(always)]
+pub(crate) fn differentiate<const CHANNELS: usize>(
+    sensitivity: &Sensitivity,
+    [x, y]: [usize; 2],
+    [columns, rows]: [usize; 2],
+    planes: &mut [TilePlane; CHANNELS],
+) -> f64 {
+    let (luma, colors) = (sensitivity.luma, sensitivity.colors);
+    let mut tile: TileSensitivity = [[[0.0; SCALES]; TILE_WIDTH / BLOCK]; TILE_HEIGHT / BLOCK];
+    for (row, blocks) in tile.iter_mut().enumerate().take(rows.div_ceil(BLOCK)) {
+        let sensitivities = &sensitivity.row(y / BLOCK + row)[x / BLOCK..];
+        blocks.iter_mut().zip(sensitivities).for_each(|(block, of_block)| *block = *of_block);
+    }
+    let inside: Line = core::array::from_fn(|x| if x < columns { 1.0 } else { 0.0 });
+    let mut total = [0.0; TILE_WIDTH];
+    for (group, blocks) in tile.iter().enumerate().take(rows.div_ceil(BLOCK)) {
+        let first = group * BLOCK;
+        let [fine, medium, coarse] =
+            [0, 1, 2].map(|scale| -> Line { core::array::from_fn(|x| blocks[x / BLOCK][scale]) });
+        let mut lines = [[0.0; TILE_WIDTH]; BLOCK];
+        for (plane, share) in planes.iter().zip(luma) {
+            for (line, residuals) in lines.iter_mut().zip(&plane[first..]) {
+                *line = core::array::from_fn(|x| line[x] + share * residuals[x]);
+            }
+        }
+        // Sums over 2 x 2 and 4 x 4 pixels, in every column of their blocks.
+        let pairs: [Line; 2] = core::array::from_fn(|pair| {
+            let sums: Line = core::array::from_fn(|x| lines[2 * pair][x] + lines[2 * pair + 1][x]);
+            core::array::from_fn(|x| sums[x] + sums[x ^ 1])
+        });
+        let sums: Line = core::array::from_fn(|x| pairs[0][x] + pairs[1][x]);
+        let sums: Line = core::array::from_fn(|x| sums[x] + sums[x ^ 2]);
+        let flat: Line = core::array::from_fn(|x| fine[x] + medium[x] + coarse[x]);
+        let coarse: Line = core::array::from_fn(|x| coarse[x] * (sums[x] * (1.0 / 16.0)));
+        for row in first..rows.min(first + BLOCK) {
+            let pair = &pairs[(row - first) / 2];
+            let by_luma: Line =
+                core::array::from_fn(|x| (coarse[x] + medium[x] * (pair[x] * 0.25)) * inside[x]);
+            for (channel, plane) in planes.iter_mut().enumerate() {
+                let (residuals, share) = (&mut plane[row], luma[channel]);
+                // All of the sensitivity to alpha is to its single pixels.
+                let by_sample = if channel < colors { &fine } else { &flat };
+                for x in 0..TILE_WIDTH {
+                    let gradient = by_sample[x] * residuals[x] + share * by_luma[x];
+                    total[x] += gradient * residuals[x];
+                    residuals[x] = gradient;
+                }
+            }
+        }
+    }
+    total.iter().map(|&sum| f64::from(sum)).sum()
+}
+
+/// The distortion of a picture's residuals, in interleaved order, directly from its definition.
+#[cfg(test)]
+pub(crate) fn plain_distortion(
+    sensitivity: &Sensitivity,
+    [width, height]: [usize; 2],
+    residuals: &[f64],
+) -> f64 {
+    let channels = residuals.len() / (width * height);
+    let at = |x: usize, y: usize| (y * width + x) * channels;
+    let mut distortion = 0.0;
+    for y in 0..height.next_multiple_of(BLOCK) {
+        for x in 0..width.next_multiple_of(BLOCK) {
+            let by_scale = sensitivity.row(y / BLOCK)[x / BLOCK].map(f64::from);
+            if x < width && y < height {
+                for (channel, residual) in residuals[at(x, y)..][..channels].iter().enumerate() {
+                    let is_alpha = channel >= sensitivity.colors;
+                    let count = if is_alpha { by_scale.iter().sum() } else { by_scale[0] };
+                    distortion += count * residual * residual;
+                }
+            }
+            for (scale, sensitivity_to_mean) in by_scale.iter().enumerate().skip(1) {
+                let side = 1 << scale;
+                let mut mean = 0.0;
+                for y in (y / side * side..height).take(side) {
+                    for x in (x / side * side..width).take(side) {
+                        let pixel = residuals[at(x, y)..][..channels].iter();
+                        let luma: f64 = pixel
+                            .zip(sensitivity.luma)
+                            .map(|(residual, share)| residual * f64::from(share))
+                            .sum();
+                        mean += luma / (side * side) as f64;
+                    }
+                }
+                distortion += sensitivity_to_mean * mean * mean;
+            }
+        }
+    }
+    distortion
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::source::Source;
+
+    /// Residuals in the tile whose first pixel is `corner`.
+    fn tile<const CHANNELS: usize>(
+        residuals: &[f64],
+        [width, height]: [usize; 2],
+        corner: [usize; 2],
+    ) -> [TilePlane; CHANNELS] {
+        let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        for (y, row) in (corner[1]..height).take(TILE_HEIGHT).enumerate() {
+            for (x, column) in (corner[0]..width).take(TILE_WIDTH).enumerate() {
+                for (channel, plane) in planes.iter_mut().enumerate() {
+                    plane[y][x] = residuals[(row * width + column) * CHANNELS + channel] as f32;
+                }
+            }
+        }
+        planes
+    }
+
+    fn check<const CHANNELS: usize>(model: ColorModel) {
+        let size = [TILE_WIDTH + 7, TILE_HEIGHT + 5];
+        let [width, height] = size;
+        let mut rng = fastrand::Rng::with_seed(CHANNELS as u64);
+        let samples: Vec<u8> = (0..width * height * CHANNELS).map(|_| rng.u8(..)).collect();
+        let source =
+            Source::new_u8(width as u32, height as u32, model, &samples).expect("the sizes agree");
+        let sensitivity = Sensitivity::new(&source);
+        let mut residuals: Vec<f64> = samples.iter().map(|_| rng.f64() - 0.4).collect();
+
+        let mut distortion = 0.0;
+        let mut found = vec![0.0; residuals.len()];
+        for y in (0..height).step_by(TILE_HEIGHT) {
+            for x in (0..width).step_by(TILE_WIDTH) {
+                let inside = [(width - x).min(TILE_WIDTH), (height - y).min(TILE_HEIGHT)];
+                let mut planes = tile::<CHANNELS>(&residuals, size, [x, y]);
+                distortion += differentiate(&sensitivity, [x, y], inside, &mut planes);
+                for (channel, plane) in planes.iter().enumerate() {
+                    for (row, line) in plane.iter().enumerate() {
+                        for (column, &gradient) in line.iter().enumerate() {
+                            if row < inside[1] && column < inside[0] {
+                                let at = (y + row) * width + x + column;
+                                found[at * CHANNELS + channel] = f64::from(gradient);
+                            } else {
+                                assert_eq!(gradient, 0.0, "outside the picture");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        let expected = plain_distortion(&sensitivity, size, &residuals);
+        assert!((distortion / expected - 1.0).abs() < 1e-5, "{model:?}: {distortion}, {expected}");
+        for at in 0..residuals.len() {
+            let here = residuals[at];
+            let mut with = |residual: f64| {
+                residuals[at] = residual;
+                plain_distortion(&sensitivity, size, &residuals)
+            };
+            // The distortion is quadratic, so that the difference quotient is exact.
+            let half = (with(here + 0.1) - with(here - 0.1)) / 0.4;
+            with(here);
+            assert!((found[at] - half).abs() < 1e-4, "{model:?} {at}: {}, {half}", found[at]);
+        }
+    }
+
+    #[test]
+    fn distortion_and_gradient_are_those_of_the_definition() {
+        check::<1>(ColorModel::Gray);
+        check::<2>(ColorModel::GrayAlpha);
+        check::<3>(ColorModel::Rgb);
+        check::<4>(ColorModel::Rgba);
+    }
+}

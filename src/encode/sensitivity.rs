@@ -1,0 +1,309 @@
+//! How much an error counts, by its place and its scale, to the eye: visual masking.
+//!
+//! An error is hard to see where the picture itself varies. Measures of visible differences divide
+//! the variance of the error by that of the picture, and do so on several scales: most of the weight
+//! of SSIMULACRA2 lies on the structural similarity of luma at a quarter and an eighth of the size.
+//! So a coarse error, which shifts the means of small blocks of pixels, counts more than a fine one,
+//! and both count less in texture than on even ground.
+
+use rayon::prelude::*;
+
+use super::source::Source;
+
+/// Scales on which errors count: single pixels, and means of luma over 2 x 2 and 4 x 4 pixels.
+pub(crate) const SCALES: usize = 3;
+/// Side in pixels of the blocks that have sensitivities, which is that of the coarsest scale.
+pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
+
+/// The sensitivities of a block to squared errors on each scale.
+pub(crate) type BlockSensitivity = [f32; SCALES];
+
+/// The mean sensitivity on each scale; they add up to 1.
+const BY_SCALE: [f64; SCALES] = [0.4, 0.35, 0.25];
+/// The sensitivity is the variance to the power of minus this.
+const MASKING: f64 = 0.4;
+/// What is added to a variance: the square of a few quantization steps of 8 bits.
+const LEAST_VARIANCE: f64 = (6.0 / 255.0) * (6.0 / 255.0);
+/// The variances are those in square boxes with these radii in pixels.
+const RADII: [usize; 3] = [2, 7, 20];
+/// The most and the least sensitivity on a scale, as a factor on its geometric mean.
+const MOST: f64 = 8.0;
+/// Shares of the colour channels in luma, those of Y in SSIMULACRA2's colour space XYB, about.
+const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
+/// Rows of blocks that one task computes.
+const BAND: usize = 16;
+
+/// The sensitivities of a picture.
+#[derive(Debug)]
+pub(crate) struct Sensitivity {
+    /// Blocks in a row.
+    columns: usize,
+    /// Row by row.
+    blocks: Vec<BlockSensitivity>,
+    /// The share of each channel in luma, 0 for alpha, scaled such that an error that is the same in
+    /// all colour channels of all pixels of a block counts the same on every scale.
+    pub(crate) luma: [f32; 4],
+    /// Number of channels that are not alpha.
+    pub(crate) colors: usize,
+}
+
+impl Sensitivity {
+    pub(crate) fn new(source: &Source<'_>) -> Self {
+        let model = source.color();
+        let colors = model.channels() - usize::from(model.has_alpha());
+        let shares = if colors == 1 { [1.0, 0.0, 0.0] } else { LUMA };
+        let columns = (source.width() as usize).div_ceil(BLOCK);
+        let rows = (source.height() as usize).div_ceil(BLOCK);
+        let mut blocks = vec![[0.0; SCALES]; columns * rows];
+        for (scale, share) in BY_SCALE.into_iter().enumerate() {
+            let mut logarithms = vec![0.0; blocks.len()];
+            let bands = logarithms.par_chunks_mut(columns * BAND).enumerate();
+            bands.for_each(|(band, blocks)| {
+                let first = band * BAND;
+                let end = first + blocks.len() / columns;
+                let luma = LumaBand::new(source, &shares[..colors], scale, first, end);
+                luma.logarithms(first, blocks);
+            });
+            for (block, value) in blocks.iter_mut().zip(normalized(&logarithms)) {
+                block[scale] = (share * value) as f32;
+            }
+        }
+        let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
+        Self { columns, blocks, luma: [red, green, blue, 0.0], colors }
+    }
+
+    /// A row of blocks.
+    pub(crate) fn row(&self, row: usize) -> &[BlockSensitivity] {
+        &self.blocks[row * self.columns..][..self.columns]
+    }
+
+    /// The sensitivity of a pixel to an error on all scales.
+    pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
+        self.row(y / BLOCK)[x / BLOCK].iter().sum()
+    }
+
+    /// Size in bytes.
+    pub(crate) fn memory(&self) -> usize {
+        size_of_val(&self.blocks[..])
+    }
+}
+
+/// Sensitivities from their logarithms, with a mean of 1.
+fn normalized(logarithms: &[f32]) -> impl Iterator<Item = f64> {
+    let count = logarithms.len() as f64;
+    let mean = logarithms.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
+    let clamped = move |&value: &f32| (f64::from(value) - mean).clamp(-MOST.ln(), MOST.ln()).exp();
+    let sum = logarithms.iter().map(clamped).sum::<f64>();
+    logarithms.iter().map(move |value| clamped(value) * count / sum)
+}
+
+/// Sums over the rectangles from the first row and column of a part of the picture's luma.
+struct LumaBand {
+    scale: usize,
+    /// First row, and numbers of columns and rows, at this scale.
+    first: usize,
+    width: usize,
+    height: usize,
+    /// Sums of values and of squares, with a column and a row of zeros before.
+    sums: Vec<[f64; 2]>,
+}
+
+impl LumaBand {
+    /// The luma on a scale around some rows of blocks.
+    fn new(source: &Source<'_>, shares: &[f32], scale: usize, first: usize, end: usize) -> Self {
+        let side = 1 << scale;
+        let most = RADII[RADII.len() - 1] / side;
+        let size = [source.width() as usize, source.height() as usize];
+        let [width, height] = size.map(|length| length.div_ceil(side));
+        let channels = source.color().channels();
+        let first = (first * (BLOCK / side)).saturating_sub(most);
+        let end = (end * (BLOCK / side) + most).min(height);
+        let stride = width + 1;
+        let mut sums = vec![[0.0; 2]; stride * (end - first + 1)];
+        let mut line = vec![0.0; size[0]];
+        let mut means = vec![0.0; width];
+        for y in first..end {
+            means.fill(0.0);
+            let rows = y * side..((y + 1) * side).min(size[1]);
+            let count = rows.len();
+            for row in rows {
+                for (x, value) in line.iter_mut().enumerate() {
+                    let at = (row * size[0] + x) * channels;
+                    let samples = (at..).zip(shares);
+                    *value = samples
+                        .map(|(at, share)| share * f32::from(source.wide_sample(at)) / 65535.0)
+                        .sum::<f32>();
+                }
+                for (mean, part) in means.iter_mut().zip(line.chunks(side)) {
+                    *mean += part.iter().sum::<f32>() / (part.len() * count) as f32;
+                }
+            }
+            let (before, after) = sums.split_at_mut((y - first + 1) * stride);
+            let before = &before[(y - first) * stride..];
+            let mut sum = [0.0; 2];
+            for (x, &mean) in means.iter().enumerate() {
+                let value = f64::from(mean);
+                sum = [sum[0] + value, sum[1] + value * value];
+                after[x + 1] = [before[x + 1][0] + sum[0], before[x + 1][1] + sum[1]];
+            }
+        }
+        Self { scale, first, width, height: end - first, sums }
+    }
+
+    /// The logarithms of the sensitivities of rows of blocks, of which the first has the index
+    /// `first` in the picture: means over the values of a block on this scale.
+    fn logarithms(&self, first: usize, blocks: &mut [f32]) {
+        let side = BLOCK >> self.scale;
+        let columns = self.width.div_ceil(side);
+        for (index, block) in blocks.iter_mut().enumerate() {
+            let (left, top) =
+                (index % columns * side, (first + index / columns) * side - self.first);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for y in top..(top + side).min(self.height) {
+                for x in left..(left + side).min(self.width) {
+                    let product: f64 =
+                        RADII.map(|radius| self.variance(x, y, radius)).iter().product();
+                    sum += product.ln();
+                    count += 1.0;
+                }
+            }
+            *block = (-MASKING / RADII.len() as f64 * sum / count) as f32;
+        }
+    }
+
+    /// The variance in the box around a value, plus the least variance.
+    fn variance(&self, x: usize, y: usize, radius: usize) -> f64 {
+        let radius = ((radius + (1 << self.scale) / 2) >> self.scale).max(1);
+        let (left, right) = (x.saturating_sub(radius), (x + radius + 1).min(self.width));
+        let (top, bottom) = (y.saturating_sub(radius), (y + radius + 1).min(self.height));
+        let stride = self.width + 1;
+        let corner = |x: usize, y: usize| self.sums[y * stride + x];
+        let [a, b, c, d] =
+            [corner(left, top), corner(right, top), corner(left, bottom), corner(right, bottom)];
+        let [sum, squares] = [0, 1].map(|which| d[which] - b[which] - c[which] + a[which]);
+        let count = ((right - left) * (bottom - top)) as f64;
+        let mean = sum / count;
+        (squares / count - mean * mean).max(0.0) + LEAST_VARIANCE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+
+    /// The sensitivities of a block before they are normalized, directly from the definition.
+    fn plain(source: &Source<'_>, block: [usize; 2], scale: usize) -> f64 {
+        let [width, height] = [source.width() as usize, source.height() as usize];
+        let side = 1 << scale;
+        let luma = |x: usize, y: usize| {
+            let at = (y * width + x) * 3;
+            let samples = (at..at + 3).zip(LUMA);
+            samples
+                .map(|(at, share)| f64::from(source.wide_sample(at)) / 65535.0 * f64::from(share))
+                .sum::<f64>()
+        };
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let value = |x: usize, y: usize| {
+            let rows = y * side..((y + 1) * side).min(height);
+            let columns = x * side..((x + 1) * side).min(width);
+            mean(&rows.flat_map(|y| columns.clone().map(move |x| luma(x, y))).collect::<Vec<_>>())
+        };
+        let size = [width.div_ceil(side), height.div_ceil(side)];
+        let around = |at: usize, radius: usize, length: usize| {
+            at.saturating_sub(radius)..(at + radius + 1).min(length)
+        };
+        let mut logarithms = Vec::new();
+        let per_block = BLOCK / side;
+        for y in block[1] * per_block..((block[1] + 1) * per_block).min(size[1]) {
+            for x in block[0] * per_block..((block[0] + 1) * per_block).min(size[0]) {
+                for radius in RADII {
+                    let radius = (radius as f64 / side as f64).round() as usize;
+                    let rows = around(y, radius, size[1]);
+                    let columns = around(x, radius, size[0]);
+                    let values: Vec<f64> =
+                        rows.flat_map(|y| columns.clone().map(move |x| value(x, y))).collect();
+                    let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
+                    let variance = mean(&squares) - mean(&values).powi(2);
+                    logarithms.push((variance + LEAST_VARIANCE).ln());
+                }
+            }
+        }
+        (-MASKING * mean(&logarithms)).exp()
+    }
+
+    /// Columns of noise of 8 strengths, from none to all of the range.
+    fn noise(width: usize, height: usize) -> Vec<u8> {
+        let mut rng = fastrand::Rng::with_seed(4);
+        let pixels = (0..height).flat_map(|_| 0..width);
+        pixels
+            .flat_map(|x| {
+                let reach = [0, 1, 3, 7, 15, 31, 63, 127][x * 8 / width];
+                [(); 3].map(|()| 128 - reach + rng.u8(0..=2 * reach))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn sensitivities_are_those_of_the_definition() {
+        // Several bands, the last one of less than a block.
+        let (width, height) = (43, 4 * 2 * BAND + 6);
+        let samples = noise(width, height);
+        let source = Source::new_u8(width as u32, height as u32, ColorModel::Rgb, &samples)
+            .expect("the sizes agree");
+        let sensitivity = Sensitivity::new(&source);
+        let rows = height.div_ceil(BLOCK);
+        for scale in 0..SCALES {
+            let found: Vec<f64> = (0..rows)
+                .flat_map(|row| sensitivity.row(row).iter().map(|block| f64::from(block[scale])))
+                .collect();
+            let mean = found.iter().sum::<f64>() / found.len() as f64;
+            assert!((mean - BY_SCALE[scale]).abs() < 1e-5, "scale {scale}: {mean}");
+            let blocks = (0..found.len()).map(|at| {
+                let columns = width.div_ceil(BLOCK);
+                plain(&source, [at % columns, at / columns], scale)
+            });
+            let expected: Vec<f64> = blocks.collect();
+            let geometric_mean = |values: &[f64]| {
+                (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp()
+            };
+            let mean = geometric_mean(&expected);
+            let expected: Vec<f64> =
+                expected.iter().map(|value| (value / mean).clamp(1.0 / MOST, MOST)).collect();
+            let factor = expected.iter().sum::<f64>() / expected.len() as f64;
+            for (at, (found, expected)) in found.iter().zip(expected).enumerate() {
+                let expected = expected / factor * BY_SCALE[scale];
+                assert!(
+                    (found / expected - 1.0).abs() < 1e-3,
+                    "scale {scale}, block {at}: {found}, {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn even_ground_is_more_sensitive_than_texture() {
+        let samples = noise(64, 64);
+        let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("the sizes agree");
+        let sensitivity = Sensitivity::new(&source);
+        let across: Vec<f32> = (4..64).step_by(8).map(|x| sensitivity.at(x, 32)).collect();
+        assert!(across.is_sorted_by(|a, b| a > b), "{across:?}");
+    }
+
+    #[test]
+    fn every_model_and_size_has_sensitivities() {
+        for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
+            for [width, height] in [[1, 1], [1, 70], [2, 3], [17, 9]] {
+                let samples = vec![200; width as usize * height as usize * model.channels()];
+                let source =
+                    Source::new_u8(width, height, model, &samples).expect("the sizes agree");
+                let sensitivity = Sensitivity::new(&source);
+                // All of an even picture is equally sensitive.
+                let found = sensitivity.at(width as usize - 1, height as usize - 1);
+                assert!((found - 1.0).abs() < 1e-5, "{model:?}, {width}x{height}: {found}");
+                let squares = sensitivity.luma.iter().sum::<f32>().powi(2);
+                assert!((squares - sensitivity.colors as f32).abs() < 1e-5, "{model:?}");
+            }
+        }
+    }
+}
