@@ -10,7 +10,7 @@ use image_gip::training::{
 use image_gip::{
     ColorModel, EncodeError, Encoded, Encoder, Gaussian, Kernel, Limits, Metadata, MetadataError,
     OptionError, Parameterization, Precision, RenderOptions, SampleDepth, Shortfall, Source,
-    SourceError, StreamDecoder, Target, Text, Threads, metrics,
+    SourceError, StreamDecoder, Target, Text, Threads, Tune, metrics,
 };
 
 const COLORS: [ColorModel; 4] =
@@ -196,13 +196,81 @@ fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
     let picture = scene(96, 64, 3);
     let counts = [0.0, 30.0, 60.0, 90.0].map(|q| count(&picture, Target::Quality(q)));
     assert!(counts.is_sorted() && counts[0] < counts[3], "{counts:?}");
-    assert_eq!(count(&picture, Target::Auto), count(&picture, Target::Quality(50.0)));
+    assert_eq!(count(&picture, Target::Auto), count(&picture, Target::Quality(75.0)));
     // Whatever is asked for, a flat picture has nothing to model.
     assert_eq!(count(&[77; 96 * 64 * 3], Target::Auto), 0);
     assert_eq!(count(&[77; 96 * 64 * 3], Target::Gaussians(5000)), 0);
     let ramp: Vec<u8> = (0..96 * 64 * 3).map(|i| (40 + i / 3 % 96) as u8).collect();
     let (simple, busy) = (count(&ramp, Target::Auto), count(&noise(96 * 64 * 3), Target::Auto));
     assert!(simple < 60 && simple * 3 < busy, "{simple} against {busy}");
+}
+
+#[test]
+fn a_quality_is_met_and_estimated() {
+    let (width, height) = (120, 88);
+    let samples = scene(width, height, 3);
+    let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
+    for tune in [Tune::Visual, Tune::Psnr] {
+        let mut sizes = Vec::new();
+        for quality in [20.0, 50.0, 80.0] {
+            let encoder = quick(Target::Quality(quality)).with_tune(tune).with_effort(3);
+            let encoded = encoder.encode(&source).expect("it encodes");
+            check(&encoded, &samples);
+            let found = encoded.report.quality;
+            assert_eq!(encoded.report.shortfall, None, "{tune:?}: {found} of {quality}");
+            assert!((found - quality).abs() <= 1.0, "{tune:?}: {found} of {quality}");
+            sizes.push(encoded.bytes.len());
+        }
+        assert!(sizes[0] < sizes[2], "{tune:?}: {sizes:?}");
+    }
+    // A picture with nothing to model has the best quality at any target.
+    let flat = vec![60; samples.len()];
+    let source = Source::new_u8(width, height, ColorModel::Rgb, &flat).expect("sizes agree");
+    let report = quick(Target::Quality(40.0)).encode(&source).expect("it encodes").report;
+    assert_eq!(report.quality, 100.0);
+    let above = Shortfall::QualityAbove { quality: 100.0, gaussians: 0 };
+    assert_eq!(report.shortfall, Some(above));
+}
+
+#[test]
+fn a_higher_lambda_gives_fewer_bytes() {
+    let samples = scene(96, 64, 3);
+    let source = Source::new_u8(96, 64, ColorModel::Rgb, &samples).expect("sizes agree");
+    let sizes = [30.0, 300.0, 3000.0].map(|lambda| {
+        let encoded = quick(Target::Lambda(lambda)).encode(&source).expect("it encodes");
+        assert_eq!(encoded.report.shortfall, None);
+        encoded.bytes.len()
+    });
+    assert!(sizes.is_sorted_by(|a, b| a > b), "{sizes:?}");
+}
+
+#[test]
+fn each_tuning_is_the_better_one_by_its_own_measure() {
+    // Strong texture on the left, faint texture on the right.
+    let (width, height) = (128, 96);
+    let mut rng = fastrand::Rng::with_seed(8);
+    let samples: Vec<u8> = (0..width * height)
+        .map(|at| {
+            let reach = if at % width < width / 2 { 90 } else { 12 };
+            128 - reach + rng.u8(0..=2 * reach)
+        })
+        .collect();
+    // Texture that Gaussians can follow has some size.
+    let samples: Vec<u8> = (0..width * height)
+        .map(|at| {
+            let (x, y) = (at % width / 4 * 4, at / width / 4 * 4);
+            samples[y * width + x]
+        })
+        .collect();
+    let source = Source::new_u8(width as u32, height as u32, ColorModel::Gray, &samples)
+        .expect("sizes agree");
+    let report = |tune| {
+        let encoder = quick(Target::Bytes(1500)).with_tune(tune).with_effort(3);
+        encoder.encode(&source).expect("it encodes").report
+    };
+    let (visual, psnr) = (report(Tune::Visual), report(Tune::Psnr));
+    assert!(visual.quality > psnr.quality + 3.0, "{visual:?}, {psnr:?}");
+    assert!(psnr.psnr > visual.psnr + 0.3, "{visual:?}, {psnr:?}");
 }
 
 #[test]
@@ -219,8 +287,8 @@ fn small_ramps_are_not_given_up() {
         for effort in [1, 5] {
             let encoder = quick(Target::Quality(quality)).with_effort(effort);
             let encoded = encoder.encode(&source).expect("encodes");
-            let psnr = encoded.report.psnr;
-            assert!(psnr > 30.0, "quality {quality}, effort {effort}: {psnr} dB");
+            let found = encoded.report.quality;
+            assert!(found > quality - 1.0, "quality {quality}, effort {effort}: {found}");
         }
     }
 }

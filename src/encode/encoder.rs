@@ -205,6 +205,7 @@ impl Encoder {
                 gaussians: outcome.gaussians,
                 psnr: outcome.distortion.psnr,
                 psnr_float: outcome.distortion.psnr_float,
+                quality: outcome.quality,
                 iterations: outcome.work.iterations,
                 evaluations: outcome.work.evaluations,
                 seconds: start.elapsed().as_secs_f64(),
@@ -263,6 +264,9 @@ pub struct Report {
     /// PSNR in dB of the decoded file against the source, where the decoded samples are floats,
     /// clamped but not rounded. This is the PSNR that papers report.
     pub psnr_float: f64,
+    /// An estimate of the visual quality of the decoded file, from 0 to 100: the score that the metric
+    /// SSIMULACRA2 would give, within about 2.
+    pub quality: f64,
     /// Iterations of training.
     pub iterations: u32,
     /// Evaluations of the kernel and its gradient during training, one for each pair of a Gaussian
@@ -274,6 +278,6 @@ pub struct Report {
     /// the source and the file.
     pub peak_memory: u64,
     /// Why the file misses its target by more than the tolerance (1 % of a size, 0.05 dB of a
-    /// PSNR); `None` when it meets the target.
+    /// PSNR, 1 of a quality); `None` when it meets the target.
     pub shortfall: Option<Shortfall>,
 }

@@ -1,5 +1,7 @@
 //! From a fit to an entropy-coded file that meets its target.
 
+use core::ops::Range;
+
 use super::error::EncodeError;
 use super::file::FileLayout;
 use super::fit::budget::Budget;
@@ -7,14 +9,24 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{Target, Tune};
 use super::progress::Observer;
+use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, TargetSearch};
 use crate::coding::entropy::{Code, LatticeCodes};
 use crate::gaussian::Gaussian;
+use crate::limits::Limits;
+use crate::render::Picture;
 
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
+
+/// How often the number of Gaussians of a finished fit may be corrected for a quality, and the
+/// factors that need no correction, because the steps of quantization make up for them.
+const MAX_CORRECTIONS: u32 = 3;
+const CLOSE: Range<f64> = 0.75..1.2;
+/// The least factor for a correction.
+const LEAST_FACTOR: f64 = 0.25;
 
 /// How many Gaussians a file of a size holds, about, up to `most`.
 pub(crate) fn count_for_size(
@@ -36,11 +48,16 @@ pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
     raster: &Raster,
+    judge: &Judge,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
     if let Target::Psnr(psnr) = job.target {
         extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), observer)?;
+    }
+    if let Some(quality) = job.target.quality() {
+        let dissimilarity = rate_model::SHARE_OF_FIT * quality::dissimilarity_at(quality);
+        correct(&mut fit, dissimilarity, judge, layout, observer)?;
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -49,7 +66,7 @@ pub(crate) fn finish(
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);
-    let search = TargetSearch::new(job.source, raster, layout, job.passes);
+    let search = TargetSearch::new(job.source, raster, judge, layout, job.passes);
     let coded = search.run(&gaussians, distortion, job.target, observer)?;
     observer.poll()?;
     Ok((layout.write_entropy(&coded), work))
@@ -60,11 +77,41 @@ fn extend(fit: &mut Fit<'_>, error: f64, observer: &mut Observer<'_>) -> Result<
     for _ in 0..MAX_ROUNDS {
         let before = fit.len();
         let squared = fit.best_error().squared;
-        let wanted = Budget::Error(error).wanted(before, squared, fit.most());
+        let wanted = Budget::SquaredError(error).wanted(before, squared, fit.most());
         if squared <= error || wanted <= before {
             break;
         }
-        fit.extend(wanted - before, observer)?;
+        fit.resize(wanted, observer)?;
+        if fit.len() == before {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Adds or removes Gaussians until a fit has about as many as the dissimilarity needs.
+fn correct(
+    fit: &mut Fit<'_>,
+    dissimilarity: f64,
+    judge: &Judge,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<(), EncodeError> {
+    for round in 0..MAX_CORRECTIONS {
+        let before = fit.len();
+        let gaussians = fit.gaussians();
+        let limits = Limits::none();
+        let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
+        // The dissimilarity is about inversely proportional to the number of Gaussians, but not where
+        // a few of them make the picture. There, too many are better than too few.
+        let factor = judge.dissimilarity(&picture, observer)? / dissimilarity;
+        let is_close = factor < CLOSE.end && (factor > CLOSE.start || round > 0);
+        let wanted = before.max(1) as f64 * factor.max(LEAST_FACTOR);
+        let wanted = (wanted.ceil() as usize).min(fit.most());
+        if is_close || wanted == before {
+            break;
+        }
+        fit.resize(wanted, observer)?;
         if fit.len() == before {
             break;
         }

@@ -14,6 +14,7 @@ mod options;
 mod packed;
 mod pipeline;
 mod progress;
+mod quality;
 mod raster;
 mod rate_model;
 mod rdo;

@@ -6,7 +6,7 @@ use super::error::OptionError;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Target {
-    /// A medium quality: the same as `Quality(50.0)`.
+    /// A picture that a person accepts without looking twice: the same as `Quality(75.0)`.
     #[default]
     Auto,
     /// At most this many Gaussians, from 1 to 2^22. A picture that needs fewer gets fewer.
@@ -23,10 +23,14 @@ pub enum Target {
     /// at most one Gaussian per pixel and three times the effort's iterations, and
     /// [`Report::shortfall`](crate::Report) says so.
     Psnr(f64),
-    /// A quality from 0 (smallest file) to 100 (best picture). It sets the squared error that
-    /// remains per Gaussian, the same for every picture, so simple pictures get few Gaussians. A
-    /// quality higher by 10 takes 1.2 to 1.3 times as many Gaussians.
+    /// A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 30 is low, 50
+    /// medium, 70 high, and from 90 on people see no difference. The encoder aims at its estimate of
+    /// the metric, [`Report::quality`](crate::Report), and no higher than 97.
     Quality(f64),
+    /// A Lagrange multiplier lambda from 0.01 to 10^6: with all files of a set at the same lambda, no
+    /// bit would bring more in another one. It is the squared error that a bit must save, where
+    /// samples are 0 to 255. It suits comparisons of codecs, which average over a set.
+    Lambda(f64),
 }
 
 /// By how much a PSNR may exceed its target, in dB.
@@ -36,8 +40,11 @@ pub(crate) const SIZE_TOLERANCE: f64 = 0.99;
 /// Most Gaussians that the encoder writes: as many as a decoder accepts by default.
 pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
 
+/// By how much a quality may miss its target.
+pub(crate) const QUALITY_TOLERANCE: f64 = 1.0;
+
 /// The quality of [`Target::Auto`].
-const AUTO_QUALITY: f64 = 50.0;
+const AUTO_QUALITY: f64 = 75.0;
 
 impl Target {
     /// Refuses a number that is out of range.
@@ -58,6 +65,7 @@ impl Target {
             Self::BitsPerPixel(rate) => within("bits per pixel", rate, 1e-6, 1e6),
             Self::Psnr(psnr) => within("PSNR in dB", psnr, 1.0, 120.0),
             Self::Quality(quality) => within("quality", quality, 0.0, 100.0),
+            Self::Lambda(lambda) => within("lambda", lambda, 0.01, 1e6),
         }
     }
 
@@ -73,19 +81,16 @@ impl Target {
 
     /// Whether the target sets the error, and so leaves the number of Gaussians open.
     pub(crate) fn is_by_error(self) -> bool {
-        matches!(self, Self::Psnr(_)) || self.error_per_gaussian().is_some()
+        matches!(self, Self::Psnr(_) | Self::Lambda(_)) || self.quality().is_some()
     }
 
-    /// The squared error that remains per Gaussian at this quality, where a full sample is 1;
-    /// `None` if the target is not a quality.
-    pub(crate) fn error_per_gaussian(self) -> Option<f64> {
-        let quality = match self {
-            Self::Auto => AUTO_QUALITY,
-            Self::Quality(quality) => quality,
-            _ => return None,
-        };
-        // With samples of 0 to 255: 100,000 at quality 0, 1,000 at quality 100.
-        Some(10_f64.powf(5.0 - 0.02 * quality) / (255.0 * 255.0))
+    /// The visual quality; `None` if the target is something else.
+    pub(crate) fn quality(self) -> Option<f64> {
+        match self {
+            Self::Auto => Some(AUTO_QUALITY),
+            Self::Quality(quality) => Some(quality),
+            _ => None,
+        }
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) fn finish(
             break;
         }
         let before = fit.len();
-        fit.extend(more, observer)?;
+        fit.resize(fit.len() + more, observer)?;
         file = layout.write_packed(&fit.fitted());
         if fit.len() == before {
             // There is nothing left to correct.

@@ -7,9 +7,11 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{Precision, Target};
 use super::progress::Observer;
+use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
-use super::shortfall::Shortfall;
+use super::sensitivity::Sensitivity;
+use super::shortfall::{Reached, Shortfall};
 use super::verify::{FilePsnr, Verified};
 use super::{entropy, packed};
 
@@ -29,6 +31,8 @@ pub(crate) struct Outcome {
     pub(crate) work: Work,
     pub(crate) gaussians: u32,
     pub(crate) distortion: FilePsnr,
+    /// The visual quality, from 0 to 100.
+    pub(crate) quality: f64,
     pub(crate) shortfall: Option<Shortfall>,
 }
 
@@ -65,11 +69,14 @@ fn encode_for_target(
     let layout = FileLayout::new(source, raster.mean(), kernel, parameterization, job.metadata);
 
     let budget = budget(job, &raster, &layout)?;
+    let judge = Judge::new(source);
+    let peak_before = work.peak_memory;
+    let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
     fit.run(observer)?;
 
-    let (file, work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, &raster, &layout, observer),
+    let (file, mut work) = match precision {
+        Precision::Entropy => entropy::finish(fit, job, &raster, &judge, &layout, observer),
         Precision::Packed | Precision::Float => packed::finish(fit, job, budget, &layout, observer),
     }?;
 
@@ -80,8 +87,13 @@ fn encode_for_target(
     let verified = Verified::new(&file, source);
     let gaussians = verified.gaussians();
     let distortion = verified.distortion(gaussians, observer)?;
-    let shortfall = Shortfall::of(target, pixels, file.len(), distortion.psnr, gaussians);
-    Ok(Outcome { file, work, gaussians, distortion, shortfall })
+    let dissimilarity = judge.dissimilarity(&verified.picture(), observer)?;
+    let peaks = [work.peak_memory + judge.memory(), judge.memory_at_work(), peak_before];
+    work.peak_memory = peaks.into_iter().max().unwrap_or(0);
+    let quality = quality::quality(dissimilarity).max(0.0);
+    let reached = Reached { bytes: file.len(), psnr: distortion.psnr, quality, gaussians };
+    let shortfall = Shortfall::of(target, pixels, reached);
+    Ok(Outcome { file, work, gaussians, distortion, quality, shortfall })
 }
 
 /// What decides the number of Gaussians during training.
@@ -97,13 +109,23 @@ fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Bud
         };
         return count.map(Budget::Count);
     }
-    if let Some(error) = target.error_per_gaussian() {
-        return Ok(Budget::ErrorPerGaussian(error));
+    if let Some(quality) = target.quality() {
+        let dissimilarity = quality::dissimilarity_at(quality);
+        let means = match &raster.sensitivity {
+            Some(sensitivity) => sensitivity.means,
+            None => Sensitivity::new(job.source).means,
+        };
+        let count = quality::count_for(dissimilarity, raster.pixels(), means);
+        return Ok(Budget::Count(count));
     }
     Ok(match target {
         Target::Psnr(psnr) => {
             let share = if is_coded { rate_model::SHARE_OF_FIT } else { 1.0 };
-            Budget::Error(share * raster.error_of(psnr))
+            Budget::SquaredError(share * raster.error_of(psnr))
+        }
+        Target::Lambda(lambda) => {
+            let step = rate_model::step_for_lambda(lambda);
+            Budget::DistortionPerGaussian(rate_model::distortion_per_gaussian(step))
         }
         Target::Gaussians(count) => Budget::Count(count as usize),
         _ => unreachable!("the others were handled above"),

@@ -48,6 +48,17 @@ pub(crate) fn step_for(distortion: f64, count: usize) -> f64 {
     0.5 * (SQUARED_STEP * distortion / count.max(1) as f64).log2()
 }
 
+/// The base-2 logarithm of the step of colour for a Lagrange multiplier in squared error per bit,
+/// where samples are 0 to 255.
+pub(crate) fn step_for_lambda(lambda: f64) -> f64 {
+    0.5 * (lambda / (255.0 * 255.0) / f64::from(LAMBDA)).log2()
+}
+
+/// The distortion per Gaussian for which [`step_for`] gives this step.
+pub(crate) fn distortion_per_gaussian(step: f64) -> f64 {
+    (2.0 * step).exp2() / SQUARED_STEP
+}
+
 /// The lattice for a step of colour, given by its base-2 logarithm.
 pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
     let step = step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1) as f32;

@@ -45,6 +45,8 @@ pub(crate) struct Sensitivity {
     pub(crate) luma: [f32; 4],
     /// Number of channels that are not alpha.
     pub(crate) colors: usize,
+    /// The mean on each scale before normalization: the lower, the more texture there is.
+    pub(crate) means: [f64; SCALES],
 }
 
 impl Sensitivity {
@@ -55,6 +57,7 @@ impl Sensitivity {
         let columns = (source.width() as usize).div_ceil(BLOCK);
         let rows = (source.height() as usize).div_ceil(BLOCK);
         let mut blocks = vec![[0.0; SCALES]; columns * rows];
+        let mut means = [0.0; SCALES];
         for (scale, share) in BY_SCALE.into_iter().enumerate() {
             let mut logarithms = vec![0.0; blocks.len()];
             let bands = logarithms.par_chunks_mut(columns * BAND).enumerate();
@@ -64,12 +67,14 @@ impl Sensitivity {
                 let luma = LumaBand::new(source, &shares[..colors], scale, first, end);
                 luma.logarithms(first, blocks);
             });
-            for (block, value) in blocks.iter_mut().zip(normalized(&logarithms)) {
+            let (values, mean) = normalized(&logarithms);
+            means[scale] = mean;
+            for (block, value) in blocks.iter_mut().zip(values) {
                 block[scale] = (share * value) as f32;
             }
         }
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
-        Self { columns, blocks, luma: [red, green, blue, 0.0], colors }
+        Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means }
     }
 
     /// A row of blocks.
@@ -88,13 +93,14 @@ impl Sensitivity {
     }
 }
 
-/// Sensitivities from their logarithms, with a mean of 1.
-fn normalized(logarithms: &[f32]) -> impl Iterator<Item = f64> {
+/// Sensitivities from their logarithms, with a mean of 1, and their mean before.
+fn normalized(logarithms: &[f32]) -> (impl Iterator<Item = f64>, f64) {
     let count = logarithms.len() as f64;
-    let mean = logarithms.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
-    let clamped = move |&value: &f32| (f64::from(value) - mean).clamp(-MOST.ln(), MOST.ln()).exp();
-    let sum = logarithms.iter().map(clamped).sum::<f64>();
-    logarithms.iter().map(move |value| clamped(value) * count / sum)
+    let middle = logarithms.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
+    let clamped =
+        move |&value: &f32| (f64::from(value) - middle).clamp(-MOST.ln(), MOST.ln()).exp();
+    let mean = logarithms.iter().map(clamped).sum::<f64>() / count;
+    (logarithms.iter().map(move |value| clamped(value) / mean), mean * middle.exp())
 }
 
 /// Sums over the rectangles from the first row and column of a part of the picture's luma.

@@ -2,9 +2,11 @@
 
 use core::fmt;
 
-use super::options::{PSNR_TOLERANCE, SIZE_TOLERANCE, Target};
+use super::options::{PSNR_TOLERANCE, QUALITY_TOLERANCE, SIZE_TOLERANCE, Target};
+use super::quality::MOST_QUALITY;
 
-/// Why a file does not meet its target within 1 % of size or 0.05 dB. The text says it in words.
+/// Why a file does not meet its target within 1 % of size, 0.05 dB, or 1 of quality. The text says it
+/// in words.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shortfall {
@@ -17,6 +19,18 @@ pub enum Shortfall {
     PsnrAbove {
         /// PSNR of the file in dB.
         psnr: f64,
+        /// Gaussians in the file.
+        gaussians: u32,
+    },
+    /// The visual quality is below its target: this is what the effort and the precision reach.
+    QualityBelow {
+        /// Estimated quality of the file.
+        quality: f64,
+    },
+    /// The visual quality is above its target even with these few Gaussians.
+    QualityAbove {
+        /// Estimated quality of the file.
+        quality: f64,
         /// Gaussians in the file.
         gaussians: u32,
     },
@@ -37,20 +51,35 @@ pub enum Shortfall {
     },
 }
 
+/// What a file has reached.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached {
+    pub(crate) bytes: usize,
+    /// In dB.
+    pub(crate) psnr: f64,
+    /// From 0 to 100.
+    pub(crate) quality: f64,
+    pub(crate) gaussians: u32,
+}
+
 impl Shortfall {
-    /// That of a file with so many bytes, Gaussians and decibels; `None` if it meets its target.
-    pub(crate) fn of(
-        target: Target,
-        pixels: usize,
-        bytes: usize,
-        psnr: f64,
-        gaussians: u32,
-    ) -> Option<Self> {
+    /// That of a file; `None` if it meets its target.
+    pub(crate) fn of(target: Target, pixels: usize, reached: Reached) -> Option<Self> {
+        let Reached { bytes, psnr, quality, gaussians } = reached;
         if let Target::Psnr(target) = target {
             return if psnr < target {
                 Some(Self::PsnrBelow { psnr })
             } else {
                 (psnr > target + PSNR_TOLERANCE).then_some(Self::PsnrAbove { psnr, gaussians })
+            };
+        }
+        if let Some(target) = target.quality() {
+            let target = target.min(MOST_QUALITY);
+            return if quality < target - QUALITY_TOLERANCE {
+                Some(Self::QualityBelow { quality })
+            } else {
+                let is_above = quality > target + QUALITY_TOLERANCE;
+                is_above.then_some(Self::QualityAbove { quality, gaussians })
             };
         }
         let least = target.bytes(pixels)? as f64 * SIZE_TOLERANCE;
@@ -66,6 +95,12 @@ impl fmt::Display for Shortfall {
             }
             Self::PsnrAbove { psnr, gaussians } => {
                 write!(f, "with {gaussians} Gaussians the picture already has {psnr:.2} dB")
+            }
+            Self::QualityBelow { quality } => {
+                write!(f, "quality {quality:.1} is what this effort and precision reach")
+            }
+            Self::QualityAbove { quality, gaussians } => {
+                write!(f, "with {gaussians} Gaussians the picture already has quality {quality:.1}")
             }
             Self::SizeUseless { bytes, gaussians } => write!(
                 f,

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::error::EncodeError;
 use super::progress::Observer;
 use super::source::{Source, SourceSamples};
-use super::strips::strips;
+use super::strips;
 use crate::decode::StreamDecoder;
 use crate::limits::Limits;
-use crate::render::{RenderOptions, Sample};
+use crate::render::{Picture, Sample};
 
 /// A file that was decoded for comparison with its source.
 #[derive(Debug)]
@@ -33,6 +33,11 @@ impl<'a> Verified<'a> {
         stream.feed(file).expect("the decoder reads what the encoder writes");
         assert!(stream.is_complete(), "the encoder writes whole files");
         Self { stream, source }
+    }
+
+    /// The decoded picture.
+    pub(crate) fn picture(&self) -> Picture<'_> {
+        self.stream.picture().expect("the header was read")
     }
 
     /// Number of Gaussians in the file.
@@ -62,26 +67,19 @@ impl<'a> Verified<'a> {
         count: u32,
         observer: &mut Observer<'_>,
     ) -> Result<FilePsnr, EncodeError> {
-        let (width, height) = (self.source.width(), self.source.height());
+        let width = self.source.width() as usize;
         let channels = self.source.color().channels();
-        let stride = width as usize * channels;
+        let stride = width * channels;
         let full_scale: f64 = T::OPAQUE.into();
-        let mut planes = Vec::new();
         let (mut rounded, mut exact) = (0.0, 0.0);
-        for region in strips(width, height) {
-            observer.poll()?;
-            let options = RenderOptions::new().with_region(region).with_prefix(count);
+        strips::render(&self.picture(), count, observer, |region, planes| {
             let pixels = region.pixels() as usize;
-            planes.resize(pixels * channels, 0.0);
-            let picture = self.stream.picture().expect("the header was read");
-            picture.render_planes(&options, &mut planes).expect("there are no limits");
-            observer.poll()?;
             let source = &samples[region.y as usize * stride..][..pixels * channels];
             let errors = source.par_chunks_exact(stride).enumerate().map(|(row, source)| {
                 let mut errors = [0.0; 2];
                 for (index, &source) in source.iter().enumerate() {
                     let (x, channel) = (index / channels, index % channels);
-                    let value = planes[channel * pixels + row * width as usize + x];
+                    let value = planes[channel * pixels + row * width + x];
                     let (source, sample): (f64, f64) = (source.into(), T::from_unit(value).into());
                     errors[0] += (sample - source).powi(2);
                     let value = f64::from(value.clamp(0.0, 1.0));
@@ -94,7 +92,7 @@ impl<'a> Verified<'a> {
                 rounded += by_samples;
                 exact += by_values;
             }
-        }
+        })?;
         let most = full_scale * full_scale * samples.len() as f64;
         Ok(FilePsnr {
             psnr: 10.0 * (most / rounded).log10(),

@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
     arg_required_else_help = false,
     after_help = "\
 Examples:
-  gip encode photo.jpg photo.gip                     a medium quality
+  gip encode photo.jpg photo.gip                     a good quality
   gip encode photo.png small.gip --size 20000        a file of 20,000 bytes
   gip decode photo.gip photo.png                     back to pixels
   gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
@@ -48,7 +48,7 @@ pub(crate) enum Command {
 #[command(
     allow_negative_numbers = true,
     after_help = "\
-At most one of --gaussians, --bpp, --size, --psnr and --quality may be given. If the target cannot
+At most one of --gaussians, --bpp, --size, --psnr, --quality and --lambda may be given. If the target cannot
 be met, the file comes as close as possible, and the report gives the reason."
 )]
 pub(crate) struct Encode {
@@ -79,15 +79,15 @@ pub(crate) struct Encode {
     /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.
     ///
     /// Fields: width, height, gaussians (their number), bytes, bpp (bits per pixel of the whole
-    /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples),
-    /// iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
+    /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples), quality
+    /// (an estimate of SSIMULACRA2, from 0 to 100), iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
     /// (in bytes), shortfall (null, or why the target was not met). An infinite PSNR, of an exact
     /// copy, is given as 999.
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// The target that the file has to meet. Without any of them it is --quality 50.
+/// The target that the file has to meet. Without any of them it is --quality 75.
 #[derive(Debug, clap::Args)]
 #[group(multiple = false)]
 pub(crate) struct TargetArgs {
@@ -107,10 +107,15 @@ pub(crate) struct TargetArgs {
     #[arg(long, help_heading = "Targets", value_name = "DB",
           value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
-    /// A quality from 0 (smallest) to 100 (best) [default: 50].
+    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2 [default: 75].
     #[arg(long, help_heading = "Targets", value_name = "Q",
           value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,
+    /// A Lagrange multiplier from 0.01 to 1000000: the squared error that a bit must save, where
+    /// samples are 0 to 255. For comparisons over many pictures.
+    #[arg(long, help_heading = "Targets", value_name = "L",
+          value_parser = |text: &str| number(text, 0.01, 1e6))]
+    lambda: Option<f64>,
 }
 
 impl TargetArgs {
@@ -121,6 +126,7 @@ impl TargetArgs {
             .or(self.size.map(Target::Bytes))
             .or(self.psnr.map(Target::Psnr))
             .or(self.quality.map(Target::Quality))
+            .or(self.lambda.map(Target::Lambda))
             .unwrap_or_default()
     }
 }
@@ -346,6 +352,7 @@ mod tests {
         assert_eq!(target(&["--size", "900"]), Some(Target::Bytes(900)));
         assert_eq!(target(&["--psnr", "31.5"]), Some(Target::Psnr(31.5)));
         assert_eq!(target(&["--quality", "0"]), Some(Target::Quality(0.0)));
+        assert_eq!(target(&["--lambda", "700"]), Some(Target::Lambda(700.0)));
         assert_eq!(target(&["--quality", "50", "--psnr", "30"]), None);
     }
 

@@ -85,6 +85,7 @@ struct JsonReport {
     bpp: f64,
     psnr: f64,
     psnr_float: f64,
+    quality: f64,
     iterations: u32,
     evaluations: u64,
     seconds: f64,
@@ -104,6 +105,7 @@ impl JsonReport {
             bpp: bits_per_pixel(bytes, width, height),
             psnr: json_psnr(encoded.report.psnr),
             psnr_float: json_psnr(encoded.report.psnr_float),
+            quality: encoded.report.quality,
             iterations: encoded.report.iterations,
             evaluations: encoded.report.evaluations,
             seconds: encoded.report.seconds,
@@ -114,10 +116,10 @@ impl JsonReport {
 
     /// The report as text.
     fn to_line(&self, output: &Path, psnr: f64) -> String {
-        let Self { width, height, gaussians, bytes, bpp, seconds, .. } = self;
+        let Self { width, height, gaussians, bytes, bpp, quality, seconds, .. } = self;
         let mut line = format!(
             "{}: {width}x{height}, {gaussians} Gaussians, {bytes} bytes, {bpp:.3} bpp, \
-             {psnr:.2} dB, {seconds:.1} s",
+             {psnr:.2} dB, quality {quality:.0}, {seconds:.1} s",
             files::output_name(output)
         );
         if let Some(shortfall) = &self.shortfall {

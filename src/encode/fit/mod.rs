@@ -154,8 +154,9 @@ impl<'a> Fit<'a> {
         self.settle(observer)
     }
 
-    /// Adds `count` Gaussians to a finished fit and trains all for a quarter of the iterations more.
-    pub(crate) fn extend(
+    /// Adds or removes Gaussians of a finished fit, so that there are `count`, and trains all for a
+    /// quarter of the iterations more.
+    pub(crate) fn resize(
         &mut self,
         count: usize,
         observer: &mut Observer<'_>,
@@ -166,7 +167,8 @@ impl<'a> Fit<'a> {
             self.binned_for = 0;
         }
         self.forward(observer)?;
-        self.grow(count, observer)?;
+        self.cull(self.len().saturating_sub(count));
+        self.grow(count.saturating_sub(self.len()), observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
         for iteration in 0..iterations {
@@ -225,7 +227,11 @@ impl<'a> Fit<'a> {
     /// The number of Gaussians that the budget sets, if training changes the error by the factor
     /// `foreseen`.
     fn wanted(&self, foreseen: f64) -> usize {
-        self.budget.wanted(self.parameters.len(), self.error.squared * foreseen, self.most())
+        let error = match self.budget {
+            Budget::DistortionPerGaussian(_) => self.error.distortion,
+            _ => self.error.squared,
+        };
+        self.budget.wanted(self.len(), error * foreseen, self.most())
     }
 
     /// How many Gaussians this growth step adds. `kept` Gaussians remain when the surplus has been
@@ -233,7 +239,7 @@ impl<'a> Fit<'a> {
     fn portion(&self, kept: usize, steps_left: u32) -> usize {
         let densification = &self.training.densification;
         let grown = kept as f64 * (1.0 + f64::from(densification.surplus));
-        let missing = (grown.round() as usize).saturating_sub(self.parameters.len());
+        let missing = (grown.round() as usize).saturating_sub(self.len());
         match densification.portion {
             _ if steps_left == 0 => missing,
             Portion::Even => missing.div_ceil(steps_left as usize + 1),

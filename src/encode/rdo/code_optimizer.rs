@@ -12,10 +12,10 @@ use crate::encode::file::{FileLayout, write_entropy_layers};
 use crate::encode::progress::Observer;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
-use crate::encode::strips::strips;
+use crate::encode::strips;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
-use crate::render::{Picture, RenderOptions};
+use crate::render::Picture;
 
 /// A penalty for the time that a decoder takes, in bits per Gaussian on average, shared out by the
 /// tiles that each Gaussian touches. It lowers the number of those tiles by 2 to 4 % at the same
@@ -121,14 +121,9 @@ impl<'a> CodeOptimizer<'a> {
         let header = self.layout.header();
         let limits = Limits::none();
         let rendering = Picture::new(header, &gaussians, &limits, 0);
-        let mut planes = Vec::new();
-        for region in strips(header.width, header.height) {
-            observer.poll()?;
-            planes.resize(region.pixels() as usize * self.raster.channels, 0.0);
-            let options = RenderOptions::new().with_region(region);
-            rendering.render_planes(&options, &mut planes).expect("there are no limits");
-            residuals.set(self.raster, region.y as usize, &planes);
-        }
+        strips::render(&rendering, u32::MAX, observer, |region, planes| {
+            residuals.set(self.raster, region.y as usize, planes);
+        })?;
         if let Some(sensitivity) = &self.raster.sensitivity {
             observer.poll()?;
             residuals.shift(sensitivity);

@@ -1,6 +1,7 @@
 //! The search for the quantization step with which a file meets its target.
 
 use crate::encode::options::Target;
+use crate::encode::quality::dissimilarity_at;
 
 /// The share of a target size that is aimed at.
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
@@ -10,23 +11,28 @@ const AIMED_PSNR_EXCESS: f64 = 0.02;
 /// right side is preferred.
 const WRONG_SIDE_PENALTY: f64 = 1e3;
 
-/// The size or PSNR that is aimed at, inside the tolerance of the target.
+/// The size, PSNR or visual quality that is aimed at, inside the tolerance of the target.
 ///
-/// The *deviation* of a file is the base-2 logarithm of its size, or of its squared error, divided
-/// by the one that is aimed at. It is positive for files that are too large or too distorted.
+/// The *deviation* of a file is the base-2 logarithm of its size, of its squared error, or of its
+/// dissimilarity to the eye, divided by the one that is aimed at. It is positive for files that are too large or too distorted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Aim {
     /// A size in bytes.
     Size { most: f64 },
     /// A PSNR of the decoded file in dB.
     Psnr(f64),
+    /// A dissimilarity to the eye.
+    Dissimilarity(f64),
 }
 
 impl Aim {
-    /// The aim for a target; `None` if the target is neither a size nor a PSNR.
+    /// The aim for a target; `None` if the target is no size, PSNR or quality.
     pub(crate) fn new(target: Target, pixels: usize) -> Option<Self> {
         if let Target::Psnr(psnr) = target {
             return Some(Self::Psnr(psnr + AIMED_PSNR_EXCESS));
+        }
+        if let Some(quality) = target.quality() {
+            return Some(Self::Dissimilarity(dissimilarity_at(quality)));
         }
         target.bytes(pixels).map(|bytes| Self::Size { most: AIMED_SHARE_OF_SIZE * bytes as f64 })
     }
@@ -37,6 +43,8 @@ impl Aim {
             // A file that is a little too large will be shortened.
             Self::Size { .. } => (-0.009, 0.011),
             Self::Psnr(_) => (-0.009, 0.006),
+            // At a quality of 75, a third of a point; less at a higher one.
+            Self::Dissimilarity(_) => (-0.03, 0.03),
         };
         if deviation > above {
             return WRONG_SIDE_PENALTY + deviation;
@@ -48,7 +56,7 @@ impl Aim {
     pub(crate) fn by_step(self) -> f64 {
         match self {
             Self::Size { .. } => -0.38,
-            Self::Psnr(_) => 0.36,
+            Self::Psnr(_) | Self::Dissimilarity(_) => 0.36,
         }
     }
 
@@ -56,7 +64,7 @@ impl Aim {
     pub(crate) fn by_lambda(self) -> f64 {
         match self {
             Self::Size { .. } => -0.04,
-            Self::Psnr(_) => 0.08,
+            Self::Psnr(_) | Self::Dissimilarity(_) => 0.08,
         }
     }
 }

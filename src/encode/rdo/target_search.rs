@@ -7,6 +7,7 @@ use crate::encode::error::EncodeError;
 use crate::encode::file::FileLayout;
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
+use crate::encode::quality::Judge;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
 use crate::encode::source::Source;
@@ -45,6 +46,7 @@ const MOST_TRIMMINGS: u32 = 32;
 pub(crate) struct TargetSearch<'a> {
     source: &'a Source<'a>,
     raster: &'a Raster,
+    judge: &'a Judge,
     layout: &'a FileLayout<'a>,
     /// Passes of coordinate descent; for a target there may be a few more.
     passes: u32,
@@ -55,10 +57,11 @@ impl<'a> TargetSearch<'a> {
     pub(crate) fn new(
         source: &'a Source<'a>,
         raster: &'a Raster,
+        judge: &'a Judge,
         layout: &'a FileLayout<'a>,
         passes: u32,
     ) -> Self {
-        Self { source, raster, layout, passes, codes: CodeOptimizer::new(raster, layout) }
+        Self { source, raster, judge, layout, passes, codes: CodeOptimizer::new(raster, layout) }
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
@@ -69,7 +72,10 @@ impl<'a> TargetSearch<'a> {
         target: Target,
         observer: &mut Observer<'_>,
     ) -> Result<LatticeCodes, EncodeError> {
-        let step = rate_model::step_for(distortion, gaussians.len());
+        let step = match target {
+            Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
+            _ => rate_model::step_for(distortion, gaussians.len()),
+        };
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let mut coded = self.codes.rounded(gaussians, step);
             self.codes.descend(&mut coded, 0.0, self.passes, observer)?;
@@ -157,7 +163,7 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
-        if matches!(aim, Aim::Psnr(_)) {
+        if !matches!(aim, Aim::Size { .. }) {
             return Ok(search.at);
         }
         for _ in 0..MOST_ROUNDING_TRIES {
@@ -238,6 +244,11 @@ impl<'a> TargetSearch<'a> {
                 let verified = Verified::new(&file, self.source);
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
                 ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
+            }
+            Aim::Dissimilarity(dissimilarity) => {
+                let verified = Verified::new(&file, self.source);
+                let reached = self.judge.dissimilarity(&verified.picture(), observer)?;
+                (reached / dissimilarity).log2().max(-LARGEST_DEVIATION)
             }
         })
     }
