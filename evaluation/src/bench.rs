@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
-use crate::pictures::{self, TestPicture};
+use crate::pictures::{self, PictureSet, TestPicture};
 use crate::store::Store;
 use crate::{gip, provenance};
 
@@ -18,7 +18,10 @@ const QUICK_ITERATIONS: u32 = 2_000;
 /// The pictures and settings of a run, and where its measurements are kept.
 #[derive(Debug)]
 pub(crate) struct Bench {
+    /// What all sections are about, Kodak's in the committed report.
     pub(crate) pictures: Vec<TestPicture>,
+    /// A second set, for the sections about quality: no constant was chosen to suit Kodak alone.
+    photos: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -33,14 +36,17 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(
-        images: &Path,
+        kodak: &Path,
+        photos: Option<&Path>,
         folder: PathBuf,
         quick: bool,
         iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
+        let load = |folder| pictures::load(folder, quick.then_some(QUICK_PICTURES));
         let bench = Self {
-            pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
+            pictures: load(kodak)?,
+            photos: photos.map(load).transpose()?.unwrap_or_default(),
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
@@ -56,7 +62,7 @@ impl Bench {
     /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        for picture in &self.pictures {
+        for picture in self.pictures.iter().chain(&self.photos) {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -67,6 +73,15 @@ impl Bench {
             );
         }
         Ok(())
+    }
+
+    /// The sets of pictures, the first of which is [`Self::pictures`].
+    pub(crate) fn sets(&self) -> Vec<PictureSet> {
+        let mut sets = vec![PictureSet { name: "Kodak", pictures: self.pictures.clone() }];
+        if !self.photos.is_empty() {
+            sets.push(PictureSet { name: "photos", pictures: self.photos.clone() });
+        }
+        sets
     }
 
     /// At most so many of the pictures, evenly spread.
@@ -146,7 +161,7 @@ mod tests {
         let open = |gray: u8| {
             let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
             picture.save(images.path().join("a.png")).expect("it is written");
-            Bench::new(images.path(), report.path().into(), false, None, None)
+            Bench::new(images.path(), None, report.path().into(), false, None, None)
         };
         assert!(open(1).is_ok());
         assert!(open(1).is_ok());

@@ -7,6 +7,7 @@ mod curve;
 mod gip;
 mod kernel_benchmark;
 mod memory;
+mod metric;
 mod pictures;
 mod plot;
 mod provenance;
@@ -14,6 +15,7 @@ mod report;
 mod sections;
 mod store;
 mod table;
+mod visual;
 
 use std::fs;
 use std::path::PathBuf;
@@ -33,9 +35,12 @@ use sections::{ablation, content, decode, rate, representation, speed, stability
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 struct Args {
-    /// Folder with the pictures, as .png.
+    /// Folder with the Kodak pictures, as .png.
+    #[arg(long, value_name = "DIR", alias = "images")]
+    kodak: PathBuf,
+    /// Folder with a second set of photographs, as .png, for the sections about quality.
     #[arg(long, value_name = "DIR")]
-    images: PathBuf,
+    photos: Option<PathBuf>,
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
@@ -59,8 +64,14 @@ fn main() -> Result<()> {
     let args = Args::parse();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench =
-        Bench::new(&args.images, args.out, args.quick, args.iterations, args.reference)?;
+    let mut bench = Bench::new(
+        &args.kodak,
+        args.photos.as_deref(),
+        args.out,
+        args.quick,
+        args.iterations,
+        args.reference,
+    )?;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
@@ -93,9 +104,9 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
-        let args = ["evaluation", "--images", "a", "--out", "b", "--only", "rate"];
+        let args = ["evaluation", "--kodak", "a", "--out", "b", "--only", "rate"];
         let args = Args::try_parse_from(args).expect("it is as the README has it");
         assert_eq!(args.only, [Section::Rate]);
-        assert!(Args::try_parse_from(["evaluation", "--images", "a"]).is_err());
+        assert!(Args::try_parse_from(["evaluation", "--kodak", "a"]).is_err());
     }
 }

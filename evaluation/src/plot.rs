@@ -35,6 +35,7 @@ pub(crate) struct Plot<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Corner {
     UpperLeft,
+    UpperRight,
     LowerRight,
 }
 
@@ -108,6 +109,7 @@ impl Plot<'_> {
             .configure_series_labels()
             .position(match self.legend {
                 Corner::UpperLeft => SeriesLabelPosition::UpperLeft,
+                Corner::UpperRight => SeriesLabelPosition::UpperRight,
                 Corner::LowerRight => SeriesLabelPosition::LowerRight,
             })
             .background_style(WHITE.mix(0.85))

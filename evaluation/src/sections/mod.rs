@@ -4,6 +4,7 @@
 //! There are only declarations here, so that no module has to import its parent.
 
 pub(crate) mod ablation;
+mod codec_curves;
 pub(crate) mod content;
 pub(crate) mod decode;
 mod f64_renderer;
@@ -13,6 +14,8 @@ mod methods;
 mod positions;
 mod product_tests;
 pub(crate) mod rate;
+mod rate_store;
+mod reference;
 pub(crate) mod representation;
 pub(crate) mod speed;
 pub(crate) mod stability;
