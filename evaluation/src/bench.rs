@@ -122,18 +122,23 @@ impl Bench {
 
     /// Where the measurements come from: the list at the head of every section.
     pub(crate) fn provenance(&self) -> String {
-        let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
+        let names = |pictures: &[TestPicture]| {
+            let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
+            format!("{}: {}", names.len(), names.join(", "))
+        };
         let mut list = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
-             of which some tables take fewer and say so: {}\n",
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- Pictures, of \
+             which some tables take fewer and say so: {}\n",
             self.machine,
             self.product,
             provenance::commit(),
             provenance::compiler(),
             gip::SEED,
-            names.len(),
-            names.join(", "),
+            names(&self.pictures),
         );
+        if !self.photos.is_empty() {
+            list.push_str(&format!("- Photos, where tables name them: {}\n", names(&self.photos)));
+        }
         if let Some(worker) = &self.worker {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }

@@ -40,7 +40,7 @@ pub(crate) enum Corner {
 }
 
 /// Colours that can be told apart, also by those who see no red or green (Okabe and Ito).
-const COLORS: [RGBColor; 8] = [
+const COLORS: [RGBColor; 9] = [
     RGBColor(213, 94, 0),
     RGBColor(0, 114, 178),
     RGBColor(0, 158, 115),
@@ -49,6 +49,7 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(230, 159, 0),
     RGBColor(0, 0, 0),
     RGBColor(140, 140, 140),
+    RGBColor(240, 228, 66),
 ];
 
 impl Plot<'_> {
