@@ -78,9 +78,11 @@ aom at speed 6, 4:2:0, with libavif's default tuning (tune=iq, for perceived qua
 tune=psnr; JPEG XL is libjxl's effort 7, tuned for perceived quality.";
 
 /// A picture encoded and decoded by a baseline.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct RoundTrip {
     pub(crate) bytes: f64,
+    /// The samples that were decoded.
+    pub(crate) decoded: Vec<u8>,
     pub(crate) distortion: Distortion,
     pub(crate) encode_seconds: f64,
     pub(crate) decode_seconds: f64,
@@ -140,8 +142,9 @@ impl Worker {
         let [bytes, encode_seconds, decode_seconds] = numbers[..] else {
             bail!("the worker answered `{answer}`");
         };
-        let distortion = picture.distortion(&fs::read(&self.decoded)?)?;
-        Ok(RoundTrip { bytes, distortion, encode_seconds, decode_seconds })
+        let decoded = fs::read(&self.decoded)?;
+        let distortion = picture.distortion(&decoded)?;
+        Ok(RoundTrip { bytes, decoded, distortion, encode_seconds, decode_seconds })
     }
 
     /// The median time in seconds of decoding the last file so many times more.

@@ -1,5 +1,6 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
@@ -27,6 +28,8 @@ pub(crate) struct Bench {
     pub(crate) iterations: u32,
     /// CSV with measurements of the baselines from elsewhere.
     pub(crate) reference: Option<PathBuf>,
+    /// Where to write the README's picture.
+    pub(crate) readme_picture: Option<PathBuf>,
     /// The version of our codec.
     pub(crate) product: String,
     machine: String,
@@ -50,6 +53,7 @@ impl Bench {
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
+            readme_picture: None,
             product: provenance::product(),
             machine: provenance::machine(),
             folder,
@@ -110,6 +114,28 @@ impl Bench {
         Store::open(&self.path(name), &self.machine, keys, values)
     }
 
+    /// A file that takes long to make: from the folder of files of this version of our codec, or
+    /// else made now and kept there.
+    pub(crate) fn file(
+        &self,
+        name: &str,
+        make: impl FnOnce() -> Result<Vec<u8>>,
+    ) -> Result<Vec<u8>> {
+        let folder = self.path("files").join(&self.product);
+        let path = folder.join(name);
+        if let Ok(bytes) = fs::read(&path) {
+            return Ok(bytes);
+        }
+        eprintln!("{name}");
+        let bytes = make()?;
+        fs::create_dir_all(&folder)?;
+        // Renamed when it is whole, so that an interruption leaves no part of it under its name.
+        let new = path.with_extension("new");
+        fs::write(&new, &bytes)?;
+        fs::rename(new, path)?;
+        Ok(bytes)
+    }
+
     /// The baselines, with their versions in one line.
     pub(crate) fn baselines(&mut self) -> Result<(&mut Worker, String)> {
         let worker = match self.worker.take() {
@@ -158,6 +184,18 @@ pub(crate) fn timing_version(product: &str, versions: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn files_are_made_once() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
+        let bench = Bench::new(images.path(), None, report.path().into(), false, None, None);
+        let bench = bench.expect("there is a picture");
+        assert!(bench.file("a.gip", || anyhow::bail!("it cannot be made")).is_err());
+        assert_eq!(bench.file("a.gip", || Ok(vec![1, 2])).expect("it is made"), [1, 2]);
+        assert_eq!(bench.file("a.gip", || Ok(vec![3])).expect("it is kept"), [1, 2]);
+    }
 
     #[test]
     fn another_picture_of_the_same_name_is_refused() {

@@ -87,7 +87,7 @@ pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
 }
 
 /// The samples of a file.
-fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
+pub(crate) fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
     let mut decoder = Decoder::new(file)?;
     decoder.set_options(RenderOptions::new().with_threads(threads));
     let mut samples = vec![0; decoder.output_len()?];

@@ -2,6 +2,7 @@
 
 mod baselines;
 mod bench;
+mod canvas;
 mod comparison;
 mod curve;
 mod gip;
@@ -26,7 +27,7 @@ use clap::Parser;
 
 use bench::Bench;
 use report::Section;
-use sections::{ablation, content, decode, rate, representation, speed, stability};
+use sections::{ablation, content, decode, rate, representation, sheet, speed, stability};
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
@@ -57,6 +58,10 @@ struct Args {
     /// needs the columns codec, quality, image, bytes, psnr and msssim of `rate.csv`.
     #[arg(long, value_name = "CSV")]
     reference: Option<PathBuf>,
+    /// JPEG for the README: the crops of all pictures in which we compare best and worst. The
+    /// section `sheet` writes it.
+    #[arg(long, value_name = "JPEG")]
+    readme_picture: Option<PathBuf>,
 }
 
 fn main() -> Result<()> {
@@ -72,6 +77,7 @@ fn main() -> Result<()> {
         args.iterations,
         args.reference,
     )?;
+    bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
@@ -89,6 +95,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
+        Section::Sheet => sheet::measure(bench),
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),
         Section::Stability => stability::measure(bench),

@@ -23,7 +23,9 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
-    /// Time against PSNR, and how time and memory grow
+    /// What one sees at equal size: contact sheets of crops
+    Sheet,
+    /// Time against quality, and how time and memory grow
     Speed,
     /// Decoding time against other decoders; threads and partial decoding
     Decode,
@@ -35,10 +37,11 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 8] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
+        Self::Sheet,
         Self::Speed,
         Self::Decode,
         Self::Stability,
@@ -50,6 +53,7 @@ impl Section {
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
+            Self::Sheet => "Contact sheets",
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",

@@ -2,12 +2,23 @@
 
 use anyhow::{Result, anyhow};
 use butteraugli::{ButteraugliError, ButteraugliParams, Img, RGB8, butteraugli};
-use fast_ssim2::{PixelDescriptor, PixelSlice, compute_ssimulacra2};
+use fast_ssim2::{PixelDescriptor, PixelSlice, compute_ssimulacra2, compute_ssimulacra2_maps};
 
 /// SSIMULACRA2: 100 for equal pictures; 90 is hard to tell from the source, 70 is high quality, 50
 /// is medium, 30 is low.
 pub(crate) fn ssimulacra2(source: &[u8], decoded: &[u8], width: u32, height: u32) -> Result<f64> {
     Ok(compute_ssimulacra2(&pixels(source, width, height)?, &pixels(decoded, width, height)?)?)
+}
+
+/// What each pixel contributes to SSIMULACRA2: 0 where the pictures agree, more where they differ.
+pub(crate) fn ssimulacra2_map(
+    source: &[u8],
+    decoded: &[u8],
+    width: u32,
+    height: u32,
+) -> Result<Vec<f32>> {
+    let (source, decoded) = (pixels(source, width, height)?, pixels(decoded, width, height)?);
+    Ok(compute_ssimulacra2_maps(&source, &decoded)?.diffmap())
 }
 
 fn pixels(samples: &[u8], width: u32, height: u32) -> Result<PixelSlice<'_>> {
@@ -87,6 +98,22 @@ mod tests {
             let norm = norm.expect("equal sizes");
             assert!((norm / libjxl - 1.0).abs() < 1e-4, "{values}: {norm} {libjxl}");
         }
+    }
+
+    #[test]
+    fn the_map_shows_where_the_error_is() {
+        let (source, width) = (picture(), SIDES.0 as usize);
+        let mut decoded = source.clone();
+        // Only the left quarter is coarser.
+        for row in decoded.chunks_exact_mut(3 * width) {
+            let coarse = coarser(&row[..3 * width / 4], 40);
+            row[..coarse.len()].copy_from_slice(&coarse);
+        }
+        let map = ssimulacra2_map(&source, &decoded, SIDES.0, SIDES.1).expect("equal sizes");
+        let sum = |columns: std::ops::Range<usize>| -> f32 {
+            map.chunks_exact(width).flat_map(|row| &row[columns.clone()]).sum()
+        };
+        assert!(sum(0..width / 4) > 10.0 * sum(width / 2..width * 3 / 4));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 pub(crate) mod ablation;
 mod codec_curves;
 pub(crate) mod content;
+mod crops;
 pub(crate) mod decode;
 mod f64_renderer;
 mod float_file;
@@ -17,6 +18,7 @@ pub(crate) mod rate;
 mod rate_store;
 mod reference;
 pub(crate) mod representation;
+pub(crate) mod sheet;
 pub(crate) mod speed;
 pub(crate) mod stability;
 mod two_level;
