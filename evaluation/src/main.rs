@@ -27,7 +27,9 @@ use clap::Parser;
 
 use bench::Bench;
 use report::Section;
-use sections::{ablation, content, decode, rate, representation, sheet, speed, stability};
+use sections::{
+    ablation, content, decode, printed_curves, rate, representation, sheet, speed, stability,
+};
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
@@ -95,6 +97,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
+        Section::Printed => printed_curves::measure(bench),
         Section::Sheet => sheet::measure(bench),
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),

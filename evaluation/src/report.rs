@@ -23,6 +23,8 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
+    /// Our curve on Kodak beside those that papers print
+    Printed,
     /// What one sees at equal size: contact sheets of crops
     Sheet,
     /// Time against quality, and how time and memory grow
@@ -37,10 +39,11 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 9] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
+        Self::Printed,
         Self::Sheet,
         Self::Speed,
         Self::Decode,
@@ -53,6 +56,7 @@ impl Section {
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
+            Self::Printed => "Beside printed curves",
             Self::Sheet => "Contact sheets",
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",

@@ -16,27 +16,52 @@ use crate::table::mean;
 pub(super) struct Variant {
     pub(super) name: &'static str,
     pub(super) encoder: fn(u8) -> Encoder,
-    /// What it is asked for, in bits per pixel.
-    pub(super) rates: &'static [f64],
+    /// What it is asked for.
+    pub(super) targets: &'static [Target],
 }
+
+/// Rates to ask an encoder for.
+pub(super) const RATES: &[Target] = &[
+    Target::BitsPerPixel(0.1),
+    Target::BitsPerPixel(0.15),
+    Target::BitsPerPixel(0.25),
+    Target::BitsPerPixel(0.35),
+    Target::BitsPerPixel(0.5),
+    Target::BitsPerPixel(0.75),
+    Target::BitsPerPixel(1.0),
+    Target::BitsPerPixel(1.5),
+];
 
 /// Our encoder as it is by default, and then other ways to run it: "gip, --tune psnr" has its place
 /// here as soon as the encoder knows that.
-pub(super) const OURS: &[Variant] = &[Variant {
-    name: gip::NAME,
-    encoder: gip::encoder,
-    rates: &[0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1.0, 1.5],
-}];
+pub(super) const OURS: &[Variant] =
+    &[Variant { name: gip::NAME, encoder: gip::encoder, targets: RATES }];
 
-/// The rates of a quick run.
-const QUICK_RATES: [f64; 5] = [0.15, 0.25, 0.5, 0.75, 1.05];
-/// A quick run takes one in so many of a baseline's settings, and the last.
+/// A quick run takes one in so many settings, and the last.
 const QUICK_STEP: usize = 3;
 
 impl Variant {
-    pub(super) fn rates(&self, quick: bool) -> &'static [f64] {
-        if quick { &QUICK_RATES } else { self.rates }
+    /// What the encoder is asked for, in the words of the stored measurements.
+    pub(super) fn settings(&self) -> Vec<String> {
+        self.targets.iter().map(|&target| setting(target)).collect()
     }
+}
+
+/// A target at the default effort.
+pub(super) fn setting(target: Target) -> String {
+    let target = match target {
+        Target::BitsPerPixel(rate) => format!("{rate} bpp"),
+        Target::Quality(quality) => format!("quality {quality}"),
+        other => format!("{other:?}"),
+    };
+    format!("{target}, effort {}", gip::EFFORT)
+}
+
+/// All of some settings, or those of a quick run.
+fn chosen<T: Clone>(settings: &[T], quick: bool) -> Vec<T> {
+    let (step, last) = (if quick { QUICK_STEP } else { 1 }, settings.len() - 1);
+    let index = (0..=last).filter(|&index| index % step == 0 || index == last);
+    index.map(|index| settings[index].clone()).collect()
 }
 
 /// A codec with the measurements of all its files.
@@ -50,7 +75,7 @@ pub(super) struct Codec {
 }
 
 impl Codec {
-    /// A variant of ours, asked for each of its rates.
+    /// A variant of ours, asked for each of its targets.
     pub(super) fn ours(
         store: &mut RateStore,
         version: &str,
@@ -58,12 +83,10 @@ impl Codec {
         pictures: &[TestPicture],
         quick: bool,
     ) -> Result<Self> {
-        let rates = variant.rates(quick);
-        let settings: Vec<String> =
-            rates.iter().map(|rate| format!("{rate} bpp, effort {}", gip::EFFORT)).collect();
-        let points = points(pictures, rates.len(), |picture, index| {
-            let target = Target::BitsPerPixel(rates[index]);
-            let encoder = (variant.encoder)(gip::EFFORT).with_target(target);
+        let targets = chosen(variant.targets, quick);
+        let settings = chosen(&variant.settings(), quick);
+        let points = points(pictures, targets.len(), |picture, index| {
+            let encoder = (variant.encoder)(gip::EFFORT).with_target(targets[index]);
             store.ours(version, variant.name, &settings[index], encoder, picture)
         })?;
         Ok(Self { id: variant.name, name: variant.name, settings, points })
@@ -78,15 +101,11 @@ impl Codec {
         pictures: &[TestPicture],
         quick: bool,
     ) -> Result<Self> {
-        let step = if quick { QUICK_STEP } else { 1 };
-        let last = baseline.settings.len() - 1;
-        let settings: Vec<String> = (0..=last)
-            .filter(|&index| index % step == 0 || index == last)
-            .map(|index| baseline.settings[index].to_owned())
-            .collect();
+        let settings = chosen(baseline.settings, quick);
         let points = points(pictures, settings.len(), |picture, index| {
-            store.baseline(worker, versions, baseline, &settings[index], picture)
+            store.baseline(worker, versions, baseline, settings[index], picture)
         })?;
+        let settings = settings.into_iter().map(str::to_owned).collect();
         Ok(Self { id: baseline.id, name: baseline.name, settings, points })
     }
 

@@ -13,6 +13,7 @@ mod float_file;
 mod growth;
 mod methods;
 mod positions;
+pub(crate) mod printed_curves;
 mod product_tests;
 pub(crate) mod rate;
 mod rate_store;

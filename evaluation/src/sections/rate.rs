@@ -9,7 +9,6 @@ use crate::baselines::{BASELINES, BEST_AVIF, Baseline, DESCRIPTION};
 use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::bd_rate;
-use crate::gip;
 use crate::metric::Metric;
 use crate::pictures::PictureSet;
 use crate::plot::{Corner, Plot, Scale, Series};
@@ -38,7 +37,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     for set in bench.sets() {
         comparisons.push(comparison(bench, &mut store, set, &baselines)?);
     }
-    let mut text = introduction(bench);
+    let mut text = introduction();
     if let Some(path) = &bench.reference {
         let kodak = &comparisons[0];
         text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.codecs[OURS.len()..])?);
@@ -66,19 +65,17 @@ fn hard_pictures(bench: &Bench) -> Option<PictureSet> {
     (!bench.quick && !set.pictures.is_empty()).then_some(set)
 }
 
-fn introduction(bench: &Bench) -> String {
-    let ours = OURS.iter().map(|variant| {
-        let rates: Vec<String> = variant.rates(bench.quick).iter().map(f64::to_string).collect();
-        format!("{} is asked for {} bits per pixel", variant.name, rates.join(", "))
-    });
+fn introduction() -> String {
+    let ours = OURS
+        .iter()
+        .map(|variant| format!("{} is asked for: {}", variant.name, variant.settings().join("; ")));
     format!(
-        "Compared with: {DESCRIPTION} At effort {}, {}. SSIMULACRA2 is 100 for equal pictures; 90 \
+        "Compared with: {DESCRIPTION} {}. SSIMULACRA2 is 100 for equal pictures; 90 \
          is hard to tell from the source, 70 is high quality, 50 medium, 30 low. Butteraugli is \
          its 3-norm at 80 nits: lower is better. Both equal what the tools of libjxl 0.11 print. \
          BD-rate is from {} to {} bits per pixel: how much larger (+) or smaller (-) our files are \
          at equal quality.\n",
-        gip::EFFORT,
-        ours.collect::<Vec<_>>().join("; "),
+        ours.collect::<Vec<_>>().join(". "),
         BD_RANGE.0,
         BD_RANGE.1,
     )
