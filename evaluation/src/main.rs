@@ -28,7 +28,8 @@ use clap::Parser;
 use bench::Bench;
 use report::Section;
 use sections::{
-    ablation, content, decode, printed_curves, rate, representation, sheet, speed, stability,
+    ablation, content, decode, printed_curves, quality, rate, representation, sheet, speed,
+    stability,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -98,6 +99,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
         Section::Printed => printed_curves::measure(bench),
+        Section::Quality => quality::measure(bench),
         Section::Sheet => sheet::measure(bench),
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),

@@ -25,6 +25,8 @@ pub(crate) enum Section {
     Rate,
     /// Our curve on Kodak beside those that papers print
     Printed,
+    /// Whether the same quality looks the same on every picture
+    Quality,
     /// What one sees at equal size: contact sheets of crops
     Sheet,
     /// Time against quality, and how time and memory grow
@@ -39,11 +41,12 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
         Self::Printed,
+        Self::Quality,
         Self::Sheet,
         Self::Speed,
         Self::Decode,
@@ -57,6 +60,7 @@ impl Section {
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
             Self::Printed => "Beside printed curves",
+            Self::Quality => "Quality as asked for",
             Self::Sheet => "Contact sheets",
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",

@@ -15,6 +15,7 @@ mod methods;
 mod positions;
 pub(crate) mod printed_curves;
 mod product_tests;
+pub(crate) mod quality;
 pub(crate) mod rate;
 mod rate_store;
 mod reference;
