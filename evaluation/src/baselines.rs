@@ -59,7 +59,7 @@ pub(crate) const BASELINES: [Baseline; 7] = [
 const AVIF_SETTINGS: [&str; 14] =
     ["1", "10", "15", "20", "25", "30", "40", "50", "60", "70", "80", "88", "95", "98"];
 
-/// The best that AVIF can do. It takes half a minute for a picture, so it is measured on a few.
+/// The best that AVIF can do. It takes up to half a minute for a picture, so it is measured on a few.
 pub(crate) const BEST_AVIF: Baseline = Baseline {
     id: "avif444_s0",
     name: "AVIF speed 0, 4:4:4",
@@ -75,7 +75,8 @@ pub(crate) const DESCRIPTION: &str = "JPEG is 4:2:0, progressive, with optimised
 jpegli is Google's modern encoder of JPEG, 4:2:0, with progressive scans by MozJPEG; JPEG 2000 is \
 OpenJPEG's 9/7 wavelet with its colour transform, in a .jp2; WebP is libwebp's method 6; AVIF is \
 aom at speed 6, 4:2:0, with libavif's default tuning (tune=iq, for perceived quality) and with \
-tune=psnr; JPEG XL is libjxl's effort 7, tuned for perceived quality.";
+tune=psnr; JPEG XL is libjxl's effort 7, tuned for perceived quality; from \
+distance 20 on it halves the resolution.";
 
 /// A picture encoded and decoded by a baseline.
 #[derive(Clone, Debug)]

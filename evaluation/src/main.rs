@@ -48,7 +48,7 @@ struct Args {
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
-    /// Four of the pictures and fewer settings: ten minutes on two cores.
+    /// Four pictures of each set and fewer settings: a quarter of an hour on two cores.
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].

@@ -134,8 +134,8 @@ fn summary(comparisons: &[Comparison]) -> String {
 fn against_best_avif(comparison: &Comparison) -> String {
     let pictures = comparison.set.pictures.iter().map(|picture| picture.name.as_str());
     let mut text = format!(
-        "\n### The best that AVIF can do\n\nSpeed 0 takes half a minute for a picture, so it is \
-         measured on a few, of which half are hard for us: {}.\n{}",
+        "\n### The best that AVIF can do\n\nSpeed 0 takes up to half a minute for a picture, so it \
+         is measured on a few, of which half are hard for us: {}.\n{}",
         pictures.collect::<Vec<_>>().join(", "),
         summary(std::slice::from_ref(comparison)),
     );
