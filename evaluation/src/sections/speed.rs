@@ -52,7 +52,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             ("Decoding", CodecRow::decoding),
         ] {
             let name = format!("speed-{title}-{}.svg", metric.name()).to_lowercase();
-            let title = format!("{title}, all threads: {}", metric.name());
+            let title = format!("{title}, all threads, by {}", metric.name());
             plot_scatter(bench, &name, &title, &rows, milliseconds, metric)?;
             text.push_str(&format!("\n![{title}]({name})\n"));
         }
@@ -267,7 +267,7 @@ fn plot_scatter(
         title: &format!("{title}: about {RATE} bits per pixel"),
         x: ("milliseconds", Scale::Logarithmic),
         y: (metric.with_unit(), Scale::Linear),
-        legend: Corner::UpperLeft,
+        legend: Corner::Beside,
     };
     plot.write(&bench.path(name), &series)
 }
