@@ -11,6 +11,7 @@ use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
+const QUICK_LARGE_PICTURES: usize = 1;
 /// Iterations of the published methods, if no others are asked for.
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
@@ -19,6 +20,8 @@ const QUICK_ITERATIONS: u32 = 2_000;
 #[derive(Debug)]
 pub(crate) struct Bench {
     pub(crate) pictures: Vec<TestPicture>,
+    /// Of 2,048 pixels; there may be none.
+    pub(crate) large: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -34,13 +37,16 @@ pub(crate) struct Bench {
 impl Bench {
     pub(crate) fn new(
         images: &Path,
+        large: Option<&Path>,
         folder: PathBuf,
         quick: bool,
         iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
+        let large = large.map(|large| pictures::load(large, quick.then_some(QUICK_LARGE_PICTURES)));
         let bench = Self {
             pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
+            large: large.transpose()?.unwrap_or_default(),
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
@@ -56,7 +62,7 @@ impl Bench {
     /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        for picture in &self.pictures {
+        for picture in self.pictures.iter().chain(&self.large) {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -146,7 +152,7 @@ mod tests {
         let open = |gray: u8| {
             let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
             picture.save(images.path().join("a.png")).expect("it is written");
-            Bench::new(images.path(), report.path().into(), false, None, None)
+            Bench::new(images.path(), None, report.path().into(), false, None, None)
         };
         assert!(open(1).is_ok());
         assert!(open(1).is_ok());

@@ -36,6 +36,10 @@ struct Args {
     /// Folder with the pictures, as .png.
     #[arg(long, value_name = "DIR")]
     images: PathBuf,
+    /// Folder with pictures of 2,048 pixels as .png, for `representation` at the paper's 10,000 and
+    /// 50,000 Gaussians.
+    #[arg(long, value_name = "DIR")]
+    large: Option<PathBuf>,
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
@@ -59,8 +63,14 @@ fn main() -> Result<()> {
     let args = Args::parse();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench =
-        Bench::new(&args.images, args.out, args.quick, args.iterations, args.reference)?;
+    let mut bench = Bench::new(
+        &args.images,
+        args.large.as_deref(),
+        args.out,
+        args.quick,
+        args.iterations,
+        args.reference,
+    )?;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
