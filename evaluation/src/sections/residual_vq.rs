@@ -19,8 +19,7 @@ const DECAY: f32 = 0.8;
 /// The weight of the commitment loss: the mean squared distance of a channel to the stored one, in
 /// each stage, beside the mean squared error of a sample.
 const COMMITMENT: f32 = 1.0;
-/// How many colours an entry has more than are assigned to it (Laplace smoothing), so that an entry
-/// which loses its last colour does not vanish.
+/// Added to the number of colours of an entry, so that there is a mean of none (Laplace smoothing).
 const SMOOTHING: f32 = 1e-5;
 
 /// Bits of a colour: indices of fixed length, as the paper counts them.
@@ -30,13 +29,13 @@ pub(super) const CODE_BOOK_BYTES: f64 = (STAGES * ENTRIES * size_of::<Color>()) 
 
 type Color = [f32; 3];
 
+/// The quantizer of colours at one iteration of training.
 #[derive(Clone, Debug)]
 pub(super) struct ResidualVq {
-    /// Of the picture.
+    /// Of the picture, in all and for each Gaussian.
     pixels: f32,
-    /// Of the picture, for each Gaussian.
     pixels_per_gaussian: f32,
-    /// None before the first adaptation.
+    /// One for each stage; none before training.
     code_books: Vec<CodeBook>,
 }
 
@@ -46,6 +45,7 @@ impl ResidualVq {
         Self { pixels: pixels as f32, pixels_per_gaussian: 0.0, code_books: Vec::new() }
     }
 
+    /// This quantizer an iteration later, or at the first one.
     fn following(&self, trained: &[&[f32]]) -> Self {
         let mut rest: Vec<Color> = trained.iter().map(|color| to_color(color)).collect();
         let mut rng = fastrand::Rng::with_seed(gip::SEED);
