@@ -1,7 +1,7 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
@@ -12,9 +12,25 @@ use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
+const QUICK_LARGE_PICTURES: usize = 1;
 /// Iterations of the published methods, if no others are asked for.
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
+
+/// Where the pictures are.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Folders {
+    /// Folder with the Kodak pictures, as .png.
+    #[arg(long, value_name = "DIR", alias = "images")]
+    kodak: PathBuf,
+    /// Folder with a second set of photographs, as .png, for the sections about quality.
+    #[arg(long, value_name = "DIR")]
+    photos: Option<PathBuf>,
+    /// Folder with pictures of 2,048 pixels, as .png, for `representation` at the paper's 10,000
+    /// and 50,000 Gaussians.
+    #[arg(long, value_name = "DIR")]
+    large: Option<PathBuf>,
+}
 
 /// The pictures and settings of a run, and where its measurements are kept.
 #[derive(Debug)]
@@ -23,6 +39,8 @@ pub(crate) struct Bench {
     pub(crate) pictures: Vec<TestPicture>,
     /// A second set, for the sections about quality: no constant was chosen to suit Kodak alone.
     photos: Vec<TestPicture>,
+    /// For the paper's fits at 2K.
+    pub(crate) large: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -39,17 +57,20 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(
-        kodak: &Path,
-        photos: Option<&Path>,
+        folders: &Folders,
         folder: PathBuf,
         quick: bool,
         iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
-        let load = |folder| pictures::load(folder, quick.then_some(QUICK_PICTURES));
+        let load = |folder: &PathBuf, few| pictures::load(folder, quick.then_some(few));
+        let others = |folder: &Option<PathBuf>, few| {
+            folder.as_ref().map_or(Ok(Vec::new()), |folder| load(folder, few))
+        };
         let bench = Self {
-            pictures: load(kodak)?,
-            photos: photos.map(load).transpose()?.unwrap_or_default(),
+            pictures: load(&folders.kodak, QUICK_PICTURES)?,
+            photos: others(&folders.photos, QUICK_PICTURES)?,
+            large: others(&folders.large, QUICK_LARGE_PICTURES)?,
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
@@ -66,7 +87,7 @@ impl Bench {
     /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        for picture in self.pictures.iter().chain(&self.photos) {
+        for picture in self.pictures.iter().chain(&self.photos).chain(&self.large) {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -183,15 +204,21 @@ pub(crate) fn timing_version(product: &str, versions: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    fn open(images: &Path, report: &Path) -> Result<Bench> {
+        let folders = Folders { kodak: images.into(), photos: None, large: None };
+        Bench::new(&folders, report.into(), false, None, None)
+    }
 
     #[test]
     fn files_are_made_once() {
         let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
         let (images, report) = (images.expect("a folder"), report.expect("a folder"));
         image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
-        let bench = Bench::new(images.path(), None, report.path().into(), false, None, None);
-        let bench = bench.expect("there is a picture");
+        let bench = open(images.path(), report.path()).expect("there is a picture");
         assert!(bench.file("a.gip", || anyhow::bail!("it cannot be made")).is_err());
         assert_eq!(bench.file("a.gip", || Ok(vec![1, 2])).expect("it is made"), [1, 2]);
         assert_eq!(bench.file("a.gip", || Ok(vec![3])).expect("it is kept"), [1, 2]);
@@ -201,14 +228,14 @@ mod tests {
     fn another_picture_of_the_same_name_is_refused() {
         let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
         let (images, report) = (images.expect("a folder"), report.expect("a folder"));
-        let open = |gray: u8| {
+        let open_gray = |gray: u8| {
             let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
             picture.save(images.path().join("a.png")).expect("it is written");
-            Bench::new(images.path(), None, report.path().into(), false, None, None)
+            open(images.path(), report.path())
         };
-        assert!(open(1).is_ok());
-        assert!(open(1).is_ok());
-        let refusal = open(2).expect_err("it is another picture").to_string();
+        assert!(open_gray(1).is_ok());
+        assert!(open_gray(1).is_ok());
+        let refusal = open_gray(2).expect_err("it is another picture").to_string();
         assert!(refusal.contains("another picture called a"), "{refusal}");
     }
 }

@@ -25,11 +25,10 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Parser;
 
-use bench::Bench;
+use bench::{Bench, Folders};
 use report::Section;
 use sections::{
-    ablation, content, decode, printed_curves, quality, rate, representation, sheet, speed,
-    stability,
+    ablation, content, decode, printed, quality, rate, representation, sheet, speed, stability,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -39,12 +38,8 @@ use sections::{
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 struct Args {
-    /// Folder with the Kodak pictures, as .png.
-    #[arg(long, value_name = "DIR", alias = "images")]
-    kodak: PathBuf,
-    /// Folder with a second set of photographs, as .png, for the sections about quality.
-    #[arg(long, value_name = "DIR")]
-    photos: Option<PathBuf>,
+    #[command(flatten)]
+    folders: Folders,
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
@@ -72,14 +67,8 @@ fn main() -> Result<()> {
     let args = Args::parse();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench = Bench::new(
-        &args.kodak,
-        args.photos.as_deref(),
-        args.out,
-        args.quick,
-        args.iterations,
-        args.reference,
-    )?;
+    let mut bench =
+        Bench::new(&args.folders, args.out, args.quick, args.iterations, args.reference)?;
     bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
@@ -98,7 +87,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
-        Section::Printed => printed_curves::measure(bench),
+        Section::Printed => printed::measure(bench),
         Section::Quality => quality::measure(bench),
         Section::Sheet => sheet::measure(bench),
         Section::Speed => speed::measure(bench),

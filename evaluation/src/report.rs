@@ -23,7 +23,7 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
-    /// Our curve on Kodak beside those that papers print
+    /// Our curve on Kodak beside curves and codecs that papers print
     Printed,
     /// Whether the same quality looks the same on every picture
     Quality,
@@ -59,7 +59,7 @@ impl Section {
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
-            Self::Printed => "Beside printed curves",
+            Self::Printed => "Beside printed figures",
             Self::Quality => "Quality as asked for",
             Self::Sheet => "Contact sheets",
             Self::Speed => "Speed against error",

@@ -5,7 +5,7 @@ use image_gip::training::Training;
 use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
 use super::methods::{self, PARAMETERIZATIONS};
-use super::positions;
+use super::quantizers;
 use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::{Curve, bd_rate};
@@ -85,7 +85,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let counts: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (positions, bit depths, seeds). {} All figures are means over the pictures that each \
+         (quantizers, bit depths, seeds). {} All figures are means over the pictures that each \
          table names; PSNR is that of the float rendering.\n",
         methods::description(ablation.iterations),
     );
@@ -95,7 +95,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     text.push_str(&ablation.intervals()?);
     text.push_str(&ablation.depths(counts)?);
     let iterations = ablation.own_iterations;
-    text.push_str(&positions::measure(bench, &ablation.pictures, counts, iterations)?);
+    text.push_str(&quantizers::measure(bench, &ablation.pictures, counts, iterations)?);
     Ok(text)
 }
 

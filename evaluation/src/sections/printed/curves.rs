@@ -5,14 +5,14 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
-use super::codec_curves::{Codec, RATES, Variant};
-use super::rate_store::RateStore;
 use crate::baselines::BASELINES;
 use crate::bench::Bench;
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::metric::Metric;
 use crate::provenance::FOLDER;
+use crate::sections::codec_curves::{Codec, RATES, Variant};
+use crate::sections::rate_store::RateStore;
 use crate::table::{Table, decibels, median, percent};
 
 /// Ours. Papers plot settings of equal slope, one multiplier of the rate for all pictures. Equal
@@ -52,7 +52,7 @@ struct Printed {
 
 const METRICS: [Metric; 2] = [Metric::Psnr, Metric::MsSsim];
 
-pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+pub(super) fn measure(bench: &mut Bench) -> Result<String> {
     let printed = read(&Path::new(FOLDER).join("printed/kodak.csv"))?;
     let mut sources: Vec<&str> = printed.iter().map(|row| row.source.as_str()).collect();
     sources.dedup();
