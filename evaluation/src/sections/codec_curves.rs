@@ -32,10 +32,11 @@ pub(super) const RATES: &[Target] = &[
     Target::BitsPerPixel(1.5),
 ];
 
-/// Our encoder as it is by default, and then other ways to run it: "gip, --tune psnr" has its place
-/// here as soon as the encoder knows that.
-pub(super) const OURS: &[Variant] =
-    &[Variant { name: gip::NAME, encoder: gip::encoder, targets: RATES }];
+/// Our encoder as it is by default, and then other ways to run it.
+pub(super) const OURS: [Variant; 2] = [
+    Variant { name: gip::NAME, encoder: gip::encoder, targets: RATES },
+    Variant { name: gip::PSNR_NAME, encoder: gip::psnr_encoder, targets: RATES },
+];
 
 /// A quick run takes one in so many settings, and the last.
 const QUICK_STEP: usize = 3;

@@ -180,7 +180,7 @@ fn stored(
     fine: &mut Option<MeasuredFile>,
 ) -> Result<[f64; 4]> {
     let fit = |positions, colors| {
-        let encoder = gip::encoder(gip::EFFORT)
+        let encoder = gip::psnr_encoder(gip::EFFORT)
             .with_target(Target::Gaussians(count))
             .with_training(training(iterations, positions, colors, picture))
             .with_precision(Precision::Packed);
@@ -337,7 +337,7 @@ mod tests {
             TestPicture { name: String::new(), path: "".into(), width, height, rgb: rgb.collect() };
         let fit = |positions, colors| {
             let training = training(90, positions, colors, &picture);
-            let encoder = gip::encoder(1).with_target(Target::Gaussians(150));
+            let encoder = gip::psnr_encoder(1).with_target(Target::Gaussians(150));
             let encoder = encoder.with_training(training).with_precision(Precision::Packed);
             let measured = gip::encode(encoder, &picture, Threads::Pool).expect("a small picture");
             let saved = saved_bits(positions, colors) * f64::from(measured.report.gaussians);

@@ -26,28 +26,33 @@ const HARD_PICTURES: [&str; 6] =
 /// Codecs on one set of pictures.
 struct Comparison {
     set: PictureSet,
-    /// Ours first: [`OURS`].
-    codecs: Vec<Codec>,
+    /// [`OURS`].
+    ours: Vec<Codec>,
+    baselines: Vec<Codec>,
+}
+
+impl Comparison {
+    /// Our default first.
+    fn codecs(&self) -> Vec<&Codec> {
+        self.ours.iter().chain(&self.baselines).collect()
+    }
 }
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut store = RateStore::open(bench)?;
-    let baselines: Vec<&Baseline> = BASELINES.iter().collect();
-    let mut comparisons = Vec::new();
-    for set in bench.sets() {
-        comparisons.push(comparison(bench, &mut store, set, &baselines)?);
-    }
+    let comparisons = compare(bench, &mut store, bench.sets(), &BASELINES.each_ref())?;
     let mut text = introduction();
     if let Some(path) = &bench.reference {
         let kodak = &comparisons[0];
-        text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.codecs[OURS.len()..])?);
+        text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.baselines)?);
     }
     text.push_str(&format!("\n### In short\n{}", summary(&comparisons)));
     if let Some(set) = hard_pictures(bench) {
         let mut baselines: Vec<_> =
             BASELINES.iter().filter(|baseline| baseline.name.starts_with("AVIF")).collect();
         baselines.push(&BEST_AVIF);
-        text.push_str(&against_best_avif(&comparison(bench, &mut store, set, &baselines)?));
+        let comparisons = compare(bench, &mut store, vec![set], &baselines)?;
+        text.push_str(&against_best_avif(&comparisons));
     }
     for comparison in &comparisons {
         for metric in Metric::ALL {
@@ -66,39 +71,46 @@ fn hard_pictures(bench: &Bench) -> Option<PictureSet> {
 }
 
 fn introduction() -> String {
-    let ours = OURS
-        .iter()
-        .map(|variant| format!("{} is asked for: {}", variant.name, variant.settings().join("; ")));
+    let ours = OURS.each_ref().map(|variant| variant.name);
     format!(
-        "Compared with: {DESCRIPTION} {}. SSIMULACRA2 is 100 for equal pictures; 90 \
+        "Compared with: {DESCRIPTION} Ours ({}) is asked for: {}. SSIMULACRA2 is 100 for equal pictures; 90 \
          is hard to tell from the source, 70 is high quality, 50 medium, 30 low. Butteraugli is \
          its 3-norm at 80 nits: lower is better. Both equal what the tools of libjxl 0.11 print. \
          BD-rate is from {} to {} bits per pixel: how much larger (+) or smaller (-) our files are \
          at equal quality.\n",
-        ours.collect::<Vec<_>>().join(". "),
+        ours.join(", "),
+        OURS[0].settings().join("; "),
         BD_RANGE.0,
         BD_RANGE.1,
     )
 }
 
-/// Ours and some baselines measured on a set.
-fn comparison(
+/// Ours and some baselines measured on sets. What matters most comes first, so that a run that is
+/// interrupted has it: our default and the baselines on all sets.
+fn compare(
     bench: &mut Bench,
     store: &mut RateStore,
-    set: PictureSet,
+    sets: Vec<PictureSet>,
     baselines: &[&Baseline],
-) -> Result<Comparison> {
+) -> Result<Vec<Comparison>> {
     let (quick, product) = (bench.quick, bench.product.clone());
     let (worker, versions) = bench.baselines()?;
-    let mut codecs = Vec::new();
-    for variant in OURS {
-        codecs.push(Codec::ours(store, &product, variant, &set.pictures, quick)?);
+    let [default, variants @ ..] = OURS;
+    let mut comparisons = Vec::new();
+    for set in sets {
+        let ours = vec![Codec::ours(store, &product, &default, &set.pictures, quick)?];
+        let baselines = baselines.iter().map(|baseline| {
+            Codec::baseline(store, worker, &versions, baseline, &set.pictures, quick)
+        });
+        let baselines = baselines.collect::<Result<_>>()?;
+        comparisons.push(Comparison { set, ours, baselines });
     }
-    for baseline in baselines {
-        let pictures = &set.pictures;
-        codecs.push(Codec::baseline(store, worker, &versions, baseline, pictures, quick)?);
+    for Comparison { set, ours, .. } in &mut comparisons {
+        for variant in &variants {
+            ours.push(Codec::ours(store, &product, variant, &set.pictures, quick)?);
+        }
     }
-    Ok(Comparison { set, codecs })
+    Ok(comparisons)
 }
 
 /// For each picture the BD-rate of one codec against another; `None` where they have no quality in
@@ -114,14 +126,15 @@ fn summary(comparisons: &[Comparison]) -> String {
     let mut text = String::from("\nMean BD-rate over the pictures:\n");
     for (index, ours) in OURS.iter().enumerate() {
         let mut columns = vec![ours.name.to_owned()];
-        let baselines = &comparisons[0].codecs[OURS.len()..];
-        columns.extend(baselines.iter().map(|baseline| format!("against {}", baseline.name)));
+        columns.extend(
+            comparisons[0].baselines.iter().map(|baseline| format!("against {}", baseline.name)),
+        );
         let mut table = Table::new(&columns);
         for metric in Metric::ALL {
-            for Comparison { set, codecs } in comparisons {
+            for Comparison { set, ours, baselines } in comparisons {
                 let mut cells = vec![format!("{}, {}", metric.name(), set.name)];
-                cells.extend(codecs[OURS.len()..].iter().map(|other| {
-                    percent(mean(bd_rates(&codecs[index], other, metric).into_iter().flatten()))
+                cells.extend(baselines.iter().map(|other| {
+                    percent(mean(bd_rates(&ours[index], other, metric).into_iter().flatten()))
                 }));
                 table.row(&cells);
             }
@@ -131,16 +144,16 @@ fn summary(comparisons: &[Comparison]) -> String {
     text
 }
 
-fn against_best_avif(comparison: &Comparison) -> String {
-    let pictures = comparison.set.pictures.iter().map(|picture| picture.name.as_str());
+fn against_best_avif(comparisons: &[Comparison]) -> String {
+    let pictures = comparisons[0].set.pictures.iter().map(|picture| picture.name.as_str());
     let mut text = format!(
         "\n### The best that AVIF can do\n\nSpeed 0 takes up to half a minute for a picture, so it \
          is measured on a few, of which half are hard for us: {}.\n{}",
         pictures.collect::<Vec<_>>().join(", "),
-        summary(std::slice::from_ref(comparison)),
+        summary(comparisons),
     );
     for metric in Metric::ALL {
-        text.push_str(&bd_rate_table(comparison, metric));
+        text.push_str(&bd_rate_table(&comparisons[0], metric));
     }
     text
 }
@@ -152,14 +165,14 @@ fn details(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<Str
         metric.name(),
         comparison.set.name,
         plot(bench, comparison, metric)?,
-        at_equal_rates(&comparison.codecs, metric),
+        at_equal_rates(&comparison.codecs(), metric),
         bd_rate_table(comparison, metric),
     ))
 }
 
 /// A table with one row per codec and one column per rate, followed by the codecs that are better
 /// than ours and at which rates.
-fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
+fn at_equal_rates(codecs: &[&Codec], metric: Metric) -> String {
     let names = TABLE_RATES.map(|rate| format!("{rate} bpp"));
     let mut columns = vec![metric.with_unit().to_owned()];
     columns.extend(names.clone());
@@ -191,7 +204,8 @@ fn at_equal_rates(codecs: &[Codec], metric: Metric) -> String {
 
 /// BD-rates of ours against all others, for each picture and on average.
 fn bd_rate_table(comparison: &Comparison, metric: Metric) -> String {
-    let [ours, others @ ..] = &comparison.codecs[..] else { return String::new() };
+    let codecs = comparison.codecs();
+    let (ours, others) = (codecs[0], &codecs[1..]);
     let mut columns = vec!["picture"];
     columns.extend(others.iter().map(|codec| codec.name));
     let mut table = Table::new(&columns);
@@ -230,8 +244,8 @@ fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String
     let set = &comparison.set;
     let name = format!("rate-{}-{}.svg", set.name, metric.name()).to_lowercase();
     let series: Vec<Series> = comparison
-        .codecs
-        .iter()
+        .codecs()
+        .into_iter()
         .map(|codec| Series {
             name: codec.name.to_owned(),
             points: codec
