@@ -169,6 +169,7 @@ pub use coding::entropy::fuzzing;
 pub mod training {
     //! The constants of training, for the study of the method; see [`Training`].
 
+    pub use crate::encode::VectorQuantizer;
     pub use crate::encode::training::{
         Densification, Distortion, GaussianFilter, LearningRateSchedule, NewColor, NewShape,
         Optimizer, Placement, Portion, Quantization, Training, Units,

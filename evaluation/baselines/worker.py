@@ -23,9 +23,12 @@ import os
 import statistics
 import sys
 import time
+from importlib.metadata import version
 
 import imagecodecs
+import mozjpeg_lossless_optimization
 import numpy
+import pyjpegli
 from PIL import AvifImagePlugin, Image, features
 
 
@@ -59,6 +62,16 @@ def jpeg_2000():
     return encode, decode
 
 
+def jpegli():
+    def encode(image, quality, threads):
+        data = pyjpegli.encode(image.tobytes(), image.width, image.height, quality)
+        # The binding writes sequential files; progressive ones of the same samples are smaller.
+        return mozjpeg_lossless_optimization.optimize(data)
+
+    _, decode = through_pillow("JPEG", {})
+    return encode, decode
+
+
 def jpeg_xl():
     def encode(image, distance, threads):
         samples = numpy.asarray(image)
@@ -76,10 +89,12 @@ CODECS = {
         "JPEG", {"subsampling": "4:2:0", "optimize": True, "progressive": True}
     ),
     "jpeg420": through_pillow("JPEG", {"subsampling": "4:2:0", "optimize": True}),
+    "jpegli": jpegli(),
     "jp2": jpeg_2000(),
     "webp_m6": through_pillow("WEBP", {"method": 6}),
     "avif420_s6": through_pillow("AVIF", AVIF),
     "avif420_s6_psnr": through_pillow("AVIF", AVIF | {"advanced": {"tune": "psnr"}}),
+    "avif444_s0": through_pillow("AVIF", {"speed": 0, "subsampling": "4:4:4"}),
     "jxl_e7": jpeg_xl(),
 }
 
@@ -88,6 +103,7 @@ CODECS = {
 DECODERS = {
     "jpeg420prog": lambda data, out, threads: imagecodecs.jpeg8_decode(data, out=out),
     "jpeg420": lambda data, out, threads: imagecodecs.jpeg8_decode(data, out=out),
+    "jpegli": lambda data, out, threads: imagecodecs.jpeg8_decode(data, out=out),
     "jp2": lambda data, out, threads: imagecodecs.jpeg2k_decode(
         data, out=out, numthreads=threads
     ),
@@ -100,6 +116,7 @@ DECODERS = {
     ),
 }
 DECODERS["avif420_s6_psnr"] = DECODERS["avif420_s6"]
+DECODERS["avif444_s0"] = DECODERS["avif420_s6"]
 
 
 def timed(repeats, work, *arguments):
@@ -134,6 +151,8 @@ def answer(codec, quality, threads, encodings, decodings, source, decoded):
 def versions():
     yield f"Pillow {Image.__version__}"
     yield f"libjpeg-turbo {features.version('libjpeg_turbo')}"
+    yield f"jpegli of pyjpegli {pyjpegli.__version__}"
+    yield f"mozjpeg-lossless-optimization {version('mozjpeg-lossless-optimization')}"
     yield f"OpenJPEG {features.version('jpg_2000')}"
     yield f"libwebp {features.version('webp')}"
     yield f"libavif {features.version('avif')} ({AvifImagePlugin.get_codec_version('aom')})"

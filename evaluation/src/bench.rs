@@ -1,29 +1,53 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
-use crate::pictures::{self, TestPicture};
+use crate::pictures::{self, PictureSet, TestPicture};
 use crate::store::Store;
 use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
+const QUICK_LARGE_PICTURES: usize = 1;
 /// Iterations of the published methods, if no others are asked for.
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
+/// Where the pictures are.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Folders {
+    /// Folder with the Kodak pictures, as .png.
+    #[arg(long, value_name = "DIR", alias = "images")]
+    kodak: PathBuf,
+    /// Folder with a second set of photographs, as .png, for the sections about quality.
+    #[arg(long, value_name = "DIR")]
+    photos: Option<PathBuf>,
+    /// Folder with pictures of 2,048 pixels, as .png, for `representation` at the paper's 10,000
+    /// and 50,000 Gaussians.
+    #[arg(long, value_name = "DIR")]
+    large: Option<PathBuf>,
+}
+
 /// The pictures and settings of a run, and where its measurements are kept.
 #[derive(Debug)]
 pub(crate) struct Bench {
+    /// What all sections are about, Kodak's in the committed report.
     pub(crate) pictures: Vec<TestPicture>,
+    /// A second set, for the sections about quality: no constant was chosen to suit Kodak alone.
+    photos: Vec<TestPicture>,
+    /// For the paper's fits at 2K.
+    pub(crate) large: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
     /// CSV with measurements of the baselines from elsewhere.
     pub(crate) reference: Option<PathBuf>,
+    /// Where to write the README's picture.
+    pub(crate) readme_picture: Option<PathBuf>,
     /// The version of our codec.
     pub(crate) product: String,
     machine: String,
@@ -33,17 +57,24 @@ pub(crate) struct Bench {
 
 impl Bench {
     pub(crate) fn new(
-        images: &Path,
+        folders: &Folders,
         folder: PathBuf,
         quick: bool,
         iterations: Option<u32>,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
+        let load = |folder: &PathBuf, few| pictures::load(folder, quick.then_some(few));
+        let others = |folder: &Option<PathBuf>, few| {
+            folder.as_ref().map_or(Ok(Vec::new()), |folder| load(folder, few))
+        };
         let bench = Self {
-            pictures: pictures::load(images, quick.then_some(QUICK_PICTURES))?,
+            pictures: load(&folders.kodak, QUICK_PICTURES)?,
+            photos: others(&folders.photos, QUICK_PICTURES)?,
+            large: others(&folders.large, QUICK_LARGE_PICTURES)?,
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
+            readme_picture: None,
             product: provenance::product(),
             machine: provenance::machine(),
             folder,
@@ -56,7 +87,7 @@ impl Bench {
     /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        for picture in &self.pictures {
+        for picture in self.pictures.iter().chain(&self.photos).chain(&self.large) {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -67,6 +98,15 @@ impl Bench {
             );
         }
         Ok(())
+    }
+
+    /// The sets of pictures, the first of which is [`Self::pictures`].
+    pub(crate) fn sets(&self) -> Vec<PictureSet> {
+        let mut sets = vec![PictureSet { name: "Kodak", pictures: self.pictures.clone() }];
+        if !self.photos.is_empty() {
+            sets.push(PictureSet { name: "photos", pictures: self.photos.clone() });
+        }
+        sets
     }
 
     /// At most so many of the pictures, evenly spread.
@@ -95,6 +135,28 @@ impl Bench {
         Store::open(&self.path(name), &self.machine, keys, values)
     }
 
+    /// A file that takes long to make: from the folder of files of this version of our codec, or
+    /// else made now and kept there.
+    pub(crate) fn file(
+        &self,
+        name: &str,
+        make: impl FnOnce() -> Result<Vec<u8>>,
+    ) -> Result<Vec<u8>> {
+        let folder = self.path("files").join(&self.product);
+        let path = folder.join(name);
+        if let Ok(bytes) = fs::read(&path) {
+            return Ok(bytes);
+        }
+        eprintln!("{name}");
+        let bytes = make()?;
+        fs::create_dir_all(&folder)?;
+        // Renamed when it is whole, so that an interruption leaves no part of it under its name.
+        let new = path.with_extension("new");
+        fs::write(&new, &bytes)?;
+        fs::rename(new, path)?;
+        Ok(bytes)
+    }
+
     /// The baselines, with their versions in one line.
     pub(crate) fn baselines(&mut self) -> Result<(&mut Worker, String)> {
         let worker = match self.worker.take() {
@@ -107,18 +169,23 @@ impl Bench {
 
     /// Where the measurements come from: the list at the head of every section.
     pub(crate) fn provenance(&self) -> String {
-        let names: Vec<&str> = self.pictures.iter().map(|picture| picture.name.as_str()).collect();
+        let names = |pictures: &[TestPicture]| {
+            let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
+            format!("{}: {}", names.len(), names.join(", "))
+        };
         let mut list = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- {} pictures, \
-             of which some tables take fewer and say so: {}\n",
+            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- Pictures, of \
+             which some tables take fewer and say so: {}\n",
             self.machine,
             self.product,
             provenance::commit(),
             provenance::compiler(),
             gip::SEED,
-            names.len(),
-            names.join(", "),
+            names(&self.pictures),
         );
+        if !self.photos.is_empty() {
+            list.push_str(&format!("- Photos, where tables name them: {}\n", names(&self.photos)));
+        }
         if let Some(worker) = &self.worker {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }
@@ -137,20 +204,38 @@ pub(crate) fn timing_version(product: &str, versions: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    fn open(images: &Path, report: &Path) -> Result<Bench> {
+        let folders = Folders { kodak: images.into(), photos: None, large: None };
+        Bench::new(&folders, report.into(), false, None, None)
+    }
+
+    #[test]
+    fn files_are_made_once() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
+        let bench = open(images.path(), report.path()).expect("there is a picture");
+        assert!(bench.file("a.gip", || anyhow::bail!("it cannot be made")).is_err());
+        assert_eq!(bench.file("a.gip", || Ok(vec![1, 2])).expect("it is made"), [1, 2]);
+        assert_eq!(bench.file("a.gip", || Ok(vec![3])).expect("it is kept"), [1, 2]);
+    }
 
     #[test]
     fn another_picture_of_the_same_name_is_refused() {
         let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
         let (images, report) = (images.expect("a folder"), report.expect("a folder"));
-        let open = |gray: u8| {
+        let open_gray = |gray: u8| {
             let picture = image::RgbImage::from_pixel(3, 2, image::Rgb([gray; 3]));
             picture.save(images.path().join("a.png")).expect("it is written");
-            Bench::new(images.path(), report.path().into(), false, None, None)
+            open(images.path(), report.path())
         };
-        assert!(open(1).is_ok());
-        assert!(open(1).is_ok());
-        let refusal = open(2).expect_err("it is another picture").to_string();
+        assert!(open_gray(1).is_ok());
+        assert!(open_gray(1).is_ok());
+        let refusal = open_gray(2).expect_err("it is another picture").to_string();
         assert!(refusal.contains("another picture called a"), "{refusal}");
     }
 }

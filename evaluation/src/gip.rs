@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image_gip::{
-    ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder, Threads,
+    ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder, Threads, Tune,
 };
 
 use crate::memory;
@@ -13,6 +13,8 @@ use crate::table::median;
 
 /// The name of our codec in tables and CSV files.
 pub(crate) const NAME: &str = "gip";
+/// The same for [`psnr_encoder`], beside the default.
+pub(crate) const PSNR_NAME: &str = "gip --tune psnr";
 /// The encoder's default effort, used wherever no other is named.
 pub(crate) const EFFORT: u8 = 5;
 /// The seed of everything random in the encoder.
@@ -34,6 +36,12 @@ pub(crate) struct MeasuredFile {
 /// The encoder at an effort, with the seed of all measurements.
 pub(crate) fn encoder(effort: u8) -> Encoder {
     Encoder::new().with_effort(effort).with_seed(SEED)
+}
+
+/// The same, tuned for PSNR: where only PSNR is compared, and for the published methods, which
+/// minimize squared error.
+pub(crate) fn psnr_encoder(effort: u8) -> Encoder {
+    encoder(effort).with_tune(Tune::Psnr)
 }
 
 /// Encodes a picture and measures the file.
@@ -87,7 +95,7 @@ pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
 }
 
 /// The samples of a file.
-fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
+pub(crate) fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
     let mut decoder = Decoder::new(file)?;
     decoder.set_options(RenderOptions::new().with_threads(threads));
     let mut samples = vec![0; decoder.output_len()?];

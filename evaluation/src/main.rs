@@ -2,11 +2,13 @@
 
 mod baselines;
 mod bench;
+mod canvas;
 mod comparison;
 mod curve;
 mod gip;
 mod kernel_benchmark;
 mod memory;
+mod metric;
 mod pictures;
 mod plot;
 mod provenance;
@@ -14,6 +16,7 @@ mod report;
 mod sections;
 mod store;
 mod table;
+mod visual;
 
 use std::fs;
 use std::path::PathBuf;
@@ -22,9 +25,11 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Parser;
 
-use bench::Bench;
+use bench::{Bench, Folders};
 use report::Section;
-use sections::{ablation, content, decode, rate, representation, speed, stability};
+use sections::{
+    ablation, content, decode, printed, quality, rate, representation, sheet, speed, stability,
+};
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
@@ -33,13 +38,12 @@ use sections::{ablation, content, decode, rate, representation, speed, stability
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 struct Args {
-    /// Folder with the pictures, as .png.
-    #[arg(long, value_name = "DIR")]
-    images: PathBuf,
+    #[command(flatten)]
+    folders: Folders,
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
-    /// Four of the pictures and fewer settings: ten minutes on two cores.
+    /// Four pictures of each set and fewer settings: a quarter of an hour on two cores.
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].
@@ -52,6 +56,10 @@ struct Args {
     /// needs the columns codec, quality, image, bytes, psnr and msssim of `rate.csv`.
     #[arg(long, value_name = "CSV")]
     reference: Option<PathBuf>,
+    /// JPEG for the README: the crops of all pictures in which we compare best and worst. The
+    /// section `sheet` writes it.
+    #[arg(long, value_name = "JPEG")]
+    readme_picture: Option<PathBuf>,
 }
 
 fn main() -> Result<()> {
@@ -60,7 +68,8 @@ fn main() -> Result<()> {
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
     let mut bench =
-        Bench::new(&args.images, args.out, args.quick, args.iterations, args.reference)?;
+        Bench::new(&args.folders, args.out, args.quick, args.iterations, args.reference)?;
+    bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
@@ -78,6 +87,9 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
+        Section::Printed => printed::measure(bench),
+        Section::Quality => quality::measure(bench),
+        Section::Sheet => sheet::measure(bench),
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),
         Section::Stability => stability::measure(bench),
@@ -93,9 +105,9 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
-        let args = ["evaluation", "--images", "a", "--out", "b", "--only", "rate"];
+        let args = ["evaluation", "--kodak", "a", "--out", "b", "--only", "rate"];
         let args = Args::try_parse_from(args).expect("it is as the README has it");
         assert_eq!(args.only, [Section::Rate]);
-        assert!(Args::try_parse_from(["evaluation", "--images", "a"]).is_err());
+        assert!(Args::try_parse_from(["evaluation", "--kodak", "a"]).is_err());
     }
 }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use image_gip::metrics;
 
+use crate::visual;
+
 /// An 8-bit RGB picture, from a file or synthetic.
 #[derive(Clone, Debug)]
 pub(crate) struct TestPicture {
@@ -18,12 +20,38 @@ pub(crate) struct TestPicture {
     pub(crate) rgb: Vec<u8>,
 }
 
+/// Pictures that are measured together.
+#[derive(Clone, Debug)]
+pub(crate) struct PictureSet {
+    pub(crate) name: &'static str,
+    pub(crate) pictures: Vec<TestPicture>,
+}
+
 /// How well a decoded picture agrees with its source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Distortion {
     /// In dB, over all samples.
     pub(crate) psnr: f64,
     pub(crate) ms_ssim: f64,
+    pub(crate) ssimulacra2: f64,
+    /// Butteraugli's 3-norm.
+    pub(crate) butteraugli: f64,
+}
+
+impl Distortion {
+    /// What CSV files call the values.
+    pub(crate) const COLUMNS: [&str; 4] = ["psnr", "msssim", "ssimulacra2", "butteraugli"];
+
+    /// In the order of [`Self::COLUMNS`].
+    pub(crate) fn values(&self) -> [f64; 4] {
+        [self.psnr, self.ms_ssim, self.ssimulacra2, self.butteraugli]
+    }
+}
+
+impl From<[f64; 4]> for Distortion {
+    fn from([psnr, ms_ssim, ssimulacra2, butteraugli]: [f64; 4]) -> Self {
+        Self { psnr, ms_ssim, ssimulacra2, butteraugli }
+    }
 }
 
 impl TestPicture {
@@ -43,9 +71,12 @@ impl TestPicture {
             decoded.len(),
             self.rgb.len()
         );
+        let (width, height) = (self.width, self.height);
         Ok(Distortion {
             psnr: metrics::psnr(&self.rgb, decoded, 255.0),
-            ms_ssim: metrics::ms_ssim(&self.rgb, decoded, self.width as usize, 3, 255.0),
+            ms_ssim: metrics::ms_ssim(&self.rgb, decoded, width as usize, 3, 255.0),
+            ssimulacra2: visual::ssimulacra2(&self.rgb, decoded, width, height)?,
+            butteraugli: visual::butteraugli_3_norm(&self.rgb, decoded, width, height)?,
         })
     }
 

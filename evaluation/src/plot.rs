@@ -27,7 +27,7 @@ pub(crate) struct Plot<'a> {
     pub(crate) title: &'a str,
     pub(crate) x: (&'a str, Scale),
     pub(crate) y: (&'a str, Scale),
-    /// A corner that the series leave free.
+    /// Where the series leave room.
     pub(crate) legend: Corner,
 }
 
@@ -35,11 +35,17 @@ pub(crate) struct Plot<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Corner {
     UpperLeft,
+    UpperRight,
     LowerRight,
+    /// To the right of all points: the axis, which must be logarithmic, goes on below the legend.
+    Beside,
 }
 
+/// By how much a logarithmic axis is longer with a legend beside the points.
+const LONGER: f64 = 1.3;
+
 /// Colours that can be told apart, also by those who see no red or green (Okabe and Ito).
-const COLORS: [RGBColor; 8] = [
+const COLORS: [RGBColor; 9] = [
     RGBColor(213, 94, 0),
     RGBColor(0, 114, 178),
     RGBColor(0, 158, 115),
@@ -48,13 +54,17 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(230, 159, 0),
     RGBColor(0, 0, 0),
     RGBColor(140, 140, 140),
+    RGBColor(240, 228, 66),
 ];
 
 impl Plot<'_> {
     /// Writes the series, each as points joined by lines.
     pub(crate) fn write(&self, path: &Path, series: &[Series]) -> Result<()> {
         let points = || series.iter().flat_map(|series| &series.points);
-        let x = range(points().map(|point| point.0), self.x.1);
+        let mut x = range(points().map(|point| point.0), self.x.1);
+        if let (Some(x), Corner::Beside) = (&mut x, self.legend) {
+            x.end = x.start * (x.end / x.start).powf(LONGER);
+        }
         let y = range(points().map(|point| point.1), self.y.1);
         let (Some(x), Some(y)) = (x, y) else {
             return Err(anyhow!("there is nothing to plot in {}", path.display()));
@@ -108,6 +118,7 @@ impl Plot<'_> {
             .configure_series_labels()
             .position(match self.legend {
                 Corner::UpperLeft => SeriesLabelPosition::UpperLeft,
+                Corner::UpperRight | Corner::Beside => SeriesLabelPosition::UpperRight,
                 Corner::LowerRight => SeriesLabelPosition::LowerRight,
             })
             .background_style(WHITE.mix(0.85))

@@ -23,7 +23,13 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
-    /// Time against PSNR, and how time and memory grow
+    /// Our curve on Kodak beside curves and codecs that papers print
+    Printed,
+    /// Whether the same quality looks the same on every picture
+    Quality,
+    /// What one sees at equal size: contact sheets of crops
+    Sheet,
+    /// Time against quality, and how time and memory grow
     Speed,
     /// Decoding time against other decoders; threads and partial decoding
     Decode,
@@ -35,10 +41,13 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 7] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
+        Self::Printed,
+        Self::Quality,
+        Self::Sheet,
         Self::Speed,
         Self::Decode,
         Self::Stability,
@@ -50,6 +59,9 @@ impl Section {
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
+            Self::Printed => "Beside printed figures",
+            Self::Quality => "Quality as asked for",
+            Self::Sheet => "Contact sheets",
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",

@@ -27,6 +27,7 @@ mod verify;
 pub use encoder::{Encoded, Encoder, Report, encode};
 pub use error::{EncodeError, OptionError, SourceError};
 pub(crate) use fit::training;
+pub use fit::vector_quantizer::VectorQuantizer;
 pub use options::{Precision, Target, Tune};
 pub use progress::Progress;
 pub use shortfall::Shortfall;

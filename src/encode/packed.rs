@@ -75,6 +75,8 @@ fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec
     (0..5 + channels)
         .map(|component| match (precision, component) {
             (Precision::Float, _) => Quantizer::Float,
+            (_, 0 | 1) if depths.center.is_some() => Quantizer::Float,
+            (_, 5..) if depths.color.is_some() => Quantizer::Float,
             (_, 0 | 1) => packed(depths.position_bits),
             (_, 2..5) => packed(depths.shape_bits),
             (_, _) => packed(depths.color_bits),

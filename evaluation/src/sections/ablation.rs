@@ -5,7 +5,7 @@ use image_gip::training::Training;
 use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
 use super::methods::{self, PARAMETERIZATIONS};
-use super::positions;
+use super::quantizers;
 use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::{Curve, bd_rate};
@@ -85,7 +85,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let counts: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (positions, bit depths, seeds). {} All figures are means over the pictures that each \
+         (quantizers, bit depths, seeds), tuned for PSNR. {} All figures are means over the pictures that each \
          table names; PSNR is that of the float rendering.\n",
         methods::description(ablation.iterations),
     );
@@ -95,7 +95,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     text.push_str(&ablation.intervals()?);
     text.push_str(&ablation.depths(counts)?);
     let iterations = ablation.own_iterations;
-    text.push_str(&positions::measure(bench, &ablation.pictures, counts, iterations)?);
+    text.push_str(&quantizers::measure(bench, &ablation.pictures, counts, iterations)?);
     Ok(text)
 }
 
@@ -178,7 +178,7 @@ impl Ablation<'_> {
             let variant = format!("{position}/{shape}/{color} bits");
             let mut outcomes = Vec::new();
             for &count in counts {
-                let encoder = Encoder::new().with_seed(gip::SEED).with_training(training.clone());
+                let encoder = gip::psnr_encoder(gip::EFFORT).with_training(training.clone());
                 let encoder = encoder.with_precision(Precision::Packed);
                 outcomes.push(self.means(&variant, self.own_iterations, count, &encoder)?);
             }
@@ -219,7 +219,7 @@ impl Ablation<'_> {
         let mut outcomes = Vec::new();
         for seed in 0..SEEDS {
             let training = Training::fast(self.own_iterations);
-            let encoder = Encoder::new().with_seed(seed).with_training(training);
+            let encoder = gip::psnr_encoder(gip::EFFORT).with_seed(seed).with_training(training);
             let encoder = encoder.with_precision(Precision::Packed);
             let variant = format!("seed {seed}");
             outcomes.push(self.means(&variant, self.own_iterations, self.gaussians, &encoder)?);
@@ -255,7 +255,7 @@ impl Ablation<'_> {
     /// A published method without quantization.
     fn float(&mut self, variant: &str, training: Training) -> Result<VariantMeans> {
         let iterations = training.iterations;
-        let encoder = Encoder::new().with_seed(gip::SEED).with_training(training);
+        let encoder = gip::psnr_encoder(gip::EFFORT).with_training(training);
         let encoder = encoder.with_precision(Precision::Float);
         self.means(variant, iterations, self.gaussians, &encoder)
     }

@@ -10,7 +10,7 @@ use image_gip::{
     Decoder, Gaussian, Region, RenderOptions, StreamDecoder, Target, Threads, metrics,
 };
 
-use super::rate::RateStore;
+use super::rate_store::RateStore;
 use super::speed::nearest;
 use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
 use crate::bench::{Bench, timing_version};

@@ -74,7 +74,8 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
             let width = (1.5e6 * megapixels).sqrt().round();
             let height = (1e6 * megapixels / width).round();
             let large = picture.mirrored(width as u32, height as u32);
-            let encoder = gip::encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
+            let encoder =
+                gip::psnr_encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
             let measured = gip::encode(encoder, &large, Threads::Pool)?;
             let file = &measured.file;
             Ok([
@@ -109,7 +110,7 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
     let by_count = gaussians.iter().map(|&count| cost(1.0, count)).collect::<Result<Vec<_>>>()?;
 
     let mut text = format!(
-        "\n### Growth\n\nCompared with each other: our codec at effort {GROWTH_EFFORT} with \
+        "\n### Growth\n\nCompared with each other: our codec at effort {GROWTH_EFFORT}, tuned for PSNR, with \
          growing numbers of pixels and Gaussians, on {}, cropped or continued in mirror images. \
          The encoding time of other efforts grows with their iterations. Evaluations are kernel \
          evaluations in training, each with its gradient, per pixel and iteration; the time of \

@@ -4,16 +4,24 @@
 //! There are only declarations here, so that no module has to import its parent.
 
 pub(crate) mod ablation;
+mod codec_curves;
 pub(crate) mod content;
+mod crops;
 pub(crate) mod decode;
 mod f64_renderer;
 mod float_file;
 mod growth;
 mod methods;
-mod positions;
+pub(crate) mod printed;
 mod product_tests;
+pub(crate) mod quality;
+mod quantizers;
 pub(crate) mod rate;
+mod rate_store;
+mod reference;
 pub(crate) mod representation;
+mod residual_vq;
+pub(crate) mod sheet;
 pub(crate) mod speed;
 pub(crate) mod stability;
 mod two_level;

@@ -1,18 +1,19 @@
-//! Encoding and decoding time against PSNR, of our codec and the baselines.
+//! Encoding and decoding time against quality, of our codec and the baselines.
 
 use anyhow::Result;
 use image_gip::{Target, Threads};
 
 use super::growth;
-use super::rate::RateStore;
+use super::rate_store::RateStore;
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::{Bench, timing_version};
 use crate::comparison::{Better, NamedFigures, better_than};
 use crate::gip;
-use crate::pictures::TestPicture;
+use crate::metric::Metric;
+use crate::pictures::{Distortion, TestPicture};
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
-use crate::table::Table;
+use crate::table::{Table, mean};
 
 /// The rate of all files, approximately, in bits per pixel.
 const RATE: f64 = 0.5;
@@ -24,13 +25,12 @@ const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
 
-/// What the codecs are compared by.
-const CRITERIA: [(&str, Better); 5] = [
-    ("PSNR at about this rate", Better::Higher),
-    ("encoding time with one thread", Better::Lower),
-    ("encoding time with all", Better::Lower),
-    ("decoding time with one thread", Better::Lower),
-    ("decoding time with all", Better::Lower),
+/// The times that codecs are compared by, beside all metrics.
+const TIMES: [&str; 4] = [
+    "encoding time with one thread",
+    "encoding time with all",
+    "decoding time with one thread",
+    "decoding time with all",
 ];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
@@ -46,18 +46,16 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     );
     text.push_str(&table(&rows));
     text.push_str(&worse_than_baselines(&rows));
-    for (name, title, seconds, unit) in [
-        (
-            "speed-encode.svg",
-            "Encoding, all threads",
-            CodecRow::encoding as fn(&CodecRow) -> f64,
-            "seconds",
-        ),
-        ("speed-decode.svg", "Decoding, all threads", CodecRow::decoding, "milliseconds"),
-    ] {
-        let factor = if unit == "milliseconds" { 1000.0 } else { 1.0 };
-        plot_scatter(bench, name, title, &rows, &|row| factor * seconds(row), unit)?;
-        text.push_str(&format!("\n![{title}]({name})\n"));
+    for metric in [Metric::Ssimulacra2, Metric::Psnr] {
+        for (title, milliseconds) in [
+            ("Encoding", CodecRow::encoding as fn(&CodecRow) -> f64),
+            ("Decoding", CodecRow::decoding),
+        ] {
+            let name = format!("speed-{title}-{}.svg", metric.name()).to_lowercase();
+            let title = format!("{title}, all threads, by {}", metric.name());
+            plot_scatter(bench, &name, &title, &rows, milliseconds, metric)?;
+            text.push_str(&format!("\n![{title}]({name})\n"));
+        }
     }
     text.push_str(&growth::measure(bench)?);
     Ok(text)
@@ -69,19 +67,21 @@ struct CodecRow {
     codec: &'static str,
     setting: String,
     rate: f64,
-    psnr: f64,
+    /// In the order of [`Metric::ALL`].
+    levels: [f64; 4],
     /// Seconds with one thread and with all.
     encode: [f64; 2],
     decode: [f64; 2],
 }
 
 impl CodecRow {
+    /// Milliseconds with all threads.
     fn encoding(&self) -> f64 {
-        self.encode[1]
+        1000.0 * self.encode[1]
     }
 
     fn decoding(&self) -> f64 {
-        self.decode[1]
+        1000.0 * self.decode[1]
     }
 }
 
@@ -90,10 +90,20 @@ fn pictures(bench: &Bench) -> Vec<TestPicture> {
 }
 
 fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
+    let [psnr, ms_ssim, ssimulacra2, butteraugli] = Distortion::COLUMNS;
     let mut store = bench.store(
         "speed.csv",
         ["codec", "quality", "threads", "image"],
-        ["bytes", "bpp", "psnr", "encode_seconds", "decode_seconds"],
+        [
+            "bytes",
+            "bpp",
+            psnr,
+            ms_ssim,
+            ssimulacra2,
+            butteraugli,
+            "encode_seconds",
+            "decode_seconds",
+        ],
     )?;
     let mut files = RateStore::open(bench)?;
     let pictures = pictures(bench);
@@ -111,7 +121,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
                 let measured = gip::encode(encoder, picture, threads)?;
                 let decode = gip::decode_seconds(&measured.file, threads)?;
                 let times = [measured.report.seconds, decode];
-                Ok(values(picture, measured.bytes, measured.distortion.psnr, times))
+                Ok(values(picture, measured.bytes, &measured.distortion, times))
             })
         })?);
     }
@@ -132,7 +142,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
                 let trip =
                     worker.round_trip(baseline.id, setting, picture, threads, [REPEATS; 2])?;
                 let times = [trip.encode_seconds, trip.decode_seconds];
-                Ok(values(picture, trip.bytes, trip.distortion.psnr, times))
+                Ok(values(picture, trip.bytes, &trip.distortion, times))
             })
         })?);
     }
@@ -160,52 +170,55 @@ fn thread_label(threads: Threads) -> &'static str {
     if threads == Threads::One { "one" } else { "all" }
 }
 
-fn values(picture: &TestPicture, bytes: f64, psnr: f64, [encode, decode]: [f64; 2]) -> [f64; 5] {
-    [bytes, picture.rate(bytes), psnr, encode, decode]
+fn values(
+    picture: &TestPicture,
+    bytes: f64,
+    distortion: &Distortion,
+    [encode, decode]: [f64; 2],
+) -> [f64; 8] {
+    let [psnr, ms_ssim, ssimulacra2, butteraugli] = distortion.values();
+    [bytes, picture.rate(bytes), psnr, ms_ssim, ssimulacra2, butteraugli, encode, decode]
 }
 
+/// Means over the pictures. `get` measures one with a number of threads.
 fn row(
     codec: &'static str,
     setting: &str,
     pictures: &[TestPicture],
-    mut get: impl FnMut(usize, Threads) -> Result<[f64; 5]>,
+    mut get: impl FnMut(usize, Threads) -> Result<[f64; 8]>,
 ) -> Result<CodecRow> {
-    let mut means = Vec::new();
-    for threads in [Threads::One, Threads::Pool] {
-        let mut sums = [0.0; 5];
-        for index in 0..pictures.len() {
-            for (sum, value) in sums.iter_mut().zip(get(index, threads)?) {
-                *sum += value / pictures.len() as f64;
-            }
-        }
-        means.push(sums);
-    }
-    let [_, rate, psnr, ..] = means[0];
+    let mut all = |threads| -> Result<Vec<[f64; 8]>> {
+        (0..pictures.len()).map(|picture| get(picture, threads)).collect()
+    };
+    let (one, pool) = (all(Threads::One)?, all(Threads::Pool)?);
+    let of = |all: &[[f64; 8]], column: usize| {
+        mean(all.iter().map(|values| values[column])).unwrap_or(f64::NAN)
+    };
+    let level = |metric: Metric| {
+        let levels = one.iter().map(|&[_, _, psnr, ms_ssim, ssimulacra2, butteraugli, _, _]| {
+            metric.level(&Distortion::from([psnr, ms_ssim, ssimulacra2, butteraugli]))
+        });
+        metric.mean(levels).unwrap_or(f64::NAN)
+    };
     Ok(CodecRow {
         codec,
         setting: setting.to_owned(),
-        rate,
-        psnr,
-        encode: [means[0][3], means[1][3]],
-        decode: [means[0][4], means[1][4]],
+        rate: of(&one, 1),
+        levels: Metric::ALL.map(level),
+        encode: [of(&one, 6), of(&pool, 6)],
+        decode: [of(&one, 7), of(&pool, 7)],
     })
 }
 
 fn table(rows: &[CodecRow]) -> String {
-    let mut table = Table::new(&[
-        "codec",
-        "setting",
-        "bpp",
-        "PSNR in dB",
-        "encode s, one thread",
-        "all",
-        "decode ms, one thread",
-        "all",
-    ]);
+    let mut columns = vec!["codec", "setting", "bpp"];
+    columns.extend(Metric::ALL.map(Metric::with_unit));
+    columns.extend(["encode s, one thread", "all", "decode ms, one thread", "all"]);
+    let mut table = Table::new(&columns);
     for row in rows {
         let mut cells = vec![row.codec.to_owned(), row.setting.clone()];
         cells.push(format!("{:.3}", row.rate));
-        cells.push(format!("{:.2}", row.psnr));
+        cells.extend(Metric::ALL.iter().zip(row.levels).map(|(metric, level)| metric.cell(level)));
         cells.extend(row.encode.map(|seconds| format!("{seconds:.3}")));
         cells.extend(row.decode.map(|seconds| format!("{:.1}", 1000.0 * seconds)));
         table.row(&cells);
@@ -220,17 +233,17 @@ fn worse_than_baselines(rows: &[CodecRow]) -> String {
         return String::new();
     };
     let named = |row: &CodecRow| {
-        let [encode, decode] = [row.encode, row.decode];
-        (row.codec.to_owned(), vec![row.psnr, encode[0], encode[1], decode[0], decode[1]])
+        (row.codec.to_owned(), [&row.levels[..], &row.encode, &row.decode].concat())
     };
     let others: Vec<NamedFigures> =
         rows.iter().filter(|row| row.codec != gip::NAME).map(named).collect();
-    let (name, figures) = named(ours);
-    better_than(
-        &CRITERIA,
-        &(format!("{name} at its default effort ({})", gip::EFFORT), figures),
-        &others,
-    )
+    let metrics = Metric::ALL.map(|metric| format!("{} at about this rate", metric.name()));
+    let mut figures: Vec<_> =
+        metrics.iter().map(|metric| (metric.as_str(), Better::Higher)).collect();
+    figures.extend(TIMES.map(|time| (time, Better::Lower)));
+    let (name, values) = named(ours);
+    let ours = (format!("{name} at its default effort ({})", gip::EFFORT), values);
+    better_than(&figures, &ours, &others)
 }
 
 fn plot_scatter(
@@ -238,12 +251,13 @@ fn plot_scatter(
     name: &str,
     title: &str,
     rows: &[CodecRow],
-    time: &dyn Fn(&CodecRow) -> f64,
-    unit: &str,
+    milliseconds: fn(&CodecRow) -> f64,
+    metric: Metric,
 ) -> Result<()> {
+    let index = Metric::ALL.iter().position(|&each| each == metric).expect("it is one of all");
     let mut series: Vec<Series> = Vec::new();
     for row in rows {
-        let point = (time(row), row.psnr);
+        let point = (milliseconds(row), metric.shown(row.levels[index]));
         match series.iter_mut().find(|series| series.name == row.codec) {
             Some(series) => series.points.push(point),
             None => series.push(Series { name: row.codec.to_owned(), points: vec![point] }),
@@ -251,9 +265,9 @@ fn plot_scatter(
     }
     let plot = Plot {
         title: &format!("{title}: about {RATE} bits per pixel"),
-        x: (unit, Scale::Logarithmic),
-        y: ("PSNR in dB", Scale::Linear),
-        legend: Corner::UpperLeft,
+        x: ("milliseconds", Scale::Logarithmic),
+        y: (metric.with_unit(), Scale::Linear),
+        legend: Corner::Beside,
     };
     plot.write(&bench.path(name), &series)
 }

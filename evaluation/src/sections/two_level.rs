@@ -71,7 +71,7 @@ fn fit_level(
     training: &Training,
 ) -> Result<(Vec<u8>, LevelCosts)> {
     let source = Source::new_u16(width, height, ColorModel::Rgb, samples)?;
-    let encoder = gip::encoder(gip::EFFORT)
+    let encoder = gip::psnr_encoder(gip::EFFORT)
         .with_target(Target::Gaussians(gaussians))
         .with_precision(Precision::Float)
         .with_training(training.clone());

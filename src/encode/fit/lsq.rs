@@ -5,9 +5,13 @@
 //! Training renders exactly what the file will hold: the values pass through the same quantizers
 //! that the file stores, and are decoded by the same function that the decoder calls.
 
+use core::ops::Range;
+use std::sync::Arc;
+
 use super::parameterization;
 use super::row::{Row, RowBounds};
 use super::training;
+use super::vector_quantizer::VectorQuantizer;
 use crate::coding::packed::{MAX_PARAMETER, Quantizer, UniformQuantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 
@@ -15,6 +19,8 @@ use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 #[derive(Clone, Debug)]
 pub(crate) struct LsqQuantizers {
     components: Vec<LsqQuantizer>,
+    /// What takes the place of LSQ+, and at which components.
+    replacements: Vec<(Range<usize>, Arc<dyn VectorQuantizer>)>,
     parameterization: Parameterization,
     /// Steps of Adam so far.
     age: i32,
@@ -24,6 +30,8 @@ pub(crate) struct LsqQuantizers {
 #[derive(Clone, Copy, Debug)]
 struct LsqQuantizer {
     quantizer: UniformQuantizer,
+    /// Whether another quantizer takes its place.
+    is_replaced: bool,
     /// For a logarithmic quantizer, the logarithm of the least value.
     min_logarithm: Option<f32>,
     /// Whether the offset is kept a multiple of the scale, so that a code stands for exactly 0.
@@ -43,6 +51,10 @@ impl LsqQuantizers {
         // A variance is the square of a deviation.
         let power = if bounds.parameterization == Parameterization::Covariance { 2.0 } else { 1.0 };
         let min_logarithm = power * parameterization::MIN_DEVIATION.ln();
+        let others = [(0..2, &options.center), (5..5 + bounds.channels, &options.color)];
+        let replacements: Vec<_> = (others.into_iter())
+            .filter_map(|(range, other)| Some((range, other.clone()?)))
+            .collect();
         let components = (0..5 + bounds.channels).map(|index| {
             let (bits, min_logarithm, has_zero) = match index {
                 0 | 1 => (options.position_bits, None, false),
@@ -58,6 +70,7 @@ impl LsqQuantizers {
             let (low, high) = if index < 5 { range(values) } else { three_sigma_range(values) };
             let mut component = LsqQuantizer {
                 quantizer: UniformQuantizer { bits, scale: 1.0, offset: low },
+                is_replaced: replacements.iter().any(|(range, _)| range.contains(&index)),
                 min_logarithm,
                 has_zero,
                 mean: [0.0; 2],
@@ -67,7 +80,14 @@ impl LsqQuantizers {
             component.clamp();
             component
         });
-        Self { components: components.collect(), parameterization: bounds.parameterization, age: 0 }
+        let mut quantizers = Self {
+            components: components.collect(),
+            replacements,
+            parameterization: bounds.parameterization,
+            age: 0,
+        };
+        quantizers.adapt(rows);
+        quantizers
     }
 
     /// The quantizers as the file stores them.
@@ -81,6 +101,13 @@ impl LsqQuantizers {
         let mut codes = [0; MAX_COMPONENTS];
         for ((code, &value), component) in codes.iter_mut().zip(row).zip(&self.components) {
             *code = component.quantizer.code(to_uniform(value, component.min_logarithm));
+        }
+        for (range, quantizer) in &self.replacements {
+            let mut values = *row;
+            quantizer.quantize(&mut values[range.clone()]);
+            for index in range.clone() {
+                codes[index] = values[index].to_bits();
+            }
         }
         if self.parameterization == Parameterization::Covariance && !self.is_drawable(&codes) {
             // An off-diagonal entry of 0 is always valid: bisect between its code and the rounded
@@ -120,7 +147,13 @@ impl LsqQuantizers {
         gradient: &mut Row,
     ) -> QuantizerGradients {
         let mut by_quantizer = [[0.0; 2]; MAX_COMPONENTS];
+        for (range, quantizer) in &self.replacements {
+            quantizer.add_gradient(&row[range.clone()], &mut gradient[range.clone()]);
+        }
         for (index, component) in self.components.iter().enumerate() {
+            if component.is_replaced {
+                continue;
+            }
             let UniformQuantizer { scale, offset, .. } = component.quantizer;
             let max = component.quantizer.max_code() as f32;
             // The code before it is clamped and rounded.
@@ -145,13 +178,21 @@ impl LsqQuantizers {
         by_quantizer
     }
 
-    /// Takes one step of Adam on scales and offsets, against gradients summed over `count`
-    /// Gaussians.
-    pub(crate) fn step(&mut self, gradients: &QuantizerGradients, count: usize, rate: f32) {
+    /// Takes one step of Adam on scales and offsets, against gradients summed over the Gaussians
+    /// whose values are now `rows`.
+    pub(crate) fn step(&mut self, gradients: &QuantizerGradients, rows: &[Row], rate: f32) {
         self.age += 1;
         let unbias = [1.0 - 0.9_f32.powi(self.age), 1.0 - 0.999_f32.powi(self.age)];
         for (component, gradient) in self.components.iter_mut().zip(gradients) {
-            component.step(gradient, count, rate, unbias);
+            component.step(gradient, rows.len(), rate, unbias);
+        }
+        self.adapt(rows);
+    }
+
+    fn adapt(&mut self, rows: &[Row]) {
+        for (range, quantizer) in &mut self.replacements {
+            let values: Vec<&[f32]> = rows.iter().map(|row| &row[range.clone()]).collect();
+            *quantizer = quantizer.adapted(&values);
         }
     }
 
@@ -166,6 +207,7 @@ impl LsqQuantizers {
 impl LsqQuantizer {
     fn stored(&self) -> Quantizer {
         match self.min_logarithm {
+            _ if self.is_replaced => Quantizer::Float,
             Some(_) => Quantizer::Log(self.quantizer),
             None => Quantizer::Linear(self.quantizer),
         }
@@ -286,7 +328,7 @@ mod tests {
                 // Training moves scales and offsets.
                 let gradient = [[f32::from(drift as i8), -f32::from(drift as i8)]; MAX_COMPONENTS];
                 for _ in 0..5 {
-                    quantizers.step(&gradient, rows.len(), 0.05);
+                    quantizers.step(&gradient, &rows, 0.05);
                 }
                 for row in &rows {
                     let codes = quantizers.codes(row);
@@ -341,6 +383,43 @@ mod tests {
         let mut gradient = [1.0; MAX_COMPONENTS];
         quantizers.backward(&rows[0], &decoded, &mut gradient);
         assert!((gradient[2] - decoded[2] / rows[0][2]).abs() < 1e-5);
+    }
+
+    /// Rounds to multiples of a step that each adaptation halves, and pulls values down.
+    #[derive(Debug)]
+    struct Halving(f32);
+
+    impl VectorQuantizer for Halving {
+        fn adapted(&self, trained: &[&[f32]]) -> Arc<dyn VectorQuantizer> {
+            assert!(trained.iter().all(|values| values.len() == 3));
+            Arc::new(Self(self.0 / 2.0))
+        }
+
+        fn quantize(&self, values: &mut [f32]) {
+            values.iter_mut().for_each(|value| *value = (*value / self.0).round() * self.0);
+        }
+
+        fn add_gradient(&self, trained: &[f32], gradient: &mut [f32]) {
+            gradient.iter_mut().zip(trained).for_each(|(sum, value)| *sum += value);
+        }
+    }
+
+    #[test]
+    fn another_quantizer_takes_the_place_of_lsq_plus() {
+        let rows = rows(Parameterization::Cholesky, 9, 5);
+        let mut options = Training::fast(1).quantization;
+        options.color = Some(Arc::new(Halving(1.0)));
+        let mut quantizers =
+            LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
+        assert_eq!(quantizers.stored()[5..], [Quantizer::Float; 3]);
+        let row = [30.0, 20.0, 2.0, 0.0, 2.0, 0.3125, -0.5625, 0.9375, 0.0];
+        assert_eq!(quantizers.decoded(&quantizers.codes(&row))[5..], [0.5, -0.5, 1.0, 0.0]);
+        let decoded = quantizers.decoded(&quantizers.codes(&row));
+        let mut gradient = [1.0; MAX_COMPONENTS];
+        let by_quantizer = quantizers.backward(&row, &decoded, &mut gradient);
+        assert_eq!(gradient[5..8], [1.3125, 0.4375, 1.9375]);
+        quantizers.step(&by_quantizer, &rows, 1e-3);
+        assert_eq!(quantizers.decoded(&quantizers.codes(&row))[5..], [0.25, -0.5, 1.0, 0.0]);
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod row;
 mod schedule;
 pub(crate) mod training;
 mod training_tile;
+pub(crate) mod vector_quantizer;
 
 use glam::Vec2;
 use rayon::prelude::*;
@@ -337,7 +338,7 @@ impl<'a> Fit<'a> {
             let mut total = QuantizerGradients::default();
             by_chunk.iter().for_each(|sum| add(&mut total, sum));
             let rate = self.training.quantization.learning_rate * factor;
-            quantizers.step(&total, self.parameters.len(), rate);
+            quantizers.step(&total, &self.parameters.values, rate);
         }
     }
 

@@ -1,6 +1,9 @@
 //! The constants of training (paper, sections "Methodology" and "Experimental Setup"; appendix,
 //! section "Implementation Details").
 
+use std::sync::Arc;
+
+use super::vector_quantizer::VectorQuantizer;
 use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
 
@@ -210,6 +213,10 @@ pub struct Quantization {
     /// Learning rate of scales and offsets, positive, relative to the scale (paper: 0.001,
     /// absolute).
     pub learning_rate: f32,
+    /// What quantizes the centre in place of LSQ+ (paper: nothing).
+    pub center: Option<Arc<dyn VectorQuantizer>>,
+    /// What quantizes the colour in place of LSQ+ (paper: nothing).
+    pub color: Option<Arc<dyn VectorQuantizer>>,
 }
 
 impl Training {
@@ -258,6 +265,8 @@ impl Training {
                 shape_bits: 10,
                 color_bits: 6,
                 learning_rate: 1e-3,
+                center: None,
+                color: None,
             },
         }
     }
@@ -303,6 +312,8 @@ impl Training {
                 shape_bits: 10,
                 color_bits: 6,
                 learning_rate: 1e-3,
+                center: None,
+                color: None,
             },
         }
     }
