@@ -28,13 +28,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
         SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
         SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
     }?;
-    let encoder = Encoder::new()
-        .with_target(args.target.target())
-        .with_tune(args.tune.into())
-        .with_effort(args.effort)
-        .with_precision(args.precision.into())
-        .with_seed(args.seed)
-        .with_metadata(picture.metadata.clone());
+    let encoder = args.encoder.encoder().with_metadata(picture.metadata.clone());
     let encoded = args.threads.pool()?.install(|| encode(&encoder, &source))?;
     output.write(&encoded.bytes)?;
 

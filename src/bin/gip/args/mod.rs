@@ -1,0 +1,12 @@
+//! The arguments of the command line, with their help texts.
+
+mod command;
+mod decode;
+mod encode;
+mod inspect;
+mod values;
+
+pub(crate) use command::{Args, Command};
+pub(crate) use decode::Decode;
+pub(crate) use encode::Encode;
+pub(crate) use inspect::{Compare, Info};
