@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 
+use super::batch::Batch;
 use super::decode::Decode;
 use super::encode::Encode;
 use super::inspect::{Compare, Info};
@@ -17,11 +18,12 @@ Examples:
   gip encode photo.png small.gip --size 20000        a file of 20,000 bytes
   gip decode photo.gip photo.png                     back to pixels
   gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
+  gip batch photos --out gips                        a folder, one picture per core
   gip info photo.gip                                 what the file contains
   gip compare photo.png photo.gip                    how much they differ
 
-In place of any file, `-` is standard input or standard output.
-Exit status: 0 for success, 1 for failure, 2 for wrong usage."
+In place of any file, `-` is standard input or standard output, but not as an input of `gip batch`.
+Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` failed."
 )]
 pub(crate) struct Args {
     #[command(subcommand)]
@@ -32,6 +34,7 @@ pub(crate) struct Args {
 pub(crate) enum Command {
     Encode(Encode),
     Decode(Decode),
+    Batch(Batch),
     Info(Info),
     Compare(Compare),
 }
@@ -51,7 +54,7 @@ mod tests {
         let mut tool = Args::command();
         tool.build();
         let mut commands: Vec<clap::Command> = tool.get_subcommands().cloned().collect();
-        assert_eq!(commands.len(), 4 + 1, "four and `help`");
+        assert_eq!(commands.len(), 5 + 1, "five and `help`");
         commands.push(tool);
         for mut command in commands {
             let help = command.render_long_help().to_string();

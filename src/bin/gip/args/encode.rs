@@ -65,6 +65,10 @@ pub(crate) struct EncoderArgs {
 }
 
 impl EncoderArgs {
+    /// The arguments above and the group of the targets, for what excludes them. The group that
+    /// `clap` makes of a struct is empty if another struct is flattened into it.
+    pub(super) const IDS: [&str; 5] = ["TargetArgs", "tune", "effort", "precision", "seed"];
+
     pub(crate) fn encoder(&self) -> Encoder {
         Encoder::new()
             .with_target(self.target.target())

@@ -5,6 +5,8 @@ use core::num::NonZeroU32;
 use image_gip::Region;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
+use crate::codec::{Codec, EXTENSIONS};
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct ThreadCount {
     /// Number of threads, from 1 to 1024; the result does not depend on it [default: one per
@@ -39,6 +41,22 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| "not two positive whole numbers such as 640x480".into())
 }
 
+/// Parses `N` or `WxH`, sides that something is to fit into.
+pub(super) fn bounds(text: &str) -> Result<(u32, u32), String> {
+    let side = text.parse().map(NonZeroU32::get);
+    side.map(|side| (side, side))
+        .or_else(|_| size(text))
+        .map_err(|_| "not one or two positive whole numbers such as 160 or 160x120".into())
+}
+
+/// Parses the extension of a format that can be written.
+pub(super) fn extension(text: &str) -> Result<String, String> {
+    match Codec::named(text) {
+        Some(_) => Ok(text.into()),
+        None => Err(format!("not one of {EXTENSIONS}")),
+    }
+}
+
 /// Parses `X,Y,W,H`.
 pub(super) fn region(text: &str) -> Result<Region, String> {
     let numbers: Result<Vec<u32>, _> = text.split(',').map(str::parse).collect();
@@ -56,6 +74,10 @@ mod tests {
     fn sizes_and_regions() {
         assert_eq!(size("640x480"), Ok((640, 480)));
         assert_eq!(region("1,2,3,4"), Ok(Region { x: 1, y: 2, width: 3, height: 4 }));
+        assert_eq!((bounds("64"), bounds("64x48")), (Ok((64, 64)), Ok((64, 48))));
+        for text in ["", "0", "-1", "64x", "64x0", "1.5"] {
+            assert!(bounds(text).is_err(), "{text}");
+        }
         for text in ["", "x", "640", "0x5", "5x0", "-1x5", "5x5x5", "5X5"] {
             assert!(size(text).is_err(), "{text}");
         }
