@@ -2,18 +2,17 @@
 
 mod common;
 mod pictures;
+mod room;
 
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
 
 use common::layered;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
 use image_gip::Region;
+use room::{Room, text};
 use serde_json::Value;
-use tempfile::TempDir;
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 36;
@@ -21,61 +20,7 @@ const HEIGHT: u32 = 36;
 /// An Exif block with one entry, the orientation "rotate by 90 degrees".
 const EXIF_ROTATE_90: &[u8] = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
-/// A directory for one test.
-struct Room(TempDir);
-
 impl Room {
-    fn new() -> Self {
-        Self(TempDir::new_in(env!("CARGO_TARGET_TMPDIR")).expect("the directory is writable"))
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Runs `gip` in this directory.
-    fn run(&self, args: &[&str]) -> Output {
-        self.pipe(args, &[])
-    }
-
-    /// Runs `gip` in this directory with bytes on its standard input.
-    fn pipe(&self, args: &[&str], input: &[u8]) -> Output {
-        let mut gip = Command::new(env!("CARGO_BIN_EXE_gip"))
-            .args(args)
-            .current_dir(self.0.path())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the binary was built");
-        // A tool that fails early reads nothing; that is no failure of the test.
-        let _ = gip.stdin.take().expect("piped").write_all(input);
-        gip.wait_with_output().expect("the tool ends")
-    }
-
-    /// Runs `gip`, which must succeed, and returns what it printed.
-    fn ok(&self, args: &[&str]) -> String {
-        let output = self.run(args);
-        assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
-        text(&output.stdout)
-    }
-
-    fn json(&self, args: &[&str]) -> Value {
-        let line = self.ok(args);
-        assert_eq!(line.lines().count(), 1, "one object on one line: {line}");
-        serde_json::from_str(&line).expect("JSON")
-    }
-
-    /// Runs `gip`, which must fail with one line of error; returns that line.
-    fn fails(&self, args: &[&str]) -> String {
-        let output = self.run(args);
-        let error = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{args:?}: {error}");
-        assert!(error.starts_with("error: ") && error.lines().count() == 1, "{args:?}: {error}");
-        assert!(output.stdout.is_empty(), "{args:?}");
-        error
-    }
-
     /// Saves a test picture as `name`.
     fn save(&self, name: &str, color: ColorType) -> DynamicImage {
         let picture = picture(color);
@@ -93,19 +38,6 @@ impl Room {
     fn encode(&self, input: &str, output: &str) {
         self.ok(&["encode", input, output, "--gaussians", "20", "--effort", "1"]);
     }
-
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.0.path()).expect("the directory exists");
-        let mut names: Vec<_> = entries
-            .map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned())
-            .collect();
-        names.sort();
-        names
-    }
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 fn open(path: &Path) -> DynamicImage {
@@ -679,7 +611,7 @@ fn help_is_printed_on_request() {
     let room = Room::new();
     assert!(room.ok(&["--help"]).contains("gip encode photo.jpg photo.gip"));
     assert!(room.ok(&["--version"]).contains(env!("CARGO_PKG_VERSION")));
-    for command in ["encode", "decode", "info", "compare"] {
+    for command in ["encode", "decode", "batch", "info", "compare"] {
         let help = room.ok(&[command, "--help"]);
         assert!(help.contains(&format!("Usage: gip {command} ")), "{help}");
         assert_eq!(room.ok(&["help", command]), help);

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
 use image::{DynamicImage, ImageEncoder};
 use image_gip::{ColorModel, SampleDepth};
@@ -13,6 +13,10 @@ use crate::picture::{SampleSlice, StillImage};
 
 /// Quality of JPEG files: high, because the picture has coding errors already.
 const JPEG_QUALITY: u8 = 95;
+
+/// The extensions of the formats, for messages.
+pub(crate) const EXTENSIONS: &str =
+    "png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm, ppm, pnm or pam";
 
 /// An output format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +48,14 @@ impl Codec {
             return Ok(Self::Png);
         }
         let extension = path.extension().unwrap_or_default().to_string_lossy();
-        Ok(match &*extension.to_ascii_lowercase() {
+        Self::named(&extension).with_context(|| {
+            format!("{}: the extension must name the format: {EXTENSIONS}", path.display())
+        })
+    }
+
+    /// The format with this extension.
+    pub(crate) fn named(extension: &str) -> Option<Self> {
+        Some(match &*extension.to_ascii_lowercase() {
             "bmp" => Self::Bmp,
             "ff" => Self::Farbfeld,
             "gif" => Self::Gif,
@@ -59,11 +70,7 @@ impl Codec {
             "tga" => Self::Tga,
             "tif" | "tiff" => Self::Tiff,
             "webp" => Self::WebP,
-            _ => bail!(
-                "{}: the extension must name the format: png, tif, webp, jpg, bmp, tga, qoi, gif, \
-                 ico, ff, pgm, ppm, pnm or pam",
-                path.display()
-            ),
+            _ => return None,
         })
     }
 

@@ -1,10 +1,13 @@
 //! `gip decode`.
 
+use std::io::Read;
+
 use anyhow::{Context, Result, anyhow};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, Pixel};
 use image_gip::{
-    ColorModel, DecodeError, Decoder, Header, RenderOptions, SampleDepth, StreamDecoder,
+    ColorModel, DecodeError, Decoder, Header, Metadata, Picture, RenderOptions, SampleDepth,
+    StreamDecoder,
 };
 
 use crate::args;
@@ -16,14 +19,11 @@ pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
     let codec = Codec::of(&args.output)?;
     let file = files::read(&args.input)?;
-    let mut picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
+    let picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
         Err(_) if args.allow_partial => decode_partial(args, codec, &file),
         decoded => decoded,
     })?;
-    let orientation = picture.metadata.exif.as_deref().and_then(Orientation::from_exif_chunk);
-    picture.make_upright(orientation.unwrap_or(Orientation::NoTransforms));
-    picture.drop_foreign_profile();
-    output.write(&codec.encode(&picture)?)
+    output.write(&codec.encode(&upright(picture))?)
 }
 
 /// Decodes a valid file. Layers that are not visible in the region are skipped.
@@ -31,14 +31,9 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let context = || files::input_name(&args.input);
     let mut decoder = Decoder::new(file).with_context(context)?;
     let metadata = decoder.metadata().clone();
-    let wanted = Wanted::new(args, codec, decoder.header())?;
-    decoder.set_options(wanted.options.clone());
-    let samples = decoder.output_len()?;
-    let image = match wanted.depth {
-        SampleDepth::Eight => wanted.image_u8(samples, |out| decoder.decode_into(out)),
-        _ => wanted.image_u16(samples, |out| decoder.decode_into_u16(out)),
-    };
-    Ok(StillImage { image: image.with_context(context)?, metadata })
+    let wanted = Wanted::new(render_options(args, decoder.header()), codec, decoder.header())?;
+    let image = wanted.decode(&mut decoder).with_context(context)?;
+    Ok(StillImage { image, metadata })
 }
 
 /// Decodes as many Gaussians of an invalid file as possible, and prints a warning.
@@ -52,20 +47,26 @@ fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<Stil
     let Some(picture) = stream.picture() else { return Err(error).context(name) };
     let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
     eprintln!("warning: {name}: {error}; showing {shown} of {all} Gaussians");
-    let wanted = Wanted::new(args, codec, picture.header())?;
-    let samples = picture.output_len(&wanted.options)?;
-    let image = match wanted.depth {
-        SampleDepth::Eight => {
-            wanted.image_u8(samples, |out| picture.render_u8(&wanted.options, out))
-        }
-        _ => wanted.image_u16(samples, |out| picture.render_u16(&wanted.options, out)),
-    };
-    Ok(StillImage { image: image?, metadata: stream.metadata().clone() })
+    let wanted = Wanted::new(render_options(args, picture.header()), codec, picture.header())?;
+    Ok(StillImage { image: wanted.render(&picture)?, metadata: stream.metadata().clone() })
+}
+
+/// The orientation that the Exif of a file asks for.
+pub(crate) fn orientation(metadata: &Metadata) -> Orientation {
+    let orientation = metadata.exif.as_deref().and_then(Orientation::from_exif_chunk);
+    orientation.unwrap_or(Orientation::NoTransforms)
+}
+
+/// A decoded picture as it is written: upright, and with a profile only if it fits the samples.
+pub(crate) fn upright(mut picture: StillImage) -> StillImage {
+    picture.make_upright(orientation(&picture.metadata));
+    picture.drop_foreign_profile();
+    picture
 }
 
 /// The options of the rendering, with the colour model and depth that the output format has.
-struct Wanted {
-    options: RenderOptions,
+pub(crate) struct Wanted {
+    pub(crate) options: RenderOptions,
     width: u32,
     height: u32,
     color: ColorModel,
@@ -73,17 +74,38 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn new(args: &args::Decode, codec: Codec, header: &Header) -> Result<Self> {
+    /// `options` say size, region and threads; the format sets the rest.
+    pub(crate) fn new(options: RenderOptions, codec: Codec, header: &Header) -> Result<Self> {
         let (color, depth) = codec.choose(header.color, header.depth)?;
-        let mut options = RenderOptions::new().with_color(color);
-        if let Some((width, height)) = output_size(args, header) {
-            options = options.with_size(width, height);
-        }
-        if let Some(region) = args.region {
-            options = options.with_region(region);
-        }
+        let options = options.with_color(color);
         let (width, height) = options.output_size(header);
         Ok(Self { options, width, height, color, depth })
+    }
+
+    /// The pixels of the rendering.
+    pub(crate) fn pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Decodes the rest of a file, and renders it.
+    pub(crate) fn decode(&self, decoder: &mut Decoder<impl Read>) -> Result<DynamicImage> {
+        decoder.set_options(self.options.clone());
+        let samples = decoder.output_len()?;
+        match self.depth {
+            SampleDepth::Eight => self.image_u8(samples, |out| decoder.decode_into(out)),
+            _ => self.image_u16(samples, |out| decoder.decode_into_u16(out)),
+        }
+    }
+
+    /// Renders the Gaussians of a picture.
+    pub(crate) fn render(&self, picture: &Picture<'_>) -> Result<DynamicImage> {
+        let samples = picture.output_len(&self.options)?;
+        match self.depth {
+            SampleDepth::Eight => {
+                self.image_u8(samples, |out| picture.render_u8(&self.options, out))
+            }
+            _ => self.image_u16(samples, |out| picture.render_u16(&self.options, out)),
+        }
     }
 
     fn image_u8(
@@ -126,10 +148,19 @@ impl Wanted {
     }
 }
 
-/// The size of the whole output; `None` for the stored size.
-fn output_size(args: &args::Decode, header: &Header) -> Option<(u32, u32)> {
+/// Size and region of the rendering.
+fn render_options(args: &args::Decode, header: &Header) -> RenderOptions {
     // The cast of a side that is too long saturates, and the limits refuse it.
     let scaled = |side: u32, scale: f64| (f64::from(side) * scale).round().max(1.0) as u32;
-    args.size
-        .or(args.scale.map(|scale| (scaled(header.width, scale), scaled(header.height, scale))))
+    let size = args
+        .size
+        .or(args.scale.map(|scale| (scaled(header.width, scale), scaled(header.height, scale))));
+    let mut options = RenderOptions::new();
+    if let Some((width, height)) = size {
+        options = options.with_size(width, height);
+    }
+    if let Some(region) = args.region {
+        options = options.with_region(region);
+    }
+    options
 }

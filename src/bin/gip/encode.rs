@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use image_gip::{Encoded, Encoder, Source};
+use image_gip::{EncodeError, Encoded, Encoder, Progress, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -21,24 +21,11 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
         check_name(&output)?;
     }
     let mut picture = StillImage::read(&args.input)?;
-    picture.drop_opaque_alpha();
-
-    let (width, height) = (picture.image.width(), picture.image.height());
-    let source = match picture.samples() {
-        SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
-        SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
-    }?;
-    let encoder = Encoder::new()
-        .with_target(args.target.target())
-        .with_tune(args.tune.into())
-        .with_effort(args.effort)
-        .with_precision(args.precision.into())
-        .with_seed(args.seed)
-        .with_metadata(picture.metadata.clone());
-    let encoded = args.threads.pool()?.install(|| encode(&encoder, &source))?;
+    let pool = args.threads.pool()?;
+    let encoded = pool.install(|| encode_with_bar(args.encoder.encoder(), &mut picture))?;
     output.write(&encoded.bytes)?;
 
-    let report = JsonReport::new(&source, &encoded);
+    let report = JsonReport::new(&picture, &encoded);
     let text = if args.json {
         serde_json::to_string(&report)?
     } else {
@@ -62,10 +49,10 @@ fn check_name(output: &Output) -> Result<()> {
 }
 
 /// Encodes with a progress bar, which is visible on a terminal only.
-fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
+fn encode_with_bar(encoder: Encoder, picture: &mut StillImage) -> Result<Encoded> {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left")?;
     let bar = ProgressBar::new(0).with_style(style);
-    let encoded = encoder.encode_with(source, &mut |progress| {
+    let encoded = encode(encoder, picture, &mut |progress| {
         bar.set_length(progress.iterations.into());
         bar.set_position(progress.iteration.into());
         bar.set_message(format!("{} Gaussians, {:.2} dB", progress.gaussians, progress.psnr));
@@ -73,6 +60,21 @@ fn encode(encoder: &Encoder, source: &Source<'_>) -> Result<Encoded> {
     });
     bar.finish_and_clear();
     Ok(encoded?)
+}
+
+/// Encodes a picture with its metadata. An alpha channel that is opaque everywhere is dropped.
+pub(crate) fn encode(
+    encoder: Encoder,
+    picture: &mut StillImage,
+    progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
+) -> Result<Encoded, EncodeError> {
+    picture.drop_opaque_alpha();
+    let (width, height) = (picture.image.width(), picture.image.height());
+    let source = match picture.samples() {
+        SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
+        SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
+    }?;
+    encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress)
 }
 
 /// What `--json` prints.
@@ -94,8 +96,8 @@ struct JsonReport {
 }
 
 impl JsonReport {
-    fn new(source: &Source<'_>, encoded: &Encoded) -> Self {
-        let (width, height) = (source.width(), source.height());
+    fn new(picture: &StillImage, encoded: &Encoded) -> Self {
+        let (width, height) = (picture.image.width(), picture.image.height());
         let bytes = encoded.bytes.len();
         Self {
             width,

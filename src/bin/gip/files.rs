@@ -1,10 +1,17 @@
 //! Reading and writing whole files; `-` is standard input or output.
 
-use std::fs;
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use tempfile::NamedTempFile;
+
+/// How the names of temporary files begin and end.
+const TEMPORARY: (&str, &str) = (".gip-", ".tmp");
+/// Random characters between them.
+const TEMPORARY_RANDOM: usize = 6;
 
 /// Whether a path stands for standard input or output. So do the devices: if they are redirected to
 /// a regular file, that file must not be replaced while another program has it open.
@@ -90,31 +97,73 @@ impl Output {
                 let mut stdout = io::stdout().lock();
                 stdout.write_all(bytes).and_then(|()| stdout.flush()).context("standard output")
             }
-            Self::Special(path) => fs::OpenOptions::new()
+            Self::Special(path) => OpenOptions::new()
                 .write(true)
                 .open(path)
                 .and_then(|mut file| file.write_all(bytes))
                 .with_context(|| output_name(path)),
             Self::Regular { path, directory } => {
-                replace(path, directory, bytes).with_context(|| output_name(path))
+                replace(path, directory, |file| Ok(file.write_all(bytes)?))
+                    .map(|_| ())
+                    .with_context(|| output_name(path))
             }
         }
     }
 }
 
-/// Writes a temporary file next to `path` and renames it.
-fn replace(path: &Path, directory: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".gip-");
-    // By default, temporary files are private; this one gets the permissions of a new file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(directory)?;
+/// Writes a temporary file next to `path` and renames it. Returns the file, to be written further.
+pub(crate) fn replace(
+    path: &Path,
+    directory: &Path,
+    write: impl FnOnce(&mut File) -> Result<()>,
+) -> Result<File> {
+    let mut file = temporary(directory)?;
     if let Ok(existing) = fs::metadata(path) {
         file.as_file().set_permissions(existing.permissions())?;
     }
-    file.write_all(bytes)?;
+    write(file.as_file_mut())?;
     file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
+    let file = file.persist(path)?;
+    // Only temporary files are locked.
+    let _ = file.unlock();
+    Ok(file)
+}
+
+/// Makes a temporary file, which is removed when it is dropped. It is locked, which tells
+/// [`remove_leftovers`] that it is in use: a lock ends with its process, however that ends.
+fn temporary(directory: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY.0).suffix(TEMPORARY.1).rand_bytes(TEMPORARY_RANDOM);
+    // By default, temporary files are private; this one gets the permissions of a new file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let file = builder.tempfile_in(directory)?;
+    // Where there are no locks, no file is taken for a leftover.
+    let _ = file.as_file().try_lock();
+    Ok(file)
+}
+
+/// Removes the temporary files in a directory whose processes were killed. What cannot be removed
+/// stays.
+pub(crate) fn remove_leftovers(directory: &Path) {
+    let Ok(entries) = fs::read_dir(directory) else { return };
+    for entry in entries.flatten() {
+        if !is_temporary(&entry.file_name()) || !entry.file_type().is_ok_and(|kind| kind.is_file())
+        {
+            continue;
+        }
+        let file = OpenOptions::new().write(true).open(entry.path());
+        if file.is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Whether [`temporary`] gives such names.
+fn is_temporary(name: &OsStr) -> bool {
+    let random = |name: &str| {
+        let random = name.strip_prefix(TEMPORARY.0)?.strip_suffix(TEMPORARY.1)?;
+        Some(random.len() == TEMPORARY_RANDOM && random.chars().all(|c| c.is_ascii_alphanumeric()))
+    };
+    name.to_str().and_then(random).unwrap_or(false)
 }

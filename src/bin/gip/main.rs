@@ -3,10 +3,12 @@
 #![forbid(unsafe_code)]
 
 mod args;
+mod batch;
 mod codec;
 mod compare;
 mod decode;
 mod encode;
+mod errors;
 mod files;
 mod info;
 mod picture;
@@ -14,7 +16,6 @@ mod picture;
 use std::process::ExitCode;
 
 use clap::Parser;
-use image_gip::EncodeError;
 
 use args::{Args, Command};
 
@@ -30,40 +31,22 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
+    let success = |()| ExitCode::SUCCESS;
     let outcome = match args.command {
-        Command::Encode(args) => encode::run(&args),
-        Command::Decode(args) => decode::run(&args),
-        Command::Info(args) => info::run(&args),
-        Command::Compare(args) => compare::run(&args),
+        Command::Encode(args) => encode::run(&args).map(success),
+        Command::Decode(args) => decode::run(&args).map(success),
+        Command::Batch(args) => batch::run(&args),
+        Command::Info(args) => info::run(&args).map(success),
+        Command::Compare(args) => compare::run(&args).map(success),
     };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {}", one_line(&error));
-            let wrong_usage = matches!(error.downcast_ref(), Some(EncodeError::Option(_)));
-            ExitCode::from(if wrong_usage { 2 } else { 1 })
-        }
-    }
+    outcome.unwrap_or_else(|error| {
+        eprintln!("error: {}", errors::one_line(&error));
+        ExitCode::from(errors::exit_status(&error))
+    })
 }
 
 /// The first paragraph of an error of `clap`, on one line: tips and usage follow it.
 fn first_paragraph(text: &str) -> String {
     let paragraph = text.split("\n\n").next().unwrap_or_default();
     paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// An error and its causes on one line. A cause that the text of an error repeats is printed once.
-fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let cause = cause.to_string();
-        let cause = cause.split_whitespace().collect::<Vec<_>>().join(" ");
-        if !line.contains(&cause) {
-            if !line.is_empty() {
-                line.push_str(": ");
-            }
-            line.push_str(&cause);
-        }
-    }
-    line
 }

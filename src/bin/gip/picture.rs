@@ -1,11 +1,12 @@
 //! Pictures in memory: reading them, and converting their colour model and depth.
 
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use image_gip::{ColorModel, Metadata, SampleDepth};
 
 use crate::files;
@@ -33,23 +34,23 @@ pub(crate) enum SampleSlice<'a> {
 impl StillImage {
     /// Reads a picture of any format that `image` reads, .gip included.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let name = || files::input_name(path);
         let bytes = files::read(path)?;
-        let mut reader = ImageReader::new(Cursor::new(bytes));
-        // A format without a signature is recognized by its extension.
-        if let Ok(format) = ImageFormat::from_path(path) {
-            reader.set_format(format);
-        }
-        let reader = reader.with_guessed_format().with_context(name)?;
-        Self::decode(reader).with_context(name)
+        let name = || files::input_name(path);
+        Self::decode(reader(path, Cursor::new(bytes)).with_context(name)?).with_context(name)
     }
 
-    fn decode(mut reader: ImageReader<Cursor<Vec<u8>>>) -> Result<Self> {
-        let mut limits = image::Limits::default();
-        limits.max_image_width = Some(MAX_SIDE);
-        limits.max_image_height = Some(MAX_SIDE);
-        limits.max_alloc = Some(MAX_MEMORY);
-        reader.limits(limits.clone());
+    /// Width and height in pixels as they are stored, before the orientation is applied.
+    pub(crate) fn dimensions(path: &Path) -> Result<(u32, u32)> {
+        let name = || files::input_name(path);
+        let file = BufReader::new(File::open(path).with_context(name)?);
+        reader(path, file)
+            .map_err(ImageError::from)
+            .and_then(ImageReader::into_dimensions)
+            .with_context(name)
+    }
+
+    fn decode(reader: ImageReader<impl BufRead + Seek>) -> Result<Self> {
+        let mut limits = limits();
         let mut decoder = reader.into_decoder()?;
         limits.reserve(decoder.total_bytes())?;
         decoder.set_limits(limits)?;
@@ -156,6 +157,25 @@ pub(crate) fn widest(a: ColorModel, b: ColorModel) -> ColorModel {
         (true, false) => ColorModel::Rgb,
         (true, true) => ColorModel::Rgba,
     }
+}
+
+/// A reader of the picture at `path`, which has these contents.
+fn reader<R: BufRead + Seek>(path: &Path, contents: R) -> io::Result<ImageReader<R>> {
+    let mut reader = ImageReader::new(contents);
+    // A format without a signature is recognized by its extension.
+    if let Ok(format) = ImageFormat::from_path(path) {
+        reader.set_format(format);
+    }
+    reader.limits(limits());
+    reader.with_guessed_format()
+}
+
+fn limits() -> image::Limits {
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_MEMORY);
+    limits
 }
 
 fn is_opaque<T: PartialEq>(samples: &[T], channels: usize, full: &T) -> bool {

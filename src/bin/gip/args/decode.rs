@@ -1,0 +1,48 @@
+//! The arguments of `gip decode`.
+
+use std::path::PathBuf;
+
+use image_gip::Region;
+
+use super::values::{ThreadCount, number, region, size};
+
+/// Decodes a .gip file to a picture.
+///
+/// The extension of OUTPUT sets the format: png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm,
+/// ppm, pnm or pam. On standard output it is PNG. Gray becomes RGB if the format has no gray, and
+/// 16 bits become 8 if it has no more. Alpha is never dropped: a picture with alpha cannot be
+/// written in a format without it. ICC profile and Exif are written to formats that support them
+/// (PNG, JPEG, WebP; in TIFF only the profile). An orientation in the file's Exif is applied.
+#[derive(Debug, clap::Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
+Examples:
+  gip decode photo.gip double.png --scale 2
+  gip decode photo.gip detail.png --scale 4 --region 800,600,400,300
+  gip decode photo.gip - | display -"
+)]
+pub(crate) struct Decode {
+    /// The .gip file, or `-` for standard input.
+    pub(crate) input: PathBuf,
+    /// The picture to write, or `-` for standard output (PNG).
+    pub(crate) output: PathBuf,
+    /// Render F times as wide and high, from 0.001 to 1000. The Gaussians themselves are scaled; no
+    /// pixels are resampled.
+    #[arg(long, value_name = "F", conflicts_with = "size",
+          value_parser = |text: &str| number(text, 0.001, 1000.0))]
+    pub(crate) scale: Option<f64>,
+    /// Render the whole picture at W by H pixels.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<(u32, u32)>,
+    /// Render only a region: the W by H pixels whose first one is (X, Y). Coordinates are pixels of
+    /// the output, after --scale or --size.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
+    pub(crate) region: Option<Region>,
+    /// If the file is truncated or damaged, write the picture of the Gaussians that can be decoded,
+    /// and print a warning, instead of failing.
+    #[arg(long)]
+    pub(crate) allow_partial: bool,
+    #[command(flatten)]
+    pub(crate) threads: ThreadCount,
+}

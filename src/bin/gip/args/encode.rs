@@ -1,0 +1,191 @@
+//! The arguments of `gip encode`.
+
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use image_gip::{Encoder, Precision, Target, Tune};
+
+use super::values::{ThreadCount, number};
+
+/// Encodes a picture as a .gip file.
+///
+/// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS, ICO, farbfeld, OpenEXR, Radiance
+/// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
+/// Alpha is dropped if every pixel is opaque. Samples that are floats (OpenEXR, HDR) are taken as
+/// linear light, clipped, and stored as 16-bit sRGB. An Exif orientation is applied to the pixels,
+/// and the tag in the stored Exif is reset. ICC profile, Exif and XMP are stored.
+#[derive(Debug, clap::Args)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "\
+At most one of --gaussians, --bpp, --size, --psnr, --quality and --lambda may be given. If the target cannot
+be met, the file comes as close as possible, and the report gives the reason."
+)]
+pub(crate) struct Encode {
+    /// The picture, or `-` for standard input.
+    pub(crate) input: PathBuf,
+    /// The .gip file to write, or `-` for standard output.
+    pub(crate) output: PathBuf,
+    #[command(flatten)]
+    pub(crate) encoder: EncoderArgs,
+    /// Write OUTPUT even if its name does not end in .gip.
+    #[arg(long)]
+    pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) threads: ThreadCount,
+    /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.
+    ///
+    /// Fields: width, height, gaussians (their number), bytes, bpp (bits per pixel of the whole
+    /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples), quality
+    /// (an estimate of SSIMULACRA2, from 0 to 100), iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
+    /// (in bytes), shortfall (null, or why the target was not met). An infinite PSNR, of an exact
+    /// copy, is given as 999.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The options of the encoder.
+#[derive(Debug, clap::Args)]
+pub(crate) struct EncoderArgs {
+    #[command(flatten)]
+    target: TargetArgs,
+    /// What to minimize for the size of the file.
+    #[arg(long, value_enum, default_value_t = TuneArg::Visual)]
+    tune: TuneArg,
+    /// Time to spend, from 1 (least) to 9 (most).
+    #[arg(long, value_name = "E", default_value_t = 5,
+          value_parser = clap::value_parser!(u8).range(1..=9))]
+    effort: u8,
+    /// How the Gaussians are stored.
+    #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
+    precision: PrecisionArg,
+    /// Seed of the random numbers; the same picture, options and seed give the same file.
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+}
+
+impl EncoderArgs {
+    /// The arguments above and the group of the targets, for what excludes them. The group that
+    /// `clap` makes of a struct is empty if another struct is flattened into it.
+    pub(super) const IDS: [&str; 5] = ["TargetArgs", "tune", "effort", "precision", "seed"];
+
+    pub(crate) fn encoder(&self) -> Encoder {
+        Encoder::new()
+            .with_target(self.target.target())
+            .with_tune(self.tune.into())
+            .with_effort(self.effort)
+            .with_precision(self.precision.into())
+            .with_seed(self.seed)
+    }
+}
+
+/// The target that the file has to meet. Without any of them it is --quality 75.
+#[derive(Debug, clap::Args)]
+#[group(multiple = false)]
+struct TargetArgs {
+    /// At most N Gaussians, from 1 to 4194304.
+    #[arg(long, help_heading = "Targets", value_name = "N",
+          value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
+    gaussians: Option<u32>,
+    /// A file of at most B bits per pixel, from 0.0001 to 1000.
+    #[arg(long, help_heading = "Targets", value_name = "B",
+          value_parser = |text: &str| number(text, 0.0001, 1000.0))]
+    bpp: Option<f64>,
+    /// A file of at most BYTES bytes, from 1 to 1073741824.
+    #[arg(long, help_heading = "Targets", value_name = "BYTES",
+          value_parser = clap::value_parser!(u64).range(1..))]
+    size: Option<u64>,
+    /// A PSNR of the decoded file of DB decibels, from 1 to 120.
+    #[arg(long, help_heading = "Targets", value_name = "DB",
+          value_parser = |text: &str| number(text, 1.0, 120.0))]
+    psnr: Option<f64>,
+    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2 [default: 75].
+    #[arg(long, help_heading = "Targets", value_name = "Q",
+          value_parser = |text: &str| number(text, 0.0, 100.0))]
+    quality: Option<f64>,
+    /// A Lagrange multiplier from 0.01 to 1000000: the squared error that a bit must save, where
+    /// samples are 0 to 255. For comparisons over many pictures.
+    #[arg(long, help_heading = "Targets", value_name = "L",
+          value_parser = |text: &str| number(text, 0.01, 1e6))]
+    lambda: Option<f64>,
+}
+
+impl TargetArgs {
+    fn target(&self) -> Target {
+        self.gaussians
+            .map(Target::Gaussians)
+            .or(self.bpp.map(Target::BitsPerPixel))
+            .or(self.size.map(Target::Bytes))
+            .or(self.psnr.map(Target::Psnr))
+            .or(self.quality.map(Target::Quality))
+            .or(self.lambda.map(Target::Lambda))
+            .unwrap_or_default()
+    }
+}
+
+/// What the encoder minimizes.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum TuneArg {
+    /// The error that a person sees
+    Visual,
+    /// The squared error, for the highest PSNR
+    Psnr,
+}
+
+impl From<TuneArg> for Tune {
+    fn from(arg: TuneArg) -> Self {
+        match arg {
+            TuneArg::Visual => Self::Visual,
+            TuneArg::Psnr => Self::Psnr,
+        }
+    }
+}
+
+/// How the Gaussians are stored.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PrecisionArg {
+    /// Packed coding with 32-bit floats: the fitted values themselves; files several times as large
+    F32,
+    /// Packed coding: codes of fixed bit depths, after quantization-aware training
+    Packed,
+    /// Entropy coding: codes chosen by rate-distortion optimization; the smallest files
+    Entropy,
+}
+
+impl From<PrecisionArg> for Precision {
+    fn from(arg: PrecisionArg) -> Self {
+        match arg {
+            PrecisionArg::F32 => Self::Float,
+            PrecisionArg::Packed => Self::Packed,
+            PrecisionArg::Entropy => Self::Entropy,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        target: TargetArgs,
+    }
+
+    #[test]
+    fn targets() {
+        let target = |flags: &[&str]| {
+            let line = Line::try_parse_from([&["gip"], flags].concat());
+            line.ok().map(|line| line.target.target())
+        };
+        assert_eq!(target(&[]), Some(Target::Auto));
+        assert_eq!(target(&["--gaussians", "9"]), Some(Target::Gaussians(9)));
+        assert_eq!(target(&["--bpp", "0.5"]), Some(Target::BitsPerPixel(0.5)));
+        assert_eq!(target(&["--size", "900"]), Some(Target::Bytes(900)));
+        assert_eq!(target(&["--psnr", "31.5"]), Some(Target::Psnr(31.5)));
+        assert_eq!(target(&["--quality", "0"]), Some(Target::Quality(0.0)));
+        assert_eq!(target(&["--lambda", "700"]), Some(Target::Lambda(700.0)));
+        assert_eq!(target(&["--quality", "50", "--psnr", "30"]), None);
+    }
+}

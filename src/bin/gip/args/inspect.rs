@@ -1,0 +1,39 @@
+//! The arguments of `gip info` and `gip compare`.
+
+use std::path::PathBuf;
+
+/// Shows what a .gip file contains.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Info {
+    /// The .gip file, or `-` for standard input.
+    pub(crate) file: PathBuf,
+    /// Print one JSON object: the size of the file, all fields of the header, number and bytes of
+    /// the chunks of each type, bits per Gaussian by attribute, and sizes of the metadata.
+    ///
+    /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the
+    /// quantizer of each component of the packed coding; with the entropy coding it is empty.
+    /// `lattice_steps` has the quantization steps of the entropy coding; with the packed coding it
+    /// is null.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Measures how much two pictures differ.
+///
+/// Each may be a .gip file or any picture that `gip encode` reads. They must have the same size. An
+/// alpha channel that is opaque everywhere is ignored. Both are converted to a colour model with the
+/// channels of both, and to the greater depth: gray becomes RGB, missing alpha becomes opaque, 8
+/// bits become 16. PSNR and the largest error are over all samples of all channels. MS-SSIM is the
+/// mean over the channels, on up to five scales, as the size allows.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Compare {
+    /// A picture, or `-` for standard input.
+    pub(crate) a: PathBuf,
+    /// Another one.
+    pub(crate) b: PathBuf,
+    /// Print one JSON object: width, height, channels, depth (bits per sample), psnr (in dB),
+    /// ms_ssim, max_abs_error (in quantization steps of that depth). The PSNR of identical
+    /// pictures, which is infinite, is given as 999.
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,14 @@
+//! The arguments of the command line, with their help texts.
+
+mod batch;
+mod command;
+mod decode;
+mod encode;
+mod inspect;
+mod values;
+
+pub(crate) use batch::Batch;
+pub(crate) use command::{Args, Command};
+pub(crate) use decode::Decode;
+pub(crate) use encode::Encode;
+pub(crate) use inspect::{Compare, Info};

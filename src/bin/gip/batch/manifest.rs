@@ -1,0 +1,185 @@
+//! The manifest: a line of JSON for every file.
+
+use std::collections::{HashMap, HashSet};
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Write};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+use super::inputs::Item;
+use super::task::Facts;
+use crate::files::{self, Output};
+
+/// A line.
+#[derive(Debug, Serialize)]
+pub(crate) struct Record {
+    input: String,
+    output: String,
+    status: Status,
+    input_bytes: Option<u64>,
+    #[serde(flatten)]
+    facts: Facts,
+    error: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Status {
+    Written,
+    Skipped,
+    Failed,
+}
+
+impl Record {
+    pub(crate) fn written(item: &Item, facts: Facts) -> Self {
+        Self::new(item, Status::Written, facts, None)
+    }
+
+    fn skipped(item: &Item, facts: Facts) -> Self {
+        Self::new(item, Status::Skipped, facts, None)
+    }
+
+    pub(crate) fn failed(item: &Item, error: String) -> Self {
+        Self::new(item, Status::Failed, Facts::default(), Some(error))
+    }
+
+    fn new(item: &Item, status: Status, facts: Facts, error: Option<String>) -> Self {
+        Self {
+            input: item.source.display().to_string(),
+            output: item.output.display().to_string(),
+            status,
+            input_bytes: item.source.metadata().ok().map(|metadata| metadata.len()),
+            facts,
+            error,
+        }
+    }
+}
+
+/// What is read of a line.
+#[derive(Debug, Deserialize)]
+struct Known {
+    input: String,
+    output: String,
+    status: Status,
+    bytes: Option<u64>,
+}
+
+/// The manifest that is being written.
+pub(crate) struct Manifest {
+    name: String,
+    file: Mutex<Box<dyn Write + Send>>,
+}
+
+impl Manifest {
+    /// Begins a manifest with the lines of the files that are skipped, for each of which there are
+    /// facts. With `resume`, they and the lines of unknown files are taken from the manifest that is
+    /// there, which is unchanged if this fails.
+    pub(crate) fn begin(
+        path: &Path,
+        items: &[Item],
+        skipped: &[Option<Facts>],
+        resume: bool,
+    ) -> Result<Self> {
+        let name = files::output_name(path);
+        let begin = |file: &mut dyn Write, old: Option<File>| -> Result<()> {
+            let mut file = BufWriter::new(file);
+            let mut lines = Lines::new(items, skipped);
+            if let Some(old) = old {
+                lines.copy(BufReader::new(old), &mut file)?;
+            }
+            lines.add_missing(&mut file)?;
+            Ok(file.flush()?)
+        };
+        let file: Result<Box<dyn Write + Send>> = match Output::new(path)? {
+            Output::Standard => {
+                begin(&mut io::stdout(), None).map(|()| Box::new(io::stdout()) as _)
+            }
+            Output::Special(path) => {
+                let mut file = OpenOptions::new().write(true).open(path)?;
+                begin(&mut file, None).map(|()| Box::new(file) as _)
+            }
+            Output::Regular { path, directory } => {
+                let old = match File::open(&path) {
+                    Ok(old) if resume => Some(old),
+                    Err(error) if resume && error.kind() != ErrorKind::NotFound => {
+                        return Err(error).context(name);
+                    }
+                    _ => None,
+                };
+                files::replace(&path, &directory, |file| begin(file, old))
+                    .map(|file| Box::new(file) as _)
+            }
+        };
+        Ok(Self { file: Mutex::new(file.with_context(|| name.clone())?), name })
+    }
+
+    /// Adds a line.
+    pub(crate) fn add(&self, record: &Record) -> Result<()> {
+        let mut line = serde_json::to_vec(record)?;
+        line.push(b'\n');
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        file.write_all(&line).and_then(|()| file.flush()).with_context(|| self.name.clone())
+    }
+}
+
+/// The lines that a manifest begins with.
+struct Lines<'a> {
+    items: &'a [Item],
+    skipped: &'a [Option<Facts>],
+    /// The number of each file, by the name of its result.
+    numbers: HashMap<String, usize>,
+    /// The results that have a line.
+    added: HashSet<String>,
+}
+
+impl<'a> Lines<'a> {
+    fn new(items: &'a [Item], skipped: &'a [Option<Facts>]) -> Self {
+        let output = |item: &Item| item.output.display().to_string();
+        let numbers = items.iter().map(output).zip(0..).collect();
+        Self { items, skipped, numbers, added: HashSet::new() }
+    }
+
+    /// Copies the lines of an earlier manifest that still hold.
+    fn copy(&mut self, mut old: impl BufRead, file: &mut impl Write) -> Result<()> {
+        let mut line = Vec::new();
+        for number in 1.. {
+            line.clear();
+            old.read_until(b'\n', &mut line)?;
+            // A last line without an end is one that was not written completely.
+            if !line.ends_with(b"\n") {
+                break;
+            }
+            let known: Known = serde_json::from_slice(&line)
+                .with_context(|| format!("line {number} is not one of a manifest of gip batch"))?;
+            if self.holds(&known) && self.added.insert(known.output) {
+                file.write_all(&line)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what a line says is still so. This is not known about files of other runs.
+    fn holds(&self, known: &Known) -> bool {
+        let Some(&number) = self.numbers.get(&known.output) else { return true };
+        self.skipped[number].as_ref().is_some_and(|facts| {
+            known.status != Status::Failed
+                && known.bytes == facts.bytes
+                && known.input == self.items[number].source.display().to_string()
+        })
+    }
+
+    /// Writes a line for every skipped file that has none.
+    fn add_missing(&self, file: &mut impl Write) -> Result<()> {
+        for (item, facts) in self.items.iter().zip(self.skipped) {
+            let Some(facts) = facts else { continue };
+            if !self.added.contains(&*item.output.to_string_lossy()) {
+                serde_json::to_writer(&mut *file, &Record::skipped(item, facts.clone()))?;
+                file.write_all(b"\n")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,293 @@
+//! The run of a batch, from its arguments to its exit status.
+
+use core::fmt;
+use std::fs;
+use std::io::{self, ErrorKind, Write};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::{Context, Error, Result, bail};
+use image_gip::EncodeError;
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+
+use super::budget::Budget;
+use super::inputs::{self, Item};
+use super::manifest::{Manifest, Record};
+use super::outputs::Plan;
+use super::stop::{self, Stop};
+use super::task::{Facts, Task};
+use super::workers;
+use crate::args;
+use crate::errors::one_line;
+use crate::files::{self, Output};
+
+/// The budget of one job by default, in pixels.
+const PIXELS_PER_JOB: u64 = 16_000_000;
+/// The exit status when some files failed.
+const SOME_FAILED: u8 = 3;
+
+pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
+    let start = Instant::now();
+    let task = Task::new(args);
+    let takes = |path: &Path| task.takes(path);
+    let found = inputs::find(&args.inputs, &args.out, takes, task.extension())?;
+    let Plan { items, folders } = Plan::new(found, args.manifest.as_deref())?;
+    let jobs = match args.jobs {
+        Some(jobs) => usize::from(jobs),
+        None => thread::available_parallelism().map_or(1, usize::from),
+    };
+    let pixels = match args.budget {
+        Some(megapixels) => (megapixels * 1e6) as u64,
+        None => PIXELS_PER_JOB * jobs as u64,
+    };
+    let batch = Batch { task, items, jobs, budget: Budget::new(pixels), stop: Stop::on_signals()? };
+
+    fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
+    for folder in &folders {
+        files::remove_leftovers(folder);
+    }
+    let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
+    let mut tally = Tally::default();
+    // The manifest that is there needs all that was found out about the files that are skipped.
+    if !batch.stop.is_asked_for() {
+        let begin = |path| Manifest::begin(path, &batch.items, &skipped, args.resume);
+        let manifest = args.manifest.as_deref().map(begin).transpose()?;
+        tally = batch.work(&skipped, manifest.as_ref())?;
+    }
+    files::print(&batch.summary(&skipped, &tally, start), args.manifest.as_deref())?;
+    Ok(ExitCode::from(match batch.stop.signal() {
+        Some(signal) => stop::end_by(signal),
+        None if tally.failed.into_inner() > 0 => SOME_FAILED,
+        None => 0,
+    }))
+}
+
+/// What is done, to which files, and how many of them at the same time.
+struct Batch {
+    task: Task,
+    items: Vec<Item>,
+    jobs: usize,
+    budget: Budget,
+    stop: Stop,
+}
+
+/// What has been done.
+#[derive(Debug, Default)]
+struct Tally {
+    written: AtomicUsize,
+    bytes: AtomicU64,
+    failed: AtomicUsize,
+    is_disk_full: AtomicBool,
+}
+
+impl Batch {
+    /// For each file whose result is whole and newer than the file, what the result tells.
+    fn up_to_date(&self) -> Result<Vec<Option<Facts>>> {
+        let found: Vec<OnceLock<Facts>> = self.items.iter().map(|_| OnceLock::new()).collect();
+        let bar = bar(self.items.len())?.with_message("checking");
+        workers::for_each(self.jobs, self.items.len(), &self.stop, |index| {
+            let item = &self.items[index];
+            let inspect = || self.task.inspect(&item.output, &self.budget);
+            if is_newer(&item.output, &item.source)
+                && let Ok(facts) = catch_panic(item, inspect)
+            {
+                let _ = found[index].set(facts);
+            }
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        Ok(found.into_iter().map(OnceLock::into_inner).collect())
+    }
+
+    /// Does all that is not skipped.
+    ///
+    /// # Errors
+    /// When the manifest cannot be written. What fails with a file is told, and counted.
+    fn work(&self, skipped: &[Option<Facts>], manifest: Option<&Manifest>) -> Result<Tally> {
+        let (tally, fatal) = (Tally::default(), OnceLock::new());
+        let todo: Vec<&Item> = self
+            .items
+            .iter()
+            .zip(skipped)
+            .filter_map(|(item, facts)| facts.is_none().then_some(item))
+            .collect();
+        let bar = bar(todo.len())?;
+        workers::for_each(self.jobs, todo.len(), &self.stop, |index| {
+            let item = todo[index];
+            let record = match catch_panic(item, || self.result(item)) {
+                Ok(facts) => {
+                    tally.written.fetch_add(1, Ordering::Relaxed);
+                    tally.bytes.fetch_add(facts.bytes.unwrap_or(0), Ordering::Relaxed);
+                    Record::written(item, facts)
+                }
+                Err(error) if matches!(error.downcast_ref(), Some(EncodeError::Cancelled)) => {
+                    return;
+                }
+                Err(error) => {
+                    if is_disk_full(&error) {
+                        tally.is_disk_full.store(true, Ordering::Relaxed);
+                        self.stop.halt();
+                    }
+                    let line = one_line(&error);
+                    bar.suspend(|| _ = writeln!(io::stderr(), "error: {line}"));
+                    let failed = tally.failed.fetch_add(1, Ordering::Relaxed) + 1;
+                    bar.set_message(format!("{failed} failed"));
+                    Record::failed(item, line)
+                }
+            };
+            if let Some(Err(error)) = manifest.map(|manifest| manifest.add(&record)) {
+                let _ = fatal.set(error);
+                self.stop.halt();
+            }
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        fatal.into_inner().map_or(Ok(tally), Err)
+    }
+
+    /// Makes the result of one file.
+    fn result(&self, item: &Item) -> Result<Facts> {
+        let stamp = || stamp(&item.source).with_context(|| item.source.display().to_string());
+        let before = stamp()?;
+        let (bytes, facts) = self.task.perform(item, &self.budget, &self.stop)?;
+        // The result will be newer, and would never be made again.
+        if stamp()? != before {
+            bail!("{}: the file changed while it was worked on", item.source.display());
+        }
+        if let Some(folder) = item.output.parent() {
+            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        Output::new(&item.output)?.write(&bytes)?;
+        Ok(facts)
+    }
+
+    /// The last words.
+    fn summary(&self, skipped: &[Option<Facts>], tally: &Tally, start: Instant) -> String {
+        let all = self.items.len();
+        let skipped = skipped.iter().flatten().count();
+        let [written, failed] = [&tally.written, &tally.failed].map(|n| n.load(Ordering::Relaxed));
+        let left = all - written - skipped - failed;
+        let bytes = tally.bytes.load(Ordering::Relaxed);
+        let seconds = start.elapsed().as_secs_f64();
+        let files = if all == 1 { "file" } else { "files" };
+        let mut text = format!(
+            "{all} {files}: {written} written, {skipped} skipped, {failed} failed, {left} left; {bytes} \
+             bytes, {seconds:.1} s"
+        );
+        if all == 0 {
+            text.push_str("\nnote: the folders have no files of the formats that are read");
+        } else if left > 0 {
+            let full = tally.is_disk_full.load(Ordering::Relaxed);
+            let why = if full { "the disk is full" } else { "interrupted" };
+            text.push_str(&format!("\nnote: {why}; the same command with --resume does the rest"));
+        }
+        text
+    }
+}
+
+/// A progress bar, which is visible on a terminal only.
+fn bar(length: usize) -> Result<ProgressBar> {
+    let template = "{bar:40} {pos}/{len}  {rate}  {eta} left  {msg}";
+    let style = ProgressStyle::with_template(template)?;
+    let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
+        _ = write!(out, "{:.2} files/s", state.per_sec());
+    });
+    let bar = ProgressBar::new(length as u64).with_style(style);
+    if !bar.is_hidden() {
+        bar.enable_steady_tick(Duration::from_millis(500));
+    }
+    Ok(bar)
+}
+
+/// Makes an error of a panic, so that one picture on which a library fails does not end the batch.
+fn catch_panic<T>(item: &Item, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().map(|text| text.to_string());
+        let text = text.or_else(|| panic.downcast_ref().cloned()).unwrap_or_default();
+        bail!("{}: internal error: {text}", item.source.display())
+    })
+}
+
+/// Size and time of a file, which tell whether it changed.
+fn stamp(path: &Path) -> io::Result<(u64, Option<SystemTime>)> {
+    let metadata = fs::metadata(path)?;
+    Ok((metadata.len(), metadata.modified().ok()))
+}
+
+fn is_newer(output: &Path, source: &Path) -> bool {
+    let modified = |path| fs::metadata(path).and_then(|metadata| metadata.modified());
+    match (modified(output), modified(source)) {
+        (Ok(output), Ok(source)) => output > source,
+        _ => false,
+    }
+}
+
+/// Whether an error is that of a full disk, or of a full quota.
+fn is_disk_full(error: &Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(|error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_error_with_the_name_of_the_file() {
+        let item = Item { source: "a.png".into(), output: "a.gip".into() };
+        let error = |work: fn() -> Result<()>| one_line(&catch_panic(&item, work).unwrap_err());
+        assert_eq!(error(|| panic!("of a {}", "library")), "a.png: internal error: of a library");
+        assert_eq!(error(|| panic!("fixed")), "a.png: internal error: fixed");
+        assert_eq!(error(|| bail!("plain")), "plain");
+    }
+
+    #[test]
+    fn a_full_disk_is_told_from_other_errors() {
+        for (kind, is_full) in [
+            (ErrorKind::StorageFull, true),
+            (ErrorKind::QuotaExceeded, true),
+            (ErrorKind::PermissionDenied, false),
+        ] {
+            let error = Error::from(io::Error::from(kind)).context("a.gip");
+            assert_eq!(is_disk_full(&error), is_full, "{kind}");
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_source_that_changes_while_it_is_read_has_no_result() {
+        let room = tempfile::tempdir().expect("a place for temporary files");
+        let task = Task::Decode { extension: "png".into(), bounds: None };
+        let (budget, stop) = (Budget::new(1), Stop::default());
+        let batch = Batch { task, items: Vec::new(), jobs: 1, budget, stop };
+        let item = |name: &str| Item {
+            source: room.path().join(name),
+            output: room.path().join("out").join(name).with_extension("png"),
+        };
+        let (still, changing) = (item("still.gip"), item("changing.gip"));
+        let file = image_gip::encode(8, 8, image_gip::ColorModel::Gray, &[9; 64]).expect("encoded");
+        fs::write(&still.source, &file).expect("writable");
+        batch.result(&still).expect("a sound file");
+        assert!(still.output.is_file());
+
+        // The time of a pipe changes when something is written to it.
+        let script = "mkfifo changing.gip && touch -t 200001010000 changing.gip";
+        let mut shell = std::process::Command::new("sh");
+        let made = shell.args(["-c", script]).current_dir(room.path()).status();
+        assert!(made.expect("there is a shell").success());
+        let result = thread::scope(|scope| {
+            scope.spawn(|| fs::write(&changing.source, &file).expect("it is read"));
+            batch.result(&changing)
+        });
+        let error = result.expect_err("it changed").to_string();
+        assert!(error.contains("changing.gip: the file changed"), "{error}");
+        assert!(!changing.output.exists());
+    }
+}

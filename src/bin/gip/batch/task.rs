@@ -1,0 +1,222 @@
+//! What a batch does to one file.
+
+use core::ops::ControlFlow;
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use image::ImageFormat;
+use image::metadata::Orientation;
+use image_gip::{Decoder, EncodeError, Encoder, Header, RenderOptions, StreamDecoder, Threads};
+use serde::Serialize;
+
+use super::budget::Budget;
+use super::inputs::Item;
+use super::stop::Stop;
+use crate::args;
+use crate::codec::Codec;
+use crate::decode::{self, Wanted};
+use crate::encode;
+use crate::picture::StillImage;
+
+/// What is done to every file, on one thread each.
+#[derive(Debug)]
+pub(crate) enum Task {
+    Encode(Box<Encoder>),
+    /// `bounds` are the sides that a thumbnail fits into; `None` for the whole picture.
+    Decode {
+        extension: String,
+        bounds: Option<(u32, u32)>,
+    },
+}
+
+/// What is known about a result; `None` where it is unknown or does not apply.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(crate) struct Facts {
+    pub(crate) width: Option<u32>,
+    pub(crate) height: Option<u32>,
+    pub(crate) bytes: Option<u64>,
+    gaussians: Option<u32>,
+    psnr: Option<f64>,
+    quality: Option<f64>,
+    seconds: Option<f64>,
+    shortfall: Option<String>,
+}
+
+impl Task {
+    pub(crate) fn new(args: &args::Batch) -> Self {
+        if args.decode || args.thumbnail.is_some() {
+            return Self::Decode { extension: args.format.clone(), bounds: args.thumbnail };
+        }
+        Self::Encode(Box::new(args.encoder.encoder().with_threads(Threads::One)))
+    }
+
+    /// The extension of the results.
+    pub(crate) fn extension(&self) -> &str {
+        match self {
+            Self::Encode(_) => "gip",
+            Self::Decode { extension, .. } => extension,
+        }
+    }
+
+    /// Whether a file of a folder is one to work on, by its name.
+    pub(crate) fn takes(&self, path: &Path) -> bool {
+        match self {
+            Self::Encode(_) => {
+                ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled())
+            }
+            Self::Decode { .. } => {
+                path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gip"))
+            }
+        }
+    }
+
+    /// Makes the bytes of a result.
+    ///
+    /// # Errors
+    /// When the source cannot be read, and [`EncodeError::Cancelled`] when asked to stop.
+    pub(crate) fn perform(
+        &self,
+        item: &Item,
+        budget: &Budget,
+        stop: &Stop,
+    ) -> Result<(Vec<u8>, Facts)> {
+        match self {
+            Self::Encode(encoder) => encode(encoder, item, budget, stop),
+            Self::Decode { bounds, .. } => decode(*bounds, item, budget, stop),
+        }
+    }
+
+    /// Checks that an earlier result is whole, and returns what it tells about itself.
+    pub(crate) fn inspect(&self, output: &Path, budget: &Budget) -> Result<Facts> {
+        let (width, height, gaussians) = match self {
+            Self::Encode(_) => {
+                let mut stream = StreamDecoder::new();
+                stream.feed(&fs::read(output)?)?;
+                stream.finish()?;
+                let header = stream.header().context("no header")?;
+                (header.width, header.height, Some(header.gaussians))
+            }
+            Self::Decode { .. } => {
+                let (width, height) = StillImage::dimensions(output)?;
+                let _permit = budget.wait_for(pixels(width, height));
+                StillImage::read(output)?;
+                (width, height, None)
+            }
+        };
+        Ok(Facts {
+            width: Some(width),
+            height: Some(height),
+            bytes: Some(fs::metadata(output)?.len()),
+            gaussians,
+            ..Facts::default()
+        })
+    }
+}
+
+fn encode(
+    encoder: &Encoder,
+    item: &Item,
+    budget: &Budget,
+    stop: &Stop,
+) -> Result<(Vec<u8>, Facts)> {
+    let (width, height) = StillImage::dimensions(&item.source)?;
+    let _permit = budget.wait_for(pixels(width, height));
+    check(stop)?;
+    let start = Instant::now();
+    let mut picture = StillImage::read(&item.source)?;
+    let encoded = encode::encode(encoder.clone(), &mut picture, &mut |_| match check(stop) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(_) => ControlFlow::Break(()),
+    });
+    let encoded = encoded.with_context(|| item.source.display().to_string())?;
+    let facts = Facts {
+        width: Some(picture.image.width()),
+        height: Some(picture.image.height()),
+        bytes: Some(encoded.bytes.len() as u64),
+        gaussians: Some(encoded.report.gaussians),
+        psnr: Some(encode::json_psnr(encoded.report.psnr)),
+        quality: Some(encoded.report.quality),
+        seconds: Some(start.elapsed().as_secs_f64()),
+        shortfall: encoded.report.shortfall.map(|shortfall| shortfall.to_string()),
+    };
+    Ok((encoded.bytes, facts))
+}
+
+fn decode(
+    bounds: Option<(u32, u32)>,
+    item: &Item,
+    budget: &Budget,
+    stop: &Stop,
+) -> Result<(Vec<u8>, Facts)> {
+    let context = || item.source.display().to_string();
+    let codec = Codec::of(&item.output)?;
+    let file = BufReader::new(File::open(&item.source).with_context(context)?);
+    let mut decoder = Decoder::new(file).with_context(context)?;
+    let metadata = decoder.metadata().clone();
+    let mut options = RenderOptions::new().with_threads(Threads::One);
+    let size =
+        bounds.map(|bounds| fitted(decoder.header(), decode::orientation(&metadata), bounds));
+    if let Some((width, height)) = size {
+        options = options.with_size(width, height);
+    }
+    let wanted = Wanted::new(options, codec, decoder.header()).with_context(context)?;
+    let _permit = budget.wait_for(wanted.pixels());
+    check(stop)?;
+    let start = Instant::now();
+    let image = match size {
+        None => wanted.decode(&mut decoder),
+        Some(size) => thumbnail(&wanted, &mut decoder, size),
+    };
+    let gaussians = match size {
+        None => decoder.header().gaussians,
+        Some(_) => decoder.stream().gaussians().len() as u32,
+    };
+    let picture = decode::upright(StillImage { image: image.with_context(context)?, metadata });
+    let bytes = codec.encode(&picture).with_context(context)?;
+    let facts = Facts {
+        width: Some(picture.image.width()),
+        height: Some(picture.image.height()),
+        bytes: Some(bytes.len() as u64),
+        gaussians: Some(gaussians),
+        seconds: Some(start.elapsed().as_secs_f64()),
+        ..Facts::default()
+    };
+    Ok((bytes, facts))
+}
+
+/// Reads and renders as many Gaussians as a thumbnail of this size needs.
+fn thumbnail(
+    wanted: &Wanted,
+    decoder: &mut Decoder<BufReader<File>>,
+    (width, height): (u32, u32),
+) -> Result<image::DynamicImage> {
+    decoder.set_options(wanted.options.clone());
+    decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
+    wanted.render(&decoder.picture()?)
+}
+
+/// The size, before it is turned upright, of a thumbnail that fits into these sides.
+fn fitted(header: &Header, orientation: Orientation, bounds: (u32, u32)) -> (u32, u32) {
+    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    let (across, down) = match orientation {
+        Rotate90 | Rotate90FlipH | Rotate270 | Rotate270FlipH => (bounds.1, bounds.0),
+        _ => bounds,
+    };
+    let (width, height) = (f64::from(header.width), f64::from(header.height));
+    let scale = (f64::from(across) / width).min(f64::from(down) / height).min(1.0);
+    let side = |side: f64| (side * scale).round().max(1.0) as u32;
+    (side(width), side(height))
+}
+
+fn pixels(width: u32, height: u32) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// # Errors
+/// When asked to stop.
+fn check(stop: &Stop) -> Result<(), EncodeError> {
+    if stop.is_asked_for() { Err(EncodeError::Cancelled) } else { Ok(()) }
+}
