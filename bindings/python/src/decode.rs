@@ -1,6 +1,7 @@
 //! `decode`, `gaussians` and `info`.
 
 use image_gip::{Decoder, StreamDecoder};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors::decode_error;
@@ -69,6 +70,9 @@ pub(crate) fn decode<'py>(
     decoder.output_len().map_err(failed)?;
     let channels = options.output_color(decoder.header()).map_err(failed)?.channels();
     let mut output = Output::new(py, decoder.header(), &options, &Wanted { dtype, out })?;
+    if output.overlaps(bytes) {
+        return Err(PyValueError::new_err("out overlaps src"));
+    }
     let samples = output.samples()?;
     py.detach(|| {
         threads::decoding(threads, |threads| {

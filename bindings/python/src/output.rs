@@ -66,6 +66,17 @@ impl<'py> Output<'py> {
         }
     }
 
+    /// Whether the array shares memory with these bytes.
+    pub(crate) fn overlaps(&self, bytes: &[u8]) -> bool {
+        let (start, length) = match self {
+            Self::U8(array) => (array.data().addr(), array.len()),
+            Self::U16(array) => (array.data().addr(), 2 * array.len()),
+            Self::F32(array) => (array.data().addr(), 4 * array.len()),
+        };
+        let first = bytes.as_ptr().addr();
+        start < first + bytes.len() && first < start + length
+    }
+
     pub(crate) fn samples(&mut self) -> PyResult<Samples<'_>> {
         Ok(match self {
             Self::U8(array) => Samples::U8(array.as_slice_mut()?),
@@ -170,7 +181,7 @@ fn array<'py, T: Element>(
     }
     typed.try_readwrite().map_err(|error| match error {
         BorrowError::NotWriteable => PyValueError::new_err("out is read-only"),
-        _ => PyValueError::new_err("out is in use by another call, or overlaps src"),
+        _ => PyValueError::new_err("out is in use by another call"),
     })
 }
 

@@ -1,6 +1,8 @@
 //! Pools of threads that live as long as a call. The global pool of `rayon` is never used: its threads
 //! do not exist in the child of a `fork`, and a child that waits for them hangs.
 
+use std::thread;
+
 use image_gip::Threads;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -21,11 +23,23 @@ pub(crate) fn checked(threads: i64) -> PyResult<usize> {
 
 /// Calls `work` with a pool of so many threads, which have ended when this returns.
 pub(crate) fn with_pool<R>(threads: usize, work: impl FnOnce(&ThreadPool) -> R) -> PyResult<R> {
-    ThreadPoolBuilder::new()
+    let mut handles = Vec::with_capacity(threads);
+    let pool = ThreadPoolBuilder::new()
         .num_threads(threads)
-        .thread_name(|index| format!("image_gip {index}"))
-        .build_scoped(|thread| thread.run(), work)
-        .map_err(|error| PyRuntimeError::new_err(format!("no thread could be started: {error}")))
+        .spawn_handler(|thread| {
+            let name = format!("image_gip {}", thread.index());
+            handles.push(thread::Builder::new().name(name).spawn(|| thread.run())?);
+            Ok(())
+        })
+        .build()
+        .map_err(|error| PyRuntimeError::new_err(format!("no thread could be started: {error}")))?;
+    let result = work(&pool);
+    drop(pool);
+    for handle in handles {
+        // They have no result; a panic in the work has reached this thread already.
+        let _ = handle.join();
+    }
+    Ok(result)
 }
 
 /// Does the work of a decoder: on the caller's thread, or on a pool of several.

@@ -1,17 +1,22 @@
 from collections.abc import Callable
 from os import PathLike
-from typing import Any, Literal, Protocol, Self, TypeAlias, final
+from typing import Any, Literal, Protocol, Self, SupportsIndex, TypeAlias, final
 
 from numpy.typing import DTypeLike, NDArray
 from typing_extensions import Buffer
 
 from image_gip._types import Info, Limits, Progress
 
-class _Readable(Protocol):
-    def read(self, size: int = ..., /) -> Buffer: ...
-
+_Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
+_Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
 _Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
-_Source: TypeAlias = Buffer | str | PathLike[str] | _Readable
+# NumPy declares its arrays as buffers from Python 3.12 on only.
+_Buffer: TypeAlias = Buffer | NDArray[Any]
+
+class _Readable(Protocol):
+    def read(self, size: int = ..., /) -> _Buffer: ...
+
+_Source: TypeAlias = _Buffer | str | PathLike[str] | _Readable
 
 __all__ = [
     "StreamDecoder",
@@ -28,9 +33,9 @@ __version__: str
 def decode(
     src: _Source,
     *,
-    size: tuple[int, int] | None = None,
+    size: _Size | None = None,
     scale: float | None = None,
-    region: tuple[int, int, int, int] | None = None,
+    region: _Region | None = None,
     mode: _Mode | None = None,
     dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
@@ -49,9 +54,9 @@ def encode(
     tune: Literal["visual", "psnr"] = "visual",
     threads: int = 1,
     seed: int = 0,
-    icc: Buffer | None = None,
-    exif: Buffer | None = None,
-    xmp: Buffer | None = None,
+    icc: _Buffer | None = None,
+    exif: _Buffer | None = None,
+    xmp: _Buffer | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
 def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
@@ -61,14 +66,14 @@ def read_header(file: _Readable, *, limits: Limits | None = None) -> Info: ...
 @final
 class StreamDecoder:
     def __new__(cls, *, limits: Limits | None = None) -> Self: ...
-    def feed(self, data: Buffer) -> Self: ...
+    def feed(self, data: _Buffer) -> Self: ...
     def finish(self) -> None: ...
     def image(
         self,
         *,
-        size: tuple[int, int] | None = None,
+        size: _Size | None = None,
         scale: float | None = None,
-        region: tuple[int, int, int, int] | None = None,
+        region: _Region | None = None,
         mode: _Mode | None = None,
         dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,

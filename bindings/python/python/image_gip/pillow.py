@@ -27,7 +27,6 @@ _SIGNATURE = b"\xc7GIP\r\n\x1a\n"
 _LIMITS = Limits(max_width=2**32 - 1, max_height=2**32 - 1, max_pixels=2**64 - 1)
 #: Bytes of a file that are read at once for a draft.
 _PIECE = 1024
-_MODES = ("L", "LA", "RGB", "RGBA")
 #: What `save` passes on to the encoder.
 _OPTIONS = (
     "bpp",
@@ -87,6 +86,22 @@ class GipImageFile(ImageFile.ImageFile):
         self._set_size(drafted, is_draft=scale < 1.0)
         return self.mode, (0, 0, *drafted)
 
+    def thumbnail(
+        self,
+        size: tuple[float, float],
+        resample: Image.Resampling = Image.Resampling.BICUBIC,
+        reducing_gap: float | None = 1.0,
+    ) -> None:
+        """Makes a thumbnail of the picture, in place, as ``Image.thumbnail`` does.
+
+        With the ``reducing_gap`` of 1.0, it is rendered at the size that it shall have, and hardly
+        resampled. With 2.0 or 3.0, it is rendered that much larger from more layers of the file,
+        which takes longer and shows more detail; with ``None``, the whole picture is resampled.
+        """
+        super().thumbnail(size, resample, reducing_gap)
+        # The file may be closed soon.
+        self.load()
+
     def verify(self) -> None:
         """Checks the whole file.
 
@@ -143,18 +158,17 @@ def _accept(prefix: bytes) -> bool:
 
 def _storable(image: Image.Image) -> Image.Image:
     """The picture in a mode that a file can have, if no colour changes by that."""
-    if image.mode in _MODES and "transparency" not in image.info:
-        return image
-    if image.mode == "1":
-        return image.convert("L")
-    if image.mode in {"L", "RGB"}:
-        return image.convert("LA" if image.mode == "L" else "RGBA")
-    if image.mode in {"P", "PA", "RGBX"}:
-        return image.convert("RGBA" if image.has_transparency_data else "RGB")
-    hint = ""
-    if image.mode.startswith("I;16"):
-        hint = "; image_gip.encode takes 16-bit pictures as NumPy arrays"
-    raise OSError(f"cannot write mode {image.mode} as {_FORMAT}: convert it to {_MODES}{hint}")
+    has_alpha = image.has_transparency_data
+    if image.mode in {"1", "L", "LA"}:
+        mode = "LA" if has_alpha else "L"
+    elif image.mode in {"P", "PA", "RGB", "RGBA", "RGBX"}:
+        mode = "RGBA" if has_alpha else "RGB"
+    else:
+        hint = "convert it to L, LA, RGB or RGBA"
+        if image.mode.startswith("I;16"):
+            hint += ", or pass its NumPy array to image_gip.encode, which keeps 16 bits"
+        raise OSError(f"cannot write mode {image.mode} as {_FORMAT}; {hint}")
+    return image if image.mode == mode else image.convert(mode)
 
 
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
