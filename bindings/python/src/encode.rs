@@ -112,14 +112,14 @@ fn target(
     psnr: Option<f64>,
     gaussians: Option<i64>,
 ) -> PyResult<Target> {
-    // The encoder refuses what is out of range: 0 for numbers under it.
-    let count = |gaussians: i64| u32::try_from(gaussians.max(0)).unwrap_or(u32::MAX);
+    // The encoder refuses what is out of range.
+    let at_most = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
     let targets = [
         bpp.map(Target::BitsPerPixel),
-        bytes.map(|bytes| Target::Bytes(bytes.max(0) as u64)),
+        natural("bytes", bytes)?.map(Target::Bytes),
         quality.map(Target::Quality),
         psnr.map(Target::Psnr),
-        gaussians.map(|gaussians| Target::Gaussians(count(gaussians))),
+        natural("gaussians", gaussians)?.map(|count| Target::Gaussians(at_most(count))),
     ];
     let mut given = targets.into_iter().flatten();
     let target = given.next().unwrap_or_default();
@@ -129,6 +129,15 @@ fn target(
         ));
     }
     Ok(target)
+}
+
+/// A number that is not negative.
+fn natural(name: &str, value: Option<i64>) -> PyResult<Option<u64>> {
+    let checked = |value| {
+        u64::try_from(value)
+            .map_err(|_| PyValueError::new_err(format!("{name} {value}; it must be at least 1")))
+    };
+    value.map(checked).transpose()
 }
 
 fn tuning(tune: &str) -> PyResult<Tune> {

@@ -53,6 +53,6 @@ pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
 /// Warns that a file has less than its target asks for.
 pub(crate) fn warn_of_shortfall(py: Python<'_>, what: &str) -> PyResult<()> {
     let class = py.import("image_gip._errors")?.getattr("ShortfallWarning")?;
-    py.import("warnings")?.call_method1("warn", (what, class, 2))?;
+    py.import("warnings")?.call_method1("warn", (what, class, 1))?;
     Ok(())
 }

@@ -110,7 +110,8 @@ def test_options_that_are_refused(photo: Picture) -> None:
         ({"effort": 0}, ValueError, "effort 0; it must be 1 to 9"),
         ({"effort": 1000}, ValueError, "effort 1000; it must be 1 to 9"),
         ({"bpp": 0.0}, ValueError, "bits per pixel 0; it must be"),
-        ({"bytes": -5}, ValueError, "size in bytes 0; it must be 1 to"),
+        ({"bytes": -5}, ValueError, "bytes -5; it must be at least 1"),
+        ({"bytes": 0}, ValueError, "size in bytes 0; it must be 1 to"),
         ({"bytes": 20}, ValueError, "this picture takes at least"),
         ({"gaussians": 1 << 40}, ValueError, "it must be 1 to 4194304"),
         ({"quality": float("nan")}, ValueError, "quality NaN; it must be 0 to 100"),
@@ -133,8 +134,9 @@ def test_targets(photo: Picture) -> None:
 
 
 def test_a_target_out_of_reach(photo: Picture) -> None:
-    with pytest.warns(image_gip.ShortfallWarning, match="dB is what this effort"):
+    with pytest.warns(image_gip.ShortfallWarning, match="dB is what this effort") as warnings:
         file = image_gip.encode(photo[:16, :16].copy(), psnr=120, effort=1)
+    assert [warning.filename for warning in warnings] == [__file__]
     assert image_gip.decode(file).shape == (16, 16, 3)
 
 
