@@ -376,6 +376,26 @@ fn layers_are_read_until_there_are_enough_gaussians() {
     assert_eq!(sizes.map(|(width, height)| header.gaussians_for(width, height)), [1, 2, 8]);
 }
 
+#[test]
+fn layers_are_counted_as_they_arrive() {
+    let packed = sample().bytes();
+    assert_eq!(decode_valid(&packed).layers(), [3, 1, 4]);
+    let coded = of_chunks(&layered::chunks());
+    assert_eq!(decode_valid(&coded).layers(), [layered::IN_A_LAYER as u32; layered::LAYERS]);
+    for bytes in [packed, coded] {
+        let mut decoder = StreamDecoder::new();
+        for byte in bytes.chunks(1) {
+            let before = decoder.layers().len();
+            decoder.feed(byte).expect("it is sound");
+            let layers = decoder.layers();
+            // Gaussians of an incomplete layer of the packed coding are there already.
+            let counted = layers.iter().sum::<u32>() as usize;
+            assert!(layers.len() <= before + 1 && counted <= decoder.gaussians().len());
+        }
+        assert_eq!(decoder.layers().iter().sum::<u32>() as usize, decoder.gaussians().len());
+    }
+}
+
 /// A file of two entropy-coded layers that both are damaged: the first lacks its last word, the second
 /// has a wrong CRC.
 fn damaged_twice() -> Vec<u8> {

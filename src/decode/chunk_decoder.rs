@@ -40,8 +40,8 @@ pub(super) struct ChunkDecoder {
     pub(super) gaussians: Vec<Gaussian>,
     /// The bits of entropy-coded Gaussians, if they are to be counted.
     pub(super) statistics: Option<AttributeBits>,
-    /// The number of layers that have arrived.
-    layers: u16,
+    /// The number of Gaussians in each layer that has arrived.
+    pub(super) layers: Vec<u32>,
 }
 
 /// What becomes of the bytes of the current chunk.
@@ -99,7 +99,7 @@ impl ChunkDecoder {
     #[cfg(feature = "std")]
     pub(super) fn has_reached_layers(&self, current: Option<ChunkType>) -> bool {
         matches!(self.stage, Stage::Layer(..) | Stage::Complete)
-            || self.layers > 0
+            || !self.layers.is_empty()
             || current == Some(ChunkType::GAUS)
     }
 
@@ -111,7 +111,8 @@ impl ChunkDecoder {
     /// The memory that is held, in bytes.
     pub(super) fn memory(&self) -> u64 {
         let gaussians = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
-        self.preamble_memory() + self.pending.memory() + gaussians
+        let layers = self.layers.capacity() as u64 * size_of::<u32>() as u64;
+        self.preamble_memory() + self.pending.memory() + gaussians + layers
     }
 
     /// The memory of what stands before the layers, in bytes: metadata and bounds.
@@ -124,8 +125,12 @@ impl ChunkDecoder {
     pub(super) fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
         self.limits.check_size(header.width, header.height)?;
         self.limits.check_gaussians(header.gaussians)?;
-        let gaussians = peak_memory::<Gaussian>(header.gaussians);
-        self.limits.check_memory(self.preamble_memory() + gaussians)
+        self.limits.check_memory(self.preamble_memory() + Self::memory_of_layers(header))
+    }
+
+    /// The most memory of what the layers of a picture become, in bytes.
+    fn memory_of_layers(header: &Header) -> u64 {
+        peak_memory::<Gaussian>(header.gaussians) + peak_memory::<u32>(header.layers.into())
     }
 
     /// Begins a chunk with a payload of `length` bytes.
@@ -154,7 +159,7 @@ impl ChunkDecoder {
                 malformed("is too long")
             }
             ChunkType::GAUS if !self.has_quantizers() => malformed("stands before QNTZ"),
-            ChunkType::GAUS if Some(self.layers) == self.header.as_ref().map(|h| h.layers) => {
+            ChunkType::GAUS if self.layers.len() == self.declared_layers() => {
                 malformed("more layers than the header declares")
             }
             ChunkType::GAUS if self.lattice.is_some() => self.collect_within_limits(length),
@@ -162,12 +167,12 @@ impl ChunkDecoder {
                 Ok(Stage::Layer(PackedLayerReader::new(length), self.gaussians.len()))
             }
             ChunkType::GEND if length != 0 => malformed("is not empty"),
-            ChunkType::BNDS if self.layers == 0 && self.bounds.is_some() => {
+            ChunkType::BNDS if self.layers.is_empty() && self.bounds.is_some() => {
                 malformed("appears twice")
             }
             // After the first layer, these have no meaning in version 1.
-            ChunkType::BNDS if self.layers == 0 => self.collect_within_limits(length),
-            _ if Metadata::includes(chunk) && self.layers == 0 => {
+            ChunkType::BNDS if self.layers.is_empty() => self.collect_within_limits(length),
+            _ if Metadata::includes(chunk) && self.layers.is_empty() => {
                 self.collect_within_limits(length)
             }
             ChunkType::GHDR | ChunkType::QNTZ => Ok(Stage::collect(length)),
@@ -184,8 +189,8 @@ impl ChunkDecoder {
 
     /// Collects a payload, if there is memory for it and for all Gaussians.
     fn collect_within_limits(&self, length: u32) -> Result<Stage, DecodeError> {
-        let gaussians = self.header.as_ref().map_or(0, |header| header.gaussians);
-        let declared = peak_memory::<Gaussian>(gaussians) + peak_memory::<u8>(length);
+        let layers = self.header.as_ref().map_or(0, Self::memory_of_layers);
+        let declared = layers + peak_memory::<u8>(length);
         self.limits.check_memory(self.preamble_memory() + self.pending.memory() + declared)?;
         Ok(Stage::collect(length))
     }
@@ -238,10 +243,10 @@ impl ChunkDecoder {
                 let payload = core::mem::take(payload);
                 let declared = self.header.as_ref().map_or(0, |header| header.gaussians);
                 let allowed = declared - self.arrived() as u32;
-                let number = usize::from(self.layers);
+                let number = self.layers.len();
                 let bounds = self.bounds.as_ref().and_then(|bounds| bounds.get(number).copied());
-                self.pending.push(payload, bounds, allowed)?;
-                self.layers += 1;
+                let count = self.pending.push(payload, bounds, allowed)?;
+                self.count_layer(count);
             }
             (ChunkType::BNDS, Stage::Collect { payload, .. }) => {
                 let Some(header) = &self.header else { return Ok(()) };
@@ -251,13 +256,14 @@ impl ChunkDecoder {
                 let payload = core::mem::take(payload);
                 self.metadata.insert(chunk, payload)?;
             }
-            (_, Stage::Layer(layer, _)) => {
+            (_, Stage::Layer(layer, before)) => {
                 layer.finish()?;
-                self.layers += 1;
+                let count = self.gaussians.len() - *before;
+                self.count_layer(count);
             }
             (ChunkType::GEND, _) => {
-                let declared = self.header.as_ref().map(|h| (h.layers, h.gaussians as usize));
-                if declared != Some((self.layers, self.arrived())) {
+                let declared = self.header.as_ref().map_or(0, |header| header.gaussians as usize);
+                if (self.layers.len(), self.arrived()) != (self.declared_layers(), declared) {
                     let reason = "fewer layers or Gaussians than the header declares";
                     return Err(DecodeError::malformed(chunk, reason));
                 }
@@ -268,6 +274,18 @@ impl ChunkDecoder {
         }
         self.stage = Stage::Idle;
         Ok(())
+    }
+
+    /// The number of layers that the header declares.
+    fn declared_layers(&self) -> usize {
+        self.header.as_ref().map_or(0, |header| header.layers.into())
+    }
+
+    /// Notes that a layer with `count` Gaussians has arrived.
+    fn count_layer(&mut self, count: usize) {
+        let declared = self.declared_layers();
+        reserve(&mut self.layers, 1, declared);
+        self.layers.push(count as u32);
     }
 
     /// Decodes the pending layers up to the first that is malformed.

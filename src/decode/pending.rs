@@ -53,18 +53,18 @@ impl PendingLayer {
 }
 
 impl PendingLayers {
-    /// Adds a layer, which must have 1 to `allowed` Gaussians.
+    /// Adds a layer, which must have 1 to `allowed` Gaussians. Returns their number.
     pub(crate) fn push(
         &mut self,
         payload: Vec<u8>,
         bounds: Option<LayerBounds>,
         allowed: u32,
-    ) -> Result<(), DecodeError> {
+    ) -> Result<usize, DecodeError> {
         let (count, _) = LayerCoder::read_count(&payload, allowed)?;
         self.count += count;
         self.memory += payload.len() as u64 + BYTES_PER_LAYER;
         self.layers.push(PendingLayer { count, payload, bounds });
-        Ok(())
+        Ok(count)
     }
 
     /// The number of Gaussians in all layers.

@@ -226,6 +226,12 @@ impl StreamDecoder {
         &self.chunks.gaussians
     }
 
+    /// The number of Gaussians in each layer that has arrived, in file order.
+    #[must_use]
+    pub fn layers(&self) -> &[u32] {
+        &self.chunks.layers
+    }
+
     /// The chunks that are complete: for each type their number and size, in the order in which the
     /// types have appeared. At most 64 types are listed.
     #[must_use]

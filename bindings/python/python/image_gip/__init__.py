@@ -1,0 +1,49 @@
+"""Decodes and encodes ``.gip``: pictures stored as two-dimensional Gaussians.
+
+``decode`` gives a NumPy array, at any size, of the whole picture or a part of it; ``encode`` makes
+a file of one. With ``image_gip.register()``, Pillow opens and saves ``.gip``.
+"""
+
+from image_gip._errors import (
+    CancelledError,
+    GipError,
+    LimitError,
+    MalformedError,
+    ShortfallWarning,
+    SignatureError,
+    UnexpectedEndError,
+    UnsupportedError,
+)
+from image_gip._native import StreamDecoder, __version__, decode, encode, gaussians, info
+from image_gip._types import Chunk, Info, Limits, Progress
+
+__all__ = [
+    "CancelledError",
+    "Chunk",
+    "GipError",
+    "Info",
+    "LimitError",
+    "Limits",
+    "MalformedError",
+    "Progress",
+    "ShortfallWarning",
+    "SignatureError",
+    "StreamDecoder",
+    "UnexpectedEndError",
+    "UnsupportedError",
+    "__version__",
+    "decode",
+    "encode",
+    "gaussians",
+    "info",
+    "register",
+]
+
+
+def register() -> None:
+    """Makes Pillow open and save ``.gip``, as ``import image_gip.pillow`` does.
+
+    Raises:
+        ImportError: Pillow is not installed.
+    """
+    import image_gip.pillow  # noqa: F401

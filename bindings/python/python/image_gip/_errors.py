@@ -1,0 +1,47 @@
+"""The exceptions of the module."""
+
+
+class GipError(Exception):
+    """Why a file was not decoded, or a picture not encoded. Its subclasses are the kinds of error.
+
+    Wrong arguments are no ``GipError``: they raise ``TypeError`` or ``ValueError``.
+    """
+
+    #: The four letters of the chunk in which a file breaks a rule or ends; ``None`` elsewhere.
+    chunk: str | None = None
+
+
+class SignatureError(GipError):
+    """The bytes are not those of a ``.gip`` file."""
+
+
+class MalformedError(GipError):
+    """The file breaks a rule of the format."""
+
+
+class UnsupportedError(GipError):
+    """The file may be valid, but requires something that this version does not have."""
+
+
+class UnexpectedEndError(GipError):
+    """The file ends too early."""
+
+
+class LimitError(GipError):
+    """The file or the request requires more than one of the :class:`Limits` allows."""
+
+    #: What is limited: ``"width"``, ``"height"``, ``"pixels"``, ``"Gaussians"``,
+    #: ``"bytes of memory"`` or ``"kernel evaluations"``.
+    limit: str = ""
+    #: What the file or the request requires, or more.
+    wanted: int = 0
+    #: What is allowed.
+    allowed: int = 0
+
+
+class CancelledError(GipError):
+    """The callback of an encoding returned ``False``."""
+
+
+class ShortfallWarning(UserWarning):
+    """The file has a lower PSNR or quality than asked for: it is out of reach at this effort."""

@@ -1,0 +1,90 @@
+from collections.abc import Callable
+from os import PathLike
+from typing import Any, Literal, Protocol, Self, SupportsIndex, TypeAlias, final
+
+from numpy.typing import DTypeLike, NDArray
+from typing_extensions import Buffer
+
+from image_gip._types import Info, Limits, Progress
+
+_Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
+_Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
+_Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
+# NumPy declares its arrays as buffers from Python 3.12 on only.
+_Buffer: TypeAlias = Buffer | NDArray[Any]
+
+class _Readable(Protocol):
+    def read(self, size: int = ..., /) -> _Buffer: ...
+
+_Source: TypeAlias = _Buffer | str | PathLike[str] | _Readable
+
+__all__ = [
+    "StreamDecoder",
+    "__version__",
+    "decode",
+    "encode",
+    "gaussians",
+    "info",
+    "read_header",
+]
+
+__version__: str
+
+def decode(
+    src: _Source,
+    *,
+    size: _Size | None = None,
+    scale: float | None = None,
+    region: _Region | None = None,
+    mode: _Mode | None = None,
+    dtype: DTypeLike | None = None,
+    out: NDArray[Any] | None = None,
+    threads: int = 1,
+    limits: Limits | None = None,
+) -> NDArray[Any]: ...
+def encode(
+    array: NDArray[Any],
+    *,
+    bpp: float | None = None,
+    bytes: int | None = None,
+    quality: float | None = None,
+    psnr: float | None = None,
+    gaussians: int | None = None,
+    effort: int = 5,
+    tune: Literal["visual", "psnr"] = "visual",
+    threads: int = 1,
+    seed: int = 0,
+    icc: _Buffer | None = None,
+    exif: _Buffer | None = None,
+    xmp: _Buffer | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> bytes: ...
+def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
+def info(src: _Source, *, limits: Limits | None = None) -> Info: ...
+def read_header(file: _Readable, *, limits: Limits | None = None) -> Info: ...
+
+@final
+class StreamDecoder:
+    def __new__(cls, *, limits: Limits | None = None) -> Self: ...
+    def feed(self, data: _Buffer) -> Self: ...
+    def finish(self) -> None: ...
+    def image(
+        self,
+        *,
+        size: _Size | None = None,
+        scale: float | None = None,
+        region: _Region | None = None,
+        mode: _Mode | None = None,
+        dtype: DTypeLike | None = None,
+        out: NDArray[Any] | None = None,
+        prefix: int | None = None,
+        threads: int = 1,
+    ) -> NDArray[Any]: ...
+    def gaussians(self) -> NDArray[Any]: ...
+    def gaussians_for(self, width: int, height: int) -> int: ...
+    @property
+    def arrived(self) -> int: ...
+    @property
+    def is_complete(self) -> bool: ...
+    @property
+    def info(self) -> Info | None: ...

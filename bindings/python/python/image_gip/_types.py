@@ -1,0 +1,110 @@
+"""What functions of the module take and return besides arrays."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Limits:
+    """What decoding a file may cost at most.
+
+    The defaults accept every ordinary picture, and bound what a hostile file costs to a few seconds
+    and a few hundred megabytes.
+    """
+
+    #: Largest width in pixels, of the file and of what is rendered.
+    max_width: int = 1 << 16
+    #: Largest height in pixels, of the file and of what is rendered.
+    max_height: int = 1 << 16
+    #: Most pixels, of the file and of what is rendered.
+    max_pixels: int = 1 << 28
+    #: Most Gaussians.
+    max_gaussians: int = 1 << 22
+    #: Most bytes that the decoder holds; the output array does not count.
+    max_memory: int = 512 << 20
+    #: Most evaluations of the kernel in one rendering.
+    max_work: int = 1 << 32
+
+    @classmethod
+    def none(cls) -> "Limits":
+        """No limits but those of the format. For trusted files only."""
+        return cls(
+            max_width=2**32 - 1,
+            max_height=2**32 - 1,
+            max_pixels=2**64 - 1,
+            max_gaussians=2**32 - 1,
+            max_memory=2**64 - 1,
+            max_work=2**64 - 1,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """The chunks of one type in a file."""
+
+    #: The type: four letters.
+    kind: str
+    #: The number of chunks.
+    count: int
+    #: The bytes of all these chunks, with length, type and checksum.
+    bytes: int
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Info:
+    """What a file says of its picture."""
+
+    #: Width in pixels.
+    width: int
+    #: Height in pixels.
+    height: int
+    #: The channels, as Pillow names them. Colours are sRGB unless there is an ICC profile; alpha is
+    #: straight.
+    mode: Literal["L", "LA", "RGB", "RGBA"]
+    #: Bits per sample of the picture that was encoded: 8 or 16.
+    depth: int
+    #: Number of Gaussians, as the header declares it.
+    gaussians: int
+    #: Number of Gaussians in each layer that was read, in the order of the file.
+    layers: tuple[int, ...]
+    #: Version of the format.
+    version: int
+    #: How the Gaussians are stored: ``"entropy"`` or ``"packed"``.
+    coding: str
+    #: The kernel: ``"quartic"`` or ``"exponential"``.
+    kernel: str
+    #: The largest squared Mahalanobis distance with a weight over 0.
+    cutoff: float
+    #: What is stored of a shape: ``"cholesky"``, ``"covariance"`` or ``"rotation-scale"``.
+    parameterization: str
+    #: The colour that the Gaussians are added to, in 1/65535, one number per channel.
+    base_color: tuple[int, ...]
+    #: The chunks that were read, by type, in the order in which the types appear.
+    chunks: tuple[Chunk, ...]
+    #: The ICC profile.
+    icc: bytes | None
+    #: Exif data: a TIFF stream, which begins with ``II`` or ``MM``.
+    exif: bytes | None
+    #: An XMP packet: XML in UTF-8.
+    xmp: bytes | None
+    #: Keywords and their texts.
+    texts: tuple[tuple[str, str], ...]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.width, self.height
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far an encoding has come."""
+
+    #: Iterations of training done so far.
+    iteration: int
+    #: Iterations planned in total. The number grows when the target needs more than planned.
+    iterations: int
+    #: Present number of Gaussians.
+    gaussians: int
+    #: PSNR in dB of the present Gaussians.
+    psnr: float

@@ -1,0 +1,195 @@
+"""Makes Pillow open and save ``.gip``: importing this module is all that it takes.
+
+``Image.open`` reads the header; the picture is rendered when it is needed. ``thumbnail`` and
+``draft`` render it at the size that is wanted, from the first layers of the file, which costs a
+fraction.
+
+Modes are L, LA, RGB and RGBA with 8 bits per sample, as Pillow has no 16-bit colour: a file of 16
+bits is rendered with 8. ``image_gip.decode`` gives all 16 as a NumPy array, and
+``image_gip.encode`` takes them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import IO, Any, cast
+
+import numpy as np
+from PIL import Image, ImageFile
+
+from image_gip._errors import GipError, SignatureError
+from image_gip._native import StreamDecoder, encode, info, read_header
+from image_gip._types import Limits
+
+_FORMAT = "GIP"
+_SIGNATURE = b"\xc7GIP\r\n\x1a\n"
+#: Pillow has limits of its own for the size of a picture.
+_LIMITS = Limits(max_width=2**32 - 1, max_height=2**32 - 1, max_pixels=2**64 - 1)
+#: Bytes of a file that are read at once for a draft.
+_PIECE = 1024
+#: What `save` passes on to the encoder.
+_OPTIONS = (
+    "bpp",
+    "bytes",
+    "effort",
+    "gaussians",
+    "progress",
+    "psnr",
+    "quality",
+    "seed",
+    "threads",
+    "tune",
+)
+
+
+class GipImageFile(ImageFile.ImageFile):
+    """A ``.gip`` file that Pillow has opened."""
+
+    format = _FORMAT
+    format_description = "Picture of 2D Gaussians"
+
+    def _open(self) -> None:
+        assert self.fp is not None
+        try:
+            header = read_header(self.fp, limits=_LIMITS)
+        except SignatureError as error:
+            raise SyntaxError(str(error)) from error
+        except GipError as error:
+            raise OSError(str(error)) from error
+        self._stored_size = header.size
+        self._mode = header.mode
+        if header.icc is not None:
+            self.info["icc_profile"] = header.icc
+        if header.exif is not None:
+            self.info["exif"] = b"Exif\0\0" + header.exif
+        if header.xmp is not None:
+            self.info["xmp"] = header.xmp
+        self._set_size(header.size, is_draft=False)
+
+    def _set_size(self, size: tuple[int, int], *, is_draft: bool) -> None:
+        self._size = size
+        self.tile = [ImageFile._Tile("gip", (0, 0, *size), 0, (is_draft,))]
+
+    def draft(
+        self, mode: str | None, size: tuple[int, int] | None
+    ) -> tuple[str, tuple[int, int, float, float]] | None:
+        """Lets the picture be rendered at about ``size``, not smaller, in the aspect that it has.
+
+        The fewer pixels are wanted, the fewer layers of the file are read. Has no effect once the
+        picture is loaded. ``mode`` is ignored.
+        """
+        if size is None or not self.tile:
+            return None
+        width, height = self._stored_size
+        scale = min(max(size[0] / width, size[1] / height), 1.0)
+        drafted = (max(math.ceil(width * scale), 1), max(math.ceil(height * scale), 1))
+        self._set_size(drafted, is_draft=scale < 1.0)
+        return self.mode, (0, 0, *drafted)
+
+    def thumbnail(
+        self,
+        size: tuple[float, float],
+        resample: Image.Resampling = Image.Resampling.BICUBIC,
+        reducing_gap: float | None = 1.0,
+    ) -> None:
+        """Makes a thumbnail of the picture, in place, as ``Image.thumbnail`` does.
+
+        With the ``reducing_gap`` of 1.0, it is rendered at the size that it shall have, and hardly
+        resampled. With 2.0 or 3.0, it is rendered that much larger from more layers of the file,
+        which takes longer and shows more detail; with ``None``, the whole picture is resampled.
+        """
+        super().thumbnail(size, resample, reducing_gap)
+        # The file may be closed soon.
+        self.load()
+
+    def verify(self) -> None:
+        """Checks the whole file.
+
+        Raises:
+            OSError: The file is damaged.
+        """
+        if self.fp is not None:
+            self.fp.seek(0)
+            try:
+                info(self.fp, limits=_LIMITS)
+            except GipError as error:
+                raise OSError(str(error)) from error
+        super().verify()
+
+
+class _Decoder(ImageFile.PyDecoder):
+    """Renders a picture at the size of its tile."""
+
+    _pulls_fd = True
+
+    def decode(self, buffer: Any) -> tuple[int, int]:
+        assert self.fd is not None
+        assert self.im is not None
+        (is_draft,) = self.args
+        stream = StreamDecoder(limits=_LIMITS)
+        try:
+            self._read(self.fd, stream, self.im.size if is_draft else None)
+            samples = stream.image(size=self.im.size, mode=cast("Any", self.mode), dtype=np.uint8)
+        except GipError as error:
+            raise OSError(str(error)) from error
+        # It takes any buffer, without copying it.
+        self.set_as_raw(cast("bytes", samples))
+        return -1, 0
+
+    def _read(self, file: IO[bytes], stream: StreamDecoder, draft: tuple[int, int] | None) -> None:
+        """Feeds the file, or as much of it as a draft of that size needs."""
+        try:
+            if draft is None:
+                stream.feed(file.read())
+            else:
+                for piece in iter(lambda: file.read(_PIECE), b""):
+                    arrived = stream.feed(piece).arrived
+                    if arrived > 0 and arrived >= stream.gaussians_for(*draft):
+                        return
+            stream.finish()
+        except GipError:
+            if not ImageFile.LOAD_TRUNCATED_IMAGES or stream.info is None:
+                raise
+
+
+def _accept(prefix: bytes) -> bool:
+    return prefix.startswith(_SIGNATURE)
+
+
+def _storable(image: Image.Image) -> Image.Image:
+    """The picture in a mode that a file can have, if no colour changes by that."""
+    has_alpha = image.has_transparency_data
+    if image.mode in {"1", "L", "LA"}:
+        mode = "LA" if has_alpha else "L"
+    elif image.mode in {"P", "PA", "RGB", "RGBA", "RGBX"}:
+        mode = "RGBA" if has_alpha else "RGB"
+    else:
+        hint = "convert it to L, LA, RGB or RGBA"
+        if image.mode.startswith("I;16"):
+            hint += ", or pass its NumPy array to image_gip.encode, which keeps 16 bits"
+        raise OSError(f"cannot write mode {image.mode} as {_FORMAT}; {hint}")
+    return image if image.mode == mode else image.convert(mode)
+
+
+def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
+    asked = image.encoderinfo
+    options: dict[str, Any] = {name: asked[name] for name in _OPTIONS if name in asked}
+    # As in Pillow's own formats, the profile goes with the picture, and the rest on request.
+    options["icc"] = asked.get("icc_profile", image.info.get("icc_profile")) or None
+    exif = asked.get("exif")
+    options["exif"] = (exif.tobytes() if isinstance(exif, Image.Exif) else exif) or None
+    xmp = asked.get("xmp")
+    options["xmp"] = (xmp.encode() if isinstance(xmp, str) else xmp) or None
+    samples = np.asarray(_storable(image))
+    try:
+        encoded = encode(samples, **options)
+    except GipError as error:
+        raise OSError(str(error)) from error
+    file.write(encoded)
+
+
+Image.register_decoder("gip", _Decoder)
+Image.register_open(_FORMAT, GipImageFile, _accept)
+Image.register_save(_FORMAT, _save)
+Image.register_extension(_FORMAT, ".gip")
+Image.register_mime(_FORMAT, "image/x-gip")

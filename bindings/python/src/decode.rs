@@ -1,0 +1,167 @@
+//! `decode`, `gaussians` and `info`.
+
+use image_gip::{Decoder, StreamDecoder};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::errors::decode_error;
+use crate::input::{Bytes, FileObject};
+use crate::objects::{self, Limits};
+use crate::output::{Output, Wanted};
+use crate::request::Request;
+use crate::threads;
+
+/// Decodes a picture to an array.
+///
+/// The picture is a sum of Gaussians: it is rendered at the size asked for, and no pixels are
+/// resampled. The interpreter lock is released.
+///
+/// Args:
+///     src: The file: bytes or any contiguous buffer (which is not copied, and must not change during
+///         the call), a path, or a binary file object.
+///     size: Width and height in pixels of the whole picture. Default: the stored size.
+///     scale: A factor of the stored width and height, in place of `size`.
+///     region: (x, y, width, height): render only this part of the output, in pixels of the size asked
+///         for. Layers of the file that do not show in it are skipped.
+///     mode: "L", "LA", "RGB" or "RGBA". Gray can become RGB, and an alpha channel can be added; none
+///         is dropped. Default: that of the file.
+///     dtype: numpy.uint8 (0 to 255), numpy.uint16 (0 to 65535) or numpy.float32 (1.0 is a full sample;
+///         neither clamped nor rounded). Default: that of `out`, else uint8 or uint16, whichever the
+///         encoded picture had.
+///     out: The array to decode into: C-contiguous, writeable, of the shape of the result.
+///     threads: The number of threads, 1 to 1024. With 1, the work is done on the caller's thread. The
+///         samples are the same.
+///     limits: What the file may cost at most. Default: Limits().
+///
+/// Returns:
+///     height x width (mode "L") or height x width x channels samples, rows from the top: a new array,
+///     or `out`. Colours are sRGB unless the file has an ICC profile; alpha is straight.
+///
+/// Raises:
+///     GipError: The file was refused; its subclasses say why.
+///     ValueError: An argument is out of range, or `out` does not fit.
+///     TypeError: An argument has the wrong type.
+///     OSError: The file cannot be read.
+#[pyfunction]
+#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, dtype=None, out=None, threads=1, limits=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn decode<'py>(
+    py: Python<'py>,
+    src: &Bound<'py, PyAny>,
+    size: Option<(i64, i64)>,
+    scale: Option<f64>,
+    region: Option<(i64, i64, i64, i64)>,
+    mode: Option<&str>,
+    dtype: Option<&Bound<'py, PyAny>>,
+    out: Option<&Bound<'py, PyAny>>,
+    threads: i64,
+    limits: Option<Limits>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let request = Request::new(size, scale, region, mode)?;
+    let threads = threads::checked(threads)?;
+    let file = Bytes::of_file(src)?;
+    let bytes = file.as_slice()?;
+    let limits = Limits::of(limits);
+    let failed = |error| decode_error(py, error);
+
+    let mut decoder = py.detach(|| Decoder::new_with_limits(bytes, limits)).map_err(failed)?;
+    let options = request.options(decoder.header());
+    decoder.set_options(options.clone());
+    decoder.output_len().map_err(failed)?;
+    let channels = options.output_color(decoder.header()).map_err(failed)?.channels();
+    let mut output = Output::new(py, decoder.header(), &options, &Wanted { dtype, out })?;
+    if output.overlaps(bytes) {
+        return Err(PyValueError::new_err("out overlaps src"));
+    }
+    let samples = output.samples()?;
+    py.detach(|| {
+        threads::decoding(threads, |threads| {
+            decoder.set_options(options.with_threads(threads));
+            samples.decode(&mut decoder, channels)
+        })
+    })?
+    .map_err(failed)?;
+    Ok(output.into_array())
+}
+
+/// Reads and checks a whole file, without rendering it.
+fn read_whole(
+    py: Python<'_>,
+    src: &Bound<'_, PyAny>,
+    limits: Option<Limits>,
+) -> PyResult<StreamDecoder> {
+    let file = Bytes::of_file(src)?;
+    let bytes = file.as_slice()?;
+    let mut stream = StreamDecoder::new().with_limits(Limits::of(limits));
+    let read = py.detach(|| stream.feed(bytes).and_then(|_| stream.finish()));
+    read.map_err(|error| decode_error(py, error))?;
+    Ok(stream)
+}
+
+/// The Gaussians of a picture, in the order of the file: the strongest come first, by and large.
+///
+/// Args:
+///     src: The file, as for `decode`.
+///     limits: What the file may cost at most. Default: Limits().
+///
+/// Returns:
+///     A one-dimensional structured array of float32 with the fields
+///
+///     - center, shape (2,): x to the right and y down, in pixels of the stored size; the centre of the
+///       first pixel is (0.5, 0.5);
+///     - covariance, shape (2, 2), in square pixels;
+///     - color, shape (channels,): the amplitude, where 1.0 is a full sample; it may be negative.
+///
+///     A Gaussian whose covariance is not positive definite is not drawn. `Info.kernel` names the
+///     weight that a Gaussian has around its centre.
+///
+/// Raises:
+///     GipError: The file was refused.
+///     OSError: The file cannot be read.
+#[pyfunction]
+#[pyo3(signature = (src, *, limits=None))]
+pub(crate) fn gaussians<'py>(
+    py: Python<'py>,
+    src: &Bound<'py, PyAny>,
+    limits: Option<Limits>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let stream = read_whole(py, src, limits)?;
+    let channels = stream.header().map_or(0, |header| header.color.channels());
+    objects::gaussians(py, stream.gaussians(), channels)
+}
+
+/// What a file says of its picture: header, metadata, chunks, Gaussians per layer.
+///
+/// The whole file is read and checked, but not rendered.
+///
+/// Args:
+///     src: The file, as for `decode`.
+///     limits: What the file may cost at most. Default: Limits().
+///
+/// Returns:
+///     An `Info`.
+///
+/// Raises:
+///     GipError: The file was refused.
+///     OSError: The file cannot be read.
+#[pyfunction]
+#[pyo3(signature = (src, *, limits=None))]
+pub(crate) fn info<'py>(
+    py: Python<'py>,
+    src: &Bound<'py, PyAny>,
+    limits: Option<Limits>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    objects::info(py, &read_whole(py, src, limits)?)
+}
+
+/// The `Info` of a file object up to its first layer. No more than that is read.
+#[pyfunction]
+#[pyo3(signature = (file, *, limits=None))]
+pub(crate) fn read_header<'py>(
+    py: Python<'py>,
+    file: Bound<'py, PyAny>,
+    limits: Option<Limits>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let decoder = Decoder::new_with_limits(FileObject(file.unbind()), Limits::of(limits));
+    objects::info(py, decoder.map_err(|error| decode_error(py, error))?.stream())
+}

@@ -1,0 +1,288 @@
+//! `encode`.
+
+use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use image_gip::{
+    EncodeError, Encoded, Encoder, Metadata, Progress, Shortfall, Source, Target, Tune,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::array::Picture;
+use crate::errors::{encode_error, warn_of_shortfall};
+use crate::{input, threads};
+
+/// How long the calling thread waits before it looks for signals, such as that of Ctrl-C.
+const INTERVAL: Duration = Duration::from_millis(10);
+
+/// Encodes a picture.
+///
+/// The file depends on the array and the options alone, not on the number of threads; it is the one
+/// that the tool `gip encode` writes. Encoding is an optimization, and takes seconds. The interpreter
+/// lock is released meanwhile, and Ctrl-C ends it.
+///
+/// At most one target may be given; without any of them it is quality=75. A file that cannot meet its
+/// target comes as close as it can; where that means less PSNR or quality than asked for, there is a
+/// ShortfallWarning.
+///
+/// Args:
+///     array: height x width or height x width x channels samples, C-contiguous: uint8, uint16, or
+///         float32 from 0.0 to 1.0, which is stored with 16 bits. The channels are gray; gray, alpha; red,
+///         green, blue; or red, green, blue, alpha. Colours are sRGB unless `icc` says otherwise; alpha
+///         is straight. The array is not copied, and must not change during the call.
+///     bpp: A file of at most so many bits per pixel, 1e-6 to 1e6.
+///     bytes: A file of at most so many bytes, 1 to 2**30.
+///     quality: A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 50 is
+///         medium, 70 high, and from 90 on people see no difference.
+///     psnr: A PSNR of the decoded file in dB, 1 to 120.
+///     gaussians: At most so many Gaussians, 1 to 2**22.
+///     effort: How much time to spend, 1 (least) to 9 (most).
+///     tune: What to minimize for the size of the file: "visual", the error that a person sees, or
+///         "psnr", the squared error.
+///     threads: The number of threads that work, 1 to 1024. The calling thread only waits for them.
+///     seed: The seed of all random numbers.
+///     icc: An ICC profile to store with the picture.
+///     exif: Exif data: a TIFF stream, with or without the prefix that it has in JPEG.
+///     xmp: An XMP packet: XML in UTF-8.
+///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
+///         or raises an exception, the encoding is cancelled. None goes on.
+///
+/// Returns:
+///     The file.
+///
+/// Raises:
+///     TypeError: The array is no array of a type above, or more than one target is given.
+///     ValueError: The array has another shape, strides, or floats that are out of range or NaN; an
+///         option is out of range.
+///     CancelledError: `progress` returned False.
+#[pyfunction]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=5, tune="visual", threads=1, seed=0, icc=None, exif=None, xmp=None, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
+pub(crate) fn encode<'py>(
+    py: Python<'py>,
+    array: &Bound<'py, PyAny>,
+    bpp: Option<f64>,
+    bytes: Option<i64>,
+    quality: Option<f64>,
+    psnr: Option<f64>,
+    gaussians: Option<i64>,
+    effort: i64,
+    tune: &str,
+    threads: i64,
+    seed: u64,
+    icc: Option<&Bound<'py, PyAny>>,
+    exif: Option<&Bound<'py, PyAny>>,
+    xmp: Option<&Bound<'py, PyAny>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let threads = threads::checked(threads)?;
+    let target = target(bpp, bytes, quality, psnr, gaussians)?;
+    let effort = u8::try_from(effort)
+        .map_err(|_| PyValueError::new_err(format!("effort {effort}; it must be 1 to 9")))?;
+    let encoder = Encoder::new()
+        .with_target(target)
+        .with_tune(tuning(tune)?)
+        .with_effort(effort)
+        .with_seed(seed)
+        .with_metadata(metadata(icc, exif, xmp)?);
+    let picture = Picture::new(array)?;
+    let source = picture.source()?;
+    let encoded = py
+        .detach(|| run(&encoder, &source, threads, progress.as_ref()))?
+        .map_err(|error| encode_error(py, &error))?;
+    let asked = !matches!(target, Target::Auto);
+    if asked
+        && let Some(shortfall @ (Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })) =
+            encoded.report.shortfall
+    {
+        warn_of_shortfall(py, &shortfall.to_string())?;
+    }
+    Ok(PyBytes::new(py, &encoded.bytes))
+}
+
+/// The one target that is given.
+fn target(
+    bpp: Option<f64>,
+    bytes: Option<i64>,
+    quality: Option<f64>,
+    psnr: Option<f64>,
+    gaussians: Option<i64>,
+) -> PyResult<Target> {
+    // The encoder refuses what is out of range.
+    let at_most = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
+    let targets = [
+        bpp.map(Target::BitsPerPixel),
+        natural("bytes", bytes)?.map(Target::Bytes),
+        quality.map(Target::Quality),
+        psnr.map(Target::Psnr),
+        natural("gaussians", gaussians)?.map(|count| Target::Gaussians(at_most(count))),
+    ];
+    let mut given = targets.into_iter().flatten();
+    let target = given.next().unwrap_or_default();
+    if given.next().is_some() {
+        return Err(PyTypeError::new_err(
+            "at most one of bpp, bytes, quality, psnr and gaussians may be given",
+        ));
+    }
+    Ok(target)
+}
+
+/// A number that is not negative.
+fn natural(name: &str, value: Option<i64>) -> PyResult<Option<u64>> {
+    let checked = |value| {
+        u64::try_from(value)
+            .map_err(|_| PyValueError::new_err(format!("{name} {value}; it must be at least 1")))
+    };
+    value.map(checked).transpose()
+}
+
+fn tuning(tune: &str) -> PyResult<Tune> {
+    match tune {
+        "visual" => Ok(Tune::Visual),
+        "psnr" => Ok(Tune::Psnr),
+        _ => {
+            Err(PyValueError::new_err(format!("tune {tune:?}; it must be \"visual\" or \"psnr\"")))
+        }
+    }
+}
+
+fn metadata(
+    icc: Option<&Bound<'_, PyAny>>,
+    exif: Option<&Bound<'_, PyAny>>,
+    xmp: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Metadata> {
+    let blob = |name: &str, data: Option<&Bound<'_, PyAny>>| {
+        let bytes =
+            data.map(|data| Ok::<_, PyErr>(input::buffer(name, data)?.as_slice()?.to_vec()));
+        bytes.transpose()
+    };
+    let mut metadata = Metadata::default();
+    metadata.icc_profile = blob("icc", icc)?;
+    metadata.exif = blob("exif", exif)?.map(tiff_stream).transpose()?;
+    metadata.xmp = blob("xmp", xmp)?;
+    Ok(metadata)
+}
+
+/// The TIFF stream of Exif data, without the prefix that it has in JPEG.
+fn tiff_stream(mut exif: Vec<u8>) -> PyResult<Vec<u8>> {
+    if exif.starts_with(b"Exif\0\0") {
+        exif.drain(..6);
+    }
+    if exif.starts_with(b"II") || exif.starts_with(b"MM") {
+        return Ok(exif);
+    }
+    Err(PyValueError::new_err("exif must be a TIFF stream, which begins with II or MM"))
+}
+
+/// What the threads that encode and the thread that waits for them tell each other.
+#[derive(Default)]
+struct Watch {
+    state: Mutex<State>,
+    changed: Condvar,
+    is_cancelled: AtomicBool,
+}
+
+#[derive(Default)]
+struct State {
+    /// What was reported since the last look.
+    news: Option<Progress>,
+    is_done: bool,
+}
+
+impl Watch {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes a report of the encoder, and tells it whether to go on. `last` is the iteration of its
+    /// last report.
+    fn report(&self, progress: &Progress, last: &mut Option<u32>) -> ControlFlow<()> {
+        if self.is_cancelled.load(Ordering::Relaxed) {
+            return ControlFlow::Break(());
+        }
+        // The encoder also calls between iterations, so that it can be cancelled.
+        if last.replace(progress.iteration) != Some(progress.iteration) {
+            self.state().news = Some(*progress);
+            self.changed.notify_one();
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Looks for signals and passes on reports until the encoder is done. Cancels it when a signal's
+    /// handler or the callback raises an exception, or when the callback returns False. Returns
+    /// whether it did not.
+    fn attend(&self, callback: Option<&Py<PyAny>>) -> PyResult<bool> {
+        loop {
+            let state = self.state();
+            let waits =
+                |state: &mut State| !state.is_done && (callback.is_none() || state.news.is_none());
+            let waited = self.changed.wait_timeout_while(state, INTERVAL, waits);
+            let (mut state, _) = waited.unwrap_or_else(PoisonError::into_inner);
+            let (news, is_done) = (state.news.take(), state.is_done);
+            drop(state);
+            let goes_on = Python::attach(|py| {
+                py.check_signals()?;
+                match (news, callback) {
+                    (Some(news), Some(callback)) => call(py, callback, &news),
+                    _ => Ok(true),
+                }
+            });
+            if !matches!(goes_on, Ok(true)) {
+                self.is_cancelled.store(true, Ordering::Relaxed);
+                return goes_on;
+            }
+            if is_done {
+                return Ok(true);
+            }
+        }
+    }
+}
+
+/// Calls the callback. Returns whether to go on.
+fn call(py: Python<'_>, callback: &Py<PyAny>, progress: &Progress) -> PyResult<bool> {
+    let class = py.import("image_gip._types")?.getattr("Progress")?;
+    let Progress { iteration, iterations, gaussians, psnr, .. } = *progress;
+    let answer =
+        callback.bind(py).call1((class.call1((iteration, iterations, gaussians, psnr))?,))?;
+    Ok(answer.is_none() || answer.is_truthy()?)
+}
+
+/// Tells that the encoder is done, even if it panics.
+struct Done<'a>(&'a Watch);
+
+impl Drop for Done<'_> {
+    fn drop(&mut self) {
+        self.0.state().is_done = true;
+        self.0.changed.notify_one();
+    }
+}
+
+/// Encodes on a pool of threads, while this thread attends to signals and to the callback.
+fn run(
+    encoder: &Encoder,
+    source: &Source<'_>,
+    threads: usize,
+    callback: Option<&Py<PyAny>>,
+) -> PyResult<Result<Encoded, EncodeError>> {
+    let watch = Watch::default();
+    let mut encoded = None;
+    let attended = threads::with_pool(threads, |pool| {
+        pool.in_place_scope(|scope| {
+            scope.spawn(|_| {
+                let _done = Done(&watch);
+                let mut last = None;
+                let report = &mut |progress: &Progress| watch.report(progress, &mut last);
+                encoded = Some(encoder.encode_with(source, report));
+            });
+            watch.attend(callback)
+        })
+    })?;
+    if !attended? {
+        return Ok(Err(EncodeError::Cancelled));
+    }
+    Ok(encoded.expect("the scope waits for the encoder"))
+}

@@ -1,0 +1,31 @@
+//! The native part of the Python module `image_gip`.
+//!
+//! Arrays and buffers are borrowed, the interpreter lock is released while the crate works, and
+//! nothing is kept between calls: no pool of threads that a `fork` would lose.
+
+mod array;
+mod decode;
+mod encode;
+mod errors;
+mod input;
+mod objects;
+mod output;
+mod request;
+mod stream;
+mod threads;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::decode::{decode, gaussians, info, read_header};
+    #[pymodule_export]
+    use super::encode::encode;
+    #[pymodule_export]
+    use super::stream::StreamDecoder;
+
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "the name in Python")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

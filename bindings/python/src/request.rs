@@ -1,0 +1,83 @@
+//! What to render, in the words of the caller.
+
+use image_gip::{ColorModel, Header, Region, RenderOptions};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// Names of the colour models, as Pillow has them.
+const MODES: [(&str, ColorModel); 4] = [
+    ("L", ColorModel::Gray),
+    ("LA", ColorModel::GrayAlpha),
+    ("RGB", ColorModel::Rgb),
+    ("RGBA", ColorModel::Rgba),
+];
+
+/// The name of a colour model.
+pub(crate) fn mode_name(color: ColorModel) -> &'static str {
+    MODES.iter().find(|mode| mode.1 == color).map_or("unknown", |mode| mode.0)
+}
+
+/// Size, region and mode of an output.
+#[derive(Debug)]
+pub(crate) struct Request {
+    scale: Option<f64>,
+    options: RenderOptions,
+}
+
+impl Request {
+    pub(crate) fn new(
+        size: Option<(i64, i64)>,
+        scale: Option<f64>,
+        region: Option<(i64, i64, i64, i64)>,
+        mode: Option<&str>,
+    ) -> PyResult<Self> {
+        let mut options = RenderOptions::new();
+        if let Some((width, height)) = size {
+            if scale.is_some() {
+                return Err(PyTypeError::new_err("size and scale exclude each other"));
+            }
+            options = options.with_size(number("size", width)?, number("size", height)?);
+        }
+        if let Some(scale) = scale
+            && !(scale.is_finite() && scale > 0.0)
+        {
+            return Err(PyValueError::new_err(format!("scale {scale}; it must be over 0")));
+        }
+        if let Some((x, y, width, height)) = region {
+            let number = |value| number("region", value);
+            let (x, y, width, height) = (number(x)?, number(y)?, number(width)?, number(height)?);
+            options = options.with_region(Region { x, y, width, height });
+        }
+        if let Some(mode) = mode {
+            let Some(&(_, color)) = MODES.iter().find(|known| known.0 == mode) else {
+                return Err(PyValueError::new_err(format!(
+                    "mode {mode:?}; it must be \"L\", \"LA\", \"RGB\" or \"RGBA\""
+                )));
+            };
+            options = options.with_color(color);
+        }
+        Ok(Self { scale, options })
+    }
+
+    /// Renders only the first Gaussians of the file.
+    pub(crate) fn with_prefix(mut self, prefix: Option<i64>) -> PyResult<Self> {
+        if let Some(prefix) = prefix {
+            self.options = self.options.with_prefix(number("prefix", prefix)?);
+        }
+        Ok(self)
+    }
+
+    /// The options for a picture.
+    pub(crate) fn options(&self, header: &Header) -> RenderOptions {
+        let Some(scale) = self.scale else { return self.options.clone() };
+        // The cast of a side that is too long saturates, and the decoder refuses it.
+        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+        self.options.clone().with_size(scaled(header.width), scaled(header.height))
+    }
+}
+
+fn number(name: &str, value: i64) -> PyResult<u32> {
+    u32::try_from(value).map_err(|_| {
+        PyValueError::new_err(format!("{name}: {value}; it must be 0 to {}", u32::MAX))
+    })
+}

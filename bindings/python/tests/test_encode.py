@@ -1,0 +1,218 @@
+"""`encode`: the tool's bytes, arrays that are refused, and how an encoding ends early."""
+
+import os
+import signal
+import subprocess
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import Picture, draw
+from numpy.typing import NDArray
+from PIL import Image
+
+import image_gip
+from image_gip import Progress
+
+#: What a test waits for before it fails, in seconds.
+PATIENCE = 60
+
+
+def psnr(a: Picture, b: Picture) -> float:
+    return float(10 * np.log10(255**2 / np.square(a.astype(float) - b).mean()))
+
+
+@pytest.mark.parametrize(
+    ("keywords", "arguments"),
+    [
+        ({}, []),
+        ({"bpp": 2.5}, ["--bpp", "2.5"]),
+        ({"bytes": 900}, ["--size", "900"]),
+        ({"quality": 60}, ["--quality", "60"]),
+        ({"psnr": 35, "seed": 7}, ["--psnr", "35", "--seed", "7"]),
+        ({"gaussians": 50, "tune": "psnr"}, ["--gaussians", "50", "--tune", "psnr"]),
+        ({"effort": 2, "threads": 2}, ["--effort", "2"]),
+    ],
+)
+@pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA", "I;16"])
+def test_the_tools_bytes(
+    tool: Path, tmp_path: Path, mode: str, keywords: dict[str, Any], arguments: list[str]
+) -> None:
+    channels = {"L": 1, "LA": 2, "RGB": 3, "RGBA": 4, "I;16": 1}[mode]
+    picture: Any = draw(48, 40, channels)
+    if channels == 1:
+        picture = picture[..., 0]
+    if mode == "I;16":
+        picture = picture.astype(np.uint16) * 257 + 100
+    Image.fromarray(picture).save(tmp_path / "picture.png")
+    names = [str(tmp_path / name) for name in ("picture.png", "picture.gip", "back.png")]
+    arguments = arguments if "effort" in keywords else [*arguments, "--effort", "1"]
+    subprocess.run([tool, "encode", *names[:2], *arguments], check=True, capture_output=True)
+    written = Path(names[1]).read_bytes()
+    assert image_gip.encode(picture, **{"effort": 1} | keywords) == written
+    subprocess.run([tool, "decode", *names[1:]], check=True)
+    with Image.open(names[2]) as back:
+        np.testing.assert_array_equal(image_gip.decode(written), np.asarray(back))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("channels", [0, 1, 2, 3, 4])
+def test_arrays(channels: int, dtype: Any) -> None:
+    full = {np.uint8: 1, np.uint16: 257, np.float32: 1 / 255}[dtype]
+    picture: NDArray[Any] = (draw(40, 30, max(channels, 1)) * np.array(full, dtype)).astype(dtype)
+    picture = picture if channels else picture[..., 0]
+    file = image_gip.encode(picture, psnr=38, effort=1)
+    info = image_gip.info(file)
+    assert info.mode == ("L", "L", "LA", "RGB", "RGBA")[channels]
+    assert info.depth == (8 if dtype == np.uint8 else 16)
+    decoded = image_gip.decode(file, dtype=dtype)
+    assert decoded.shape == picture.squeeze().shape
+    error = (np.clip(decoded, 0, None) - picture.squeeze().astype(float)) / full
+    assert np.sqrt(np.square(error).mean()) < 4
+
+
+def test_floats_are_stored_with_16_bits() -> None:
+    sixteen = draw(32, 24, 3).astype(np.uint16) * 257
+    floats = (sixteen / 65535).astype(np.float32)
+    assert image_gip.encode(floats, effort=1) == image_gip.encode(sixteen, effort=1)
+
+
+def test_arrays_that_are_refused() -> None:
+    picture = draw(20, 10, 3)
+    not_a_number = np.zeros((10, 20, 3), np.float32)
+    not_a_number[4, 7, 2] = np.nan
+    out_of_range = np.zeros((10, 20), np.float32)
+    out_of_range[9, 1] = 255
+    refused: list[tuple[Any, type[Exception], str]] = [
+        (picture.tolist(), TypeError, "must be a NumPy array, not list"),
+        (picture.astype(np.float64), TypeError, "dtype float64; it must be uint8, uint16 or float"),
+        (picture.astype(">u2"), TypeError, "dtype >u2; .* in the machine's byte order"),
+        (picture.astype(bool), TypeError, "dtype bool"),
+        (picture[:, ::2], ValueError, "not C-contiguous; use numpy.ascontiguousarray"),
+        (picture[..., ::-1], ValueError, "not C-contiguous"),
+        (np.asfortranarray(picture), ValueError, "not C-contiguous"),
+        (picture[0, 0], ValueError, r"shape \(3,\); it must be height x width, or"),
+        (np.zeros((4, 4, 5), np.uint8), ValueError, r"shape \(4, 4, 5\); .* x 1 to 4 channels"),
+        (np.zeros((0, 4), np.uint8), ValueError, "4x0 pixels; each side must be 1 to 1048576"),
+        (not_a_number, ValueError, r"the float at \(4, 7, 2\) is NaN; floats must be 0.0 to 1.0"),
+        (out_of_range, ValueError, r"the float at \(9, 1\) is 255; .* use numpy.clip"),
+    ]
+    for array, kind, message in refused:
+        with pytest.raises(kind, match=message):
+            image_gip.encode(array)
+
+
+def test_options_that_are_refused(photo: Picture) -> None:
+    refused: list[tuple[dict[str, Any], type[Exception], str]] = [
+        ({"bpp": 1, "psnr": 30}, TypeError, "at most one of bpp, bytes, quality, psnr"),
+        ({"effort": 0}, ValueError, "effort 0; it must be 1 to 9"),
+        ({"effort": 1000}, ValueError, "effort 1000; it must be 1 to 9"),
+        ({"bpp": 0.0}, ValueError, "bits per pixel 0; it must be"),
+        ({"bytes": -5}, ValueError, "bytes -5; it must be at least 1"),
+        ({"bytes": 0}, ValueError, "size in bytes 0; it must be 1 to"),
+        ({"bytes": 20}, ValueError, "this picture takes at least"),
+        ({"gaussians": 1 << 40}, ValueError, "it must be 1 to 4194304"),
+        ({"quality": float("nan")}, ValueError, "quality NaN; it must be 0 to 100"),
+        ({"tune": "ssim"}, ValueError, 'tune "ssim"; it must be "visual" or "psnr"'),
+        ({"threads": 2000}, ValueError, "threads 2000; it must be 1 to 1024"),
+        ({"exif": b"\xff\xd8"}, ValueError, "begins with II or MM"),
+        ({"icc": "sRGB"}, TypeError, "icc must be bytes-like, not str"),
+    ]
+    for keywords, kind, message in refused:
+        with pytest.raises(kind, match=message):
+            image_gip.encode(photo, **keywords)
+
+
+def test_targets(photo: Picture) -> None:
+    assert 594 <= len(image_gip.encode(photo, bytes=600, effort=1)) <= 600
+    assert len(image_gip.encode(photo, bpp=1, effort=1)) <= 64 * 96 / 8
+    file = image_gip.encode(photo, psnr=32, effort=1)
+    assert 32 <= psnr(image_gip.decode(file), photo) <= 32.06
+    assert image_gip.info(image_gip.encode(photo, gaussians=30, effort=1)).gaussians <= 30
+
+
+def test_a_target_out_of_reach(photo: Picture) -> None:
+    with pytest.warns(image_gip.ShortfallWarning, match="dB is what this effort") as warnings:
+        file = image_gip.encode(photo[:16, :16].copy(), psnr=120, effort=1)
+    assert [warning.filename for warning in warnings] == [__file__]
+    assert image_gip.decode(file).shape == (16, 16, 3)
+
+
+def test_the_number_of_threads_does_not_show(photo: Picture) -> None:
+    files = {image_gip.encode(photo, effort=2, threads=threads) for threads in (1, 2, 3)}
+    assert len(files) == 1
+    assert image_gip.encode(photo, effort=2, seed=1) not in files
+
+
+def test_metadata(photo: Picture) -> None:
+    exif = b"II*\0\x08\0\0\0\0\0\0\0\0\0"
+    prefixed = bytearray(b"Exif\0\0" + exif)
+    file = image_gip.encode(
+        photo, effort=1, icc=memoryview(b"profile"), exif=prefixed, xmp="<ä/>".encode()
+    )
+    info = image_gip.info(file)
+    assert (info.icc, info.exif, info.xmp) == (b"profile", exif, "<ä/>".encode())
+
+
+def test_progress(photo: Picture) -> None:
+    reports: list[Progress] = []
+
+    def note(progress: Progress) -> None:
+        assert threading.current_thread() is threading.main_thread()
+        reports.append(progress)
+
+    file = image_gip.encode(photo, effort=3, progress=note)
+    assert file == image_gip.encode(photo, effort=3)
+    iterations = [report.iteration for report in reports]
+    assert iterations == sorted(set(iterations))
+    assert len(iterations) > 3
+    assert reports[-1].iterations >= reports[-1].iteration > 0
+    assert reports[-1].gaussians > 0
+    assert reports[-1].psnr > 20
+
+
+def test_progress_cancels(photo: Picture) -> None:
+    calls = []
+
+    def stop(progress: Progress) -> bool:
+        calls.append(progress)
+        return len(calls) < 3
+
+    with pytest.raises(image_gip.CancelledError):
+        image_gip.encode(photo, effort=9, progress=stop)
+    assert len(calls) == 3
+
+    def fail(progress: Progress) -> None:
+        raise LookupError("no")
+
+    with pytest.raises(LookupError, match="no"):
+        image_gip.encode(photo, effort=9, progress=fail)
+
+
+def test_ctrl_c() -> None:
+    timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        image_gip.encode(draw(400, 300, 3), effort=9, threads=2)
+    timer.join()
+
+
+def test_the_interpreter_goes_on() -> None:
+    """An encoding on another thread, and a thread that stops it from outside."""
+    stop = threading.Event()
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            image_gip.encode(draw(400, 300, 3), effort=9, progress=lambda _: not stop.is_set())
+        except image_gip.CancelledError as error:
+            errors.append(error)
+
+    worker = threading.Thread(target=work)
+    worker.start()
+    stop.set()
+    worker.join(PATIENCE)
+    assert not worker.is_alive()
+    assert len(errors) == 1

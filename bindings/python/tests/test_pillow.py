@@ -1,0 +1,229 @@
+"""The plug-in for Pillow."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import VECTORS, Picture, draw
+from PIL import Image, ImageCms, ImageFile, UnidentifiedImageError
+
+import image_gip
+import image_gip.pillow
+
+FAST = {"effort": 1}
+#: Exif with the tag ImageDescription.
+DESCRIPTION = 0x010E
+
+
+class Counted(io.BytesIO):
+    """A file that knows how far it was read."""
+
+    furthest = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        data = super().read(size)
+        self.furthest = max(self.furthest, self.tell())
+        return data
+
+
+def saved(image: Image.Image, **options: Any) -> io.BytesIO:
+    file = io.BytesIO()
+    image.save(file, "GIP", **FAST | options)
+    file.seek(0)
+    return file
+
+
+@pytest.fixture
+def truncated_images() -> Iterator[None]:
+    """Pillow shows what there is of a damaged file."""
+    ImageFile.LOAD_TRUNCATED_IMAGES = True
+    yield
+    ImageFile.LOAD_TRUNCATED_IMAGES = False
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA"])
+def test_round_trips(mode: str) -> None:
+    samples = draw(60, 45, len(mode))
+    samples = samples[..., 0] if mode == "L" else samples
+    file = saved(Image.fromarray(samples), psnr=36)
+    assert file.getvalue() == image_gip.encode(samples, psnr=36, effort=1)
+    with Image.open(file) as opened:
+        assert (opened.format, opened.mode, opened.size) == ("GIP", mode, (60, 45))
+        assert opened.get_format_mimetype() == "image/x-gip"
+        expected = image_gip.decode(file.getvalue())
+        np.testing.assert_array_equal(np.asarray(opened), expected)
+        again = opened.copy()
+    np.testing.assert_array_equal(np.asarray(again), expected)
+
+
+@pytest.mark.parametrize(
+    ("mode", "stored"), [("1", "L"), ("P", "RGB"), ("PA", "RGBA"), ("RGBX", "RGB")]
+)
+def test_modes_that_are_converted(mode: str, stored: str) -> None:
+    image = Image.fromarray(draw(40, 30, 3)).convert("P" if mode == "PA" else mode).convert(mode)
+    file = saved(image)
+    assert file.getvalue() == image_gip.encode(np.asarray(image.convert(stored)), effort=1)
+
+
+@pytest.mark.parametrize(("mode", "stored"), [("P", "RGBA"), ("L", "LA"), ("RGB", "RGBA")])
+def test_a_transparent_colour_becomes_alpha(mode: str, stored: str) -> None:
+    image = Image.fromarray(draw(40, 30, 3)).convert(mode)
+    colour = image.getpixel((5, 5))
+    image.info["transparency"] = colour
+    with Image.open(saved(image)) as opened:
+        assert opened.mode == stored
+
+
+@pytest.mark.parametrize("mode", ["CMYK", "YCbCr", "HSV", "I", "F"])
+def test_modes_that_are_refused(mode: str) -> None:
+    image = Image.new("RGB", (9, 9)).convert("L" if mode in "IF" else "RGB").convert(mode)
+    with pytest.raises(OSError, match=f"cannot write mode {mode} as GIP; convert it"):
+        saved(image)
+
+
+def test_16_bits_go_through_numpy() -> None:
+    samples = draw(40, 30, 1)[..., 0].astype(np.uint16) * 257
+    with pytest.raises(OSError, match="pass its NumPy array to"):
+        saved(Image.fromarray(samples))
+    file = image_gip.encode(samples, psnr=40, effort=1)
+    with Image.open(io.BytesIO(file)) as opened:
+        assert opened.mode == "L"
+        np.testing.assert_array_equal(np.asarray(opened), image_gip.decode(file, dtype=np.uint8))
+
+
+def test_files_by_name(tmp_path: Path, photo: Picture) -> None:
+    path = tmp_path / "picture.gip"
+    Image.fromarray(photo).save(path, bpp=2, effort=1)
+    assert path.read_bytes() == image_gip.encode(photo, bpp=2, effort=1)
+    with Image.open(path) as opened:
+        opened.load()
+        assert opened.size == (96, 64)
+    assert image_gip.register() is None  # type: ignore[func-returns-value]
+
+
+def test_opening_reads_the_header_only(file: bytes) -> None:
+    source = Counted(file)
+    with Image.open(source) as opened:
+        assert opened.size == (96, 64)
+        assert source.furthest < 200
+        opened.load()
+        assert source.furthest == len(file)
+
+
+def test_metadata(photo: Picture) -> None:
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    exif = Image.Exif()
+    exif[DESCRIPTION] = "a disc"
+    image = Image.fromarray(photo)
+    image.info["icc_profile"] = profile
+    file = saved(image, exif=exif, xmp="<x:xmpmeta/>")
+    with Image.open(file) as opened:
+        assert opened.info["icc_profile"] == profile
+        assert opened.getexif()[DESCRIPTION] == "a disc"
+        assert opened.info["xmp"] == b"<x:xmpmeta/>"
+        second = saved(opened, exif=opened.info["exif"], xmp=opened.info["xmp"])
+        third = saved(opened, icc_profile=None)
+    first, again = image_gip.info(file.getvalue()), image_gip.info(second.getvalue())
+    assert (first.icc, first.exif, first.xmp) == (again.icc, again.exif, again.xmp)
+    bare = image_gip.info(third.getvalue())
+    assert (bare.icc, bare.exif, bare.xmp) == (None, None, None)
+    with Image.open(VECTORS / "metadata.gip") as opened:
+        assert opened.getexif()[0x0112] == 6
+
+
+def test_drafts(file: bytes) -> None:
+    source = Counted(file)
+    with Image.open(source) as opened:
+        assert opened.draft(None, (12, 8)) == ("RGB", (0, 0, 12, 8))
+        assert opened.size == (12, 8)
+        opened.load()
+        assert source.furthest < len(file)
+        assert np.asarray(opened).shape == (8, 12, 3)
+        # It is loaded, and remains as it is.
+        assert opened.draft(None, (24, 16)) is None
+    for asked, size in [((13, 8), (13, 9)), ((500, 500), (96, 64)), ((24, 1), (24, 16))]:
+        with Image.open(io.BytesIO(file)) as opened:
+            opened.draft("L", (5, 5))
+            opened.draft("L", asked)
+            assert opened.size == size
+            assert opened.mode == "RGB"
+    with Image.open(io.BytesIO(file)) as opened:
+        assert opened.draft("L", None) is None
+        opened.draft(None, (96, 64))
+        np.testing.assert_array_equal(np.asarray(opened), image_gip.decode(file))
+
+
+def test_thumbnails(file: bytes) -> None:
+    whole = Image.fromarray(image_gip.decode(file))
+    for size in [(24, 16), (20, 20), (30, 5), (200, 10), (200, 200)]:
+        expected = whole.copy()
+        expected.thumbnail(size, reducing_gap=None)
+        for gap, tolerance in [(1.0, 25), (2.0, 16), (None, 0)]:
+            source = Counted(file)
+            with Image.open(source) as opened:
+                opened.thumbnail(size, reducing_gap=gap)
+            assert opened.size == expected.size
+            error = np.abs(np.asarray(opened).astype(int) - np.asarray(expected)).mean()
+            assert error <= tolerance
+    source = Counted(file)
+    with Image.open(source) as opened:
+        opened.thumbnail((12, 12))
+    assert source.furthest < len(file)
+
+
+@pytest.mark.parametrize("damage", ["truncated", "changed"])
+def test_damaged_files(file: bytes, damage: str) -> None:
+    damaged = file[:-20] if damage == "truncated" else file[:-20] + bytes(8) + file[-12:]
+    with (
+        Image.open(io.BytesIO(damaged)) as opened,
+        pytest.raises(OSError, match="chunk GAUS") as raised,
+    ):
+        opened.load()
+    assert isinstance(raised.value.__cause__, image_gip.GipError)
+    with Image.open(io.BytesIO(damaged)) as opened, pytest.raises(OSError, match="chunk GAUS"):
+        opened.verify()
+
+
+@pytest.mark.usefixtures("truncated_images")
+def test_what_there_is_of_a_damaged_file(file: bytes) -> None:
+    whole = image_gip.decode(file).astype(int)
+    with Image.open(io.BytesIO(file[:-20])) as opened:
+        assert 0 < np.abs(np.asarray(opened) - whole).mean() < 20
+    # Nothing but the header and the steps.
+    with Image.open(io.BytesIO(file[:120])) as opened:
+        assert len(np.unique(np.asarray(opened))) <= 3
+    with Image.open(io.BytesIO(file[:300])) as opened:
+        opened.thumbnail((12, 8))
+        assert opened.size == (12, 8)
+
+
+def test_files_that_are_not_opened(file: bytes) -> None:
+    with pytest.raises(OSError, match="unexpected end of the file in chunk GHDR"):
+        Image.open(io.BytesIO(file[:30]))
+    with pytest.raises(OSError, match="unsupported: version 2"):
+        Image.open(VECTORS / "xversion.gip")
+    with pytest.raises(UnidentifiedImageError):
+        Image.open(io.BytesIO(b"\xc7GIP" + file[5:]))
+    with pytest.raises(SyntaxError, match="signature"):
+        image_gip.pillow.GipImageFile(io.BytesIO(b"\x89PNG\r\n\x1a\n" + file[8:]))
+
+
+def test_verify(file: bytes) -> None:
+    with Image.open(io.BytesIO(file)) as opened:
+        opened.verify()
+
+
+def test_pillow_has_limits_of_its_own(file: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    with pytest.raises(Image.DecompressionBombError):
+        Image.open(io.BytesIO(file))
+
+
+def test_a_cancelled_save_leaves_no_file(tmp_path: Path, photo: Picture) -> None:
+    path = tmp_path / "picture.gip"
+    with pytest.raises(OSError, match="cancelled"):
+        Image.fromarray(photo).save(path, progress=lambda _: False)
+    assert not path.exists()
