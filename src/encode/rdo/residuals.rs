@@ -33,34 +33,48 @@ pub(crate) struct Residuals {
     channels: usize,
     /// Row by row, and in each row channel by channel; every line is padded to whole vectors.
     residuals: Vec<f32>,
-    /// Whether positive or negative residuals are ignored, because the output is clamped; in the
-    /// layout of `residuals`.
-    ignored: Vec<u8>,
+    /// Which residuals are ignored, because the output is clamped; in the layout of `residuals`, each
+    /// for as many samples as a vector has.
+    ignored: Vec<ClampMask>,
     /// The sensitivities of pixels, padded as `residuals`; one line for each row of blocks.
     sensitivities: Vec<f32>,
     stride: usize,
     level: Level,
 }
 
-/// Bits of [`Residuals::ignored`]: for samples that are black, that are white, and both for
-/// padding.
-const IGNORE_NEGATIVE: u8 = 1;
-const IGNORE_POSITIVE: u8 = 2;
-
 /// The ignored residuals of sixteen samples, one bit for each.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct ClampMask {
+    /// Those of samples that are black.
     negative: u16,
+    /// Those of samples that are white.
     positive: u16,
 }
 
 impl ClampMask {
-    pub(crate) fn new(ignored: &[u8; LANES]) -> Self {
-        let bits = |bit: u8| {
-            let lanes = (0..).zip(ignored);
-            lanes.map(|(lane, ignored)| u16::from(ignored & bit != 0) << lane).sum()
-        };
-        Self { negative: bits(IGNORE_NEGATIVE), positive: bits(IGNORE_POSITIVE) }
+    pub(crate) const NONE: Self = Self { negative: 0, positive: 0 };
+    const ALL: Self = Self { negative: u16::MAX, positive: u16::MAX };
+
+    /// The mask of samples and padding.
+    fn new(samples: impl Iterator<Item = f32>) -> Self {
+        let mut mask = Self::ALL;
+        for (lane, sample) in samples.enumerate() {
+            // The output is clamped: where the source is black, a rendering below black is no
+            // error, and above white where the source is white.
+            mask.negative &= !(u16::from(sample > 0.0) << lane);
+            mask.positive &= !(u16::from(sample < 1.0) << lane);
+        }
+        mask
+    }
+
+    /// The mask of the sixteen samples from `lane` on, of which the first are those of `self`.
+    fn shifted(self, next: Self, lane: usize) -> Self {
+        let bits =
+            |low: u16, high: u16| ((u32::from(high) << LANES | u32::from(low)) >> lane) as u16;
+        Self {
+            negative: bits(self.negative, next.negative),
+            positive: bits(self.positive, next.positive),
+        }
     }
 
     /// The residuals, with 0 for those that are ignored.
@@ -77,19 +91,12 @@ impl Residuals {
     pub(crate) fn new(raster: &Raster) -> Self {
         let (width, height, channels) = (raster.width, raster.height, raster.channels);
         let stride = width + LANES;
-        let mut ignored = vec![IGNORE_NEGATIVE | IGNORE_POSITIVE; stride * height * channels];
-        ignored.par_chunks_mut(stride).enumerate().for_each(|(line, ignored)| {
-            let samples = raster.line(line / channels, line % channels);
-            for (ignored, sample) in ignored.iter_mut().zip(samples) {
-                // The output is clamped: where the source is black, a rendering below black is no
-                // error, and above white where the source is white.
-                *ignored = if sample <= 0.0 {
-                    IGNORE_NEGATIVE
-                } else if sample >= 1.0 {
-                    IGNORE_POSITIVE
-                } else {
-                    0
-                };
+        let masks = stride.div_ceil(LANES) + 1;
+        let mut ignored = vec![ClampMask::ALL; masks * height * channels];
+        ignored.par_chunks_mut(masks).enumerate().for_each(|(line, ignored)| {
+            let mut samples = raster.line(line / channels, line % channels);
+            for mask in ignored {
+                *mask = ClampMask::new(samples.by_ref().take(LANES));
             }
         });
         let mut sensitivities = vec![1.0; stride * height.div_ceil(BLOCK)];
@@ -100,7 +107,7 @@ impl Residuals {
                 }
             }
         }
-        let residuals = vec![0.0; ignored.len()];
+        let residuals = vec![0.0; stride * height * channels];
         let level = Level::new();
         Self { width, height, channels, residuals, ignored, sensitivities, stride, level }
     }
@@ -135,7 +142,9 @@ impl Residuals {
         let (level, stride, width) = (self.level, self.stride, self.width);
         let band = TILE_HEIGHT * CHANNELS * stride;
         let sensitivities = self.sensitivities.par_chunks(TILE_HEIGHT / BLOCK * stride);
-        let bands = self.residuals.par_chunks_mut(band).zip(self.ignored.par_chunks(band));
+        let masks = self.masks();
+        let ignored = self.ignored.par_chunks(TILE_HEIGHT * CHANNELS * masks);
+        let bands = self.residuals.par_chunks_mut(band).zip(ignored);
         bands.zip(sensitivities).enumerate().for_each(|(row, ((residuals, ignored), by_pixel))| {
             let rows = residuals.len() / (CHANNELS * stride);
             for x in (0..width).step_by(TILE_WIDTH) {
@@ -144,17 +153,11 @@ impl Residuals {
                 let mut clamped = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
                 for (channel, plane) in clamped.iter_mut().enumerate() {
                     for (y, line) in plane.iter_mut().enumerate().take(rows) {
-                        let samples =
-                            residuals[at(y, channel)..].iter().zip(&ignored[at(y, channel)..]);
-                        for (value, (&residual, &ignored)) in
-                            line[..columns].iter_mut().zip(samples)
-                        {
-                            *value = match ignored {
-                                IGNORE_NEGATIVE => residual.max(0.0),
-                                IGNORE_POSITIVE => residual.min(0.0),
-                                _ => residual,
-                            };
-                        }
+                        let mask = ignored[(y * CHANNELS + channel) * masks + x / LANES];
+                        line[..columns].copy_from_slice(&residuals[at(y, channel)..][..columns]);
+                        dispatch!(level, simd => {
+                            mask.clamped(simd, f32x16::load_array_ref(simd, line)).store_array(line);
+                        });
                     }
                 }
                 let mut gradients = clamped;
@@ -180,7 +183,8 @@ impl Residuals {
     /// which do not overlap.
     pub(crate) fn memory(raster: &Raster) -> usize {
         let samples = (raster.width + LANES) * raster.height * raster.channels;
-        samples * (2 * size_of::<f32>() + size_of::<u8>())
+        samples * 2 * size_of::<f32>()
+            + samples.div_ceil(LANES) * size_of::<ClampMask>()
             + (raster.width + LANES) * raster.height.div_ceil(BLOCK) * size_of::<f32>()
     }
 
@@ -248,19 +252,36 @@ impl Residuals {
         self.level
     }
 
-    /// The residuals of sixteen samples of a row from column x on, and which of them are ignored.
-    /// The column is inside the picture, so the padding suffices.
-    pub(crate) fn vector(&self, x: usize, y: usize, channel: usize) -> (&Lanes, &[u8; LANES]) {
-        let at = (y * self.channels + channel) * self.stride + x;
-        let residuals = self.residuals[at..at + LANES].try_into();
-        let ignored = self.ignored[at..at + LANES].try_into();
-        (residuals.expect("whole vectors"), ignored.expect("whole vectors"))
+    /// Masks of a line.
+    fn masks(&self) -> usize {
+        self.stride.div_ceil(LANES) + 1
     }
 
-    /// The sensitivities of the sixteen pixels of a row from column x on.
-    pub(crate) fn sensitivities(&self, x: usize, y: usize) -> &Lanes {
+    /// The residuals of so many vectors of a row from column x on. The first column of each is inside
+    /// the picture, so the padding suffices.
+    pub(crate) fn vectors(&self, x: usize, y: usize, channel: usize, count: usize) -> &[Lanes] {
+        let at = (y * self.channels + channel) * self.stride + x;
+        self.residuals[at..at + count * LANES].as_chunks().0
+    }
+
+    /// Which of these residuals are ignored; `None` if none of them is.
+    pub(crate) fn ignored(
+        &self,
+        x: usize,
+        y: usize,
+        channel: usize,
+        count: usize,
+    ) -> Option<impl Iterator<Item = ClampMask>> {
+        let line = (y * self.channels + channel) * self.masks();
+        let masks = &self.ignored[line + x / LANES..][..=count];
+        let masks = masks.windows(2).map(move |masks| masks[0].shifted(masks[1], x % LANES));
+        masks.clone().any(|mask| mask != ClampMask::NONE).then_some(masks)
+    }
+
+    /// The sensitivities of the pixels of these vectors.
+    pub(crate) fn sensitivities(&self, x: usize, y: usize, count: usize) -> &[Lanes] {
         let at = y / BLOCK * self.stride + x;
-        self.sensitivities[at..at + LANES].try_into().expect("whole vectors")
+        self.sensitivities[at..at + count * LANES].as_chunks().0
     }
 }
 
@@ -336,8 +357,8 @@ mod tests {
                 };
                 let half = (with(here + 0.1) - with(here - 0.1)) / 0.4;
                 with(here);
-                let (lanes, _) = residuals.vector(x, y, channel);
-                let found = f64::from(lanes[0]) * f64::from(residuals.sensitivities(x, y)[0]);
+                let residual = residuals.vectors(x, y, channel, 1)[0][0];
+                let found = f64::from(residual) * f64::from(residuals.sensitivities(x, y, 1)[0][0]);
                 assert!((found - half).abs() < 1e-4, "{model:?} {at}: {found}, {half}");
             }
         }

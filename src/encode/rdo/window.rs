@@ -78,24 +78,27 @@ impl Window {
         self.size = [vectors, rows.len()];
         self.channels = channels;
         self.level = Some(residuals.level());
-        let length = vectors * rows.len() * channels;
-        self.residuals.clear();
-        self.residuals.reserve_exact(length);
-        self.masks.clear();
-        let vectors =
-            rows.flat_map(|y| (0..vectors).map(move |vector| (columns.start + vector * LANES, y)));
+        // Old values are overwritten, so that they need not be cleared.
+        self.residuals.resize(vectors * rows.len() * channels, [0.0; LANES]);
         self.sensitivities.clear();
-        self.sensitivities.extend(vectors.clone().map(|(x, y)| *residuals.sensitivities(x, y)));
-        let parts = vectors
-            .flat_map(|(x, y)| (0..channels).map(move |channel| residuals.vector(x, y, channel)));
-        let mut is_clamped = false;
-        for (residuals, ignored) in parts.clone() {
-            self.residuals.push(*residuals);
-            is_clamped |= *ignored != [0; LANES];
-        }
-        if is_clamped {
-            self.masks.reserve_exact(length);
-            self.masks.extend(parts.map(|(_, ignored)| ClampMask::new(ignored)));
+        self.masks.clear();
+        let lines = self.residuals.chunks_exact_mut(vectors * channels);
+        for (index, (y, line)) in rows.zip(lines).enumerate() {
+            let x = columns.start;
+            self.sensitivities.extend_from_slice(residuals.sensitivities(x, y, vectors));
+            for channel in 0..channels {
+                let values = residuals.vectors(x, y, channel, vectors);
+                let places = line[channel..].iter_mut().step_by(channels);
+                places.zip(values).for_each(|(place, value)| *place = *value);
+                if let Some(masks) = residuals.ignored(x, y, channel, vectors) {
+                    self.masks.resize(self.size[1] * vectors * channels, ClampMask::NONE);
+                    let line = &mut self.masks[index * vectors * channels + channel..];
+                    line.iter_mut()
+                        .step_by(channels)
+                        .zip(masks)
+                        .for_each(|(place, mask)| *place = mask);
+                }
+            }
         }
         true
     }
