@@ -179,7 +179,7 @@ impl Header {
         5 + self.color.channels()
     }
 
-    /// How many Gaussians are enough for a preview of this size in pixels: one for 12 pixels, but
+    /// How many Gaussians are enough for a preview of this size in pixels: one for 16 pixels, but
     /// at least a sixth of all, and at most all. The first Gaussians of a file are the strongest.
     #[must_use]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {

@@ -3,7 +3,7 @@
 //! picture.
 
 /// In a small output, one Gaussian is enough for this many pixels.
-const PIXELS_PER_GAUSSIAN: u64 = 12;
+const PIXELS_PER_GAUSSIAN: u64 = 16;
 /// A thumbnail needs at least one out of this many of a file's Gaussians: with fewer it would
 /// differ visibly, however small it is.
 const LEAST_THUMBNAIL: u64 = 6;
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn a_small_output_needs_a_sixth_of_the_gaussians_at_least() {
         assert_eq!(gaussians_for(6000, 1, 1), 1000);
-        assert_eq!(gaussians_for(6000, 120, 200), 2000);
+        assert_eq!(gaussians_for(6000, 160, 200), 2000);
         assert_eq!(gaussians_for(6000, 4000, 3000), 6000);
         assert_eq!(gaussians_for(u32::MAX, u32::MAX, u32::MAX), u32::MAX);
         assert_eq!(gaussians_for(0, 100, 100), 0);
