@@ -171,7 +171,7 @@ pub mod training {
 
     pub use crate::encode::VectorQuantizer;
     pub use crate::encode::training::{
-        Densification, Distortion, GaussianFilter, LearningRateSchedule, NewColor, NewShape,
-        Optimizer, Placement, Portion, Quantization, Training, Units,
+        Adam, Densification, Distortion, GaussNewton, GaussianFilter, LearningRateSchedule,
+        NewColor, NewShape, Optimizer, Placement, Portion, Quantization, Training,
     };
 }

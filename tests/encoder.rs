@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use image_gip::training::{
     Distortion, GaussianFilter, LearningRateSchedule, NewColor, NewShape, Placement, Portion,
-    Training, Units,
+    Training,
 };
 use image_gip::{
     ColorModel, EncodeError, Encoded, Encoder, Gaussian, Kernel, Limits, Metadata, MetadataError,
@@ -425,8 +425,7 @@ fn every_published_variant_trains() {
             training.densification.shape = NewShape::Random;
             training.densification.distortion = Distortion::L1;
             training.densification.placement = Placement::Top;
-            training.optimizer.schedule = LearningRateSchedule::Halving(40);
-            training.optimizer.units = Units::Relative;
+            training.schedule = LearningRateSchedule::Halving(40);
             trainings.push(training);
         }
     }

@@ -20,15 +20,15 @@ use crate::threads::Threads;
 /// the codes of an entropy-coded file. In a short run, time is better spent on iterations; in a
 /// long one, more iterations gain little without more passes.
 const EFFORTS: [(u32, u32); 9] = [
-    (60, 2),
-    (90, 2),
-    (180, 2),
-    (300, 4),
-    (600, 8),
-    (1_200, 12),
-    (2_400, 16),
-    (4_800, 16),
-    (9_600, 16),
+    (40, 2),
+    (80, 2),
+    (140, 3),
+    (200, 4),
+    (320, 8),
+    (640, 12),
+    (1_280, 16),
+    (2_560, 16),
+    (5_120, 16),
 ];
 /// Fewest iterations for a target that sets the error instead of the number of Gaussians: a fit
 /// of fewer iterations needs far too many Gaussians to reach the error.

@@ -40,7 +40,7 @@ pub(crate) fn paper(
     training.iterations = iterations;
     training.parameterization = parameterization;
     let interval = (f64::from(iterations) * HALVING).round() as u32;
-    training.optimizer.schedule = LearningRateSchedule::Halving(interval.max(1));
+    training.schedule = LearningRateSchedule::Halving(interval.max(1));
     if !d3 {
         training.densification.initial = 1.0;
     }

@@ -4,8 +4,10 @@ mod adam;
 mod bins;
 pub(crate) mod budget;
 mod densify;
+mod gauss_newton;
 mod lsq;
 mod parameterization;
+mod parameters;
 mod pass;
 mod row;
 mod schedule;
@@ -16,10 +18,10 @@ pub(crate) mod vector_quantizer;
 use glam::Vec2;
 use rayon::prelude::*;
 
-use adam::Parameters;
 use budget::Budget;
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
+use parameters::{Parameters, Slope};
 use pass::Pass;
 use row::{Row, RowBounds, shape_of};
 use schedule::TrainingSchedule;
@@ -120,7 +122,7 @@ impl<'a> Fit<'a> {
 
     /// Trains from nothing.
     pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let Training { iterations, densification, optimizer, .. } = self.training;
+        let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
         self.forward(observer)?;
         let first = densification.initial * self.wanted(1.0) as f32;
@@ -131,7 +133,7 @@ impl<'a> Fit<'a> {
             if iteration == plan.quantized_from {
                 self.start_quantization();
             }
-            let factor = optimizer.schedule.factor(iteration, *iterations);
+            let factor = schedule.factor(iteration, *iterations);
             self.iterate(factor, total, plan.is_settled(iteration), observer)?;
             let done = iteration + 1;
             if done % densification.prune_interval == 0 {
@@ -309,11 +311,11 @@ impl<'a> Fit<'a> {
     fn step(&mut self, factor: f32) {
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
-        let options = &self.training.optimizer;
+        let (optimizer, raster) = (&self.training.optimizer, self.raster);
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(options, self.bounds, factor, |index, row, sum| {
+            self.parameters.step(optimizer, self.bounds, factor, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
                 let by_splat = pass.gradient(index, channels);
                 let (center, shape) =
@@ -331,7 +333,8 @@ impl<'a> Fit<'a> {
                 if let Some(quantizers) = quantizers {
                     add(sum, &quantizers.backward(row, &decoded, &mut gradient));
                 }
-                gradient
+                let sensitivity = raster.sensitivity_near([decoded[0], decoded[1]]);
+                Slope { gradient, sensitivity }
             });
         if let Some(quantizers) = &mut self.quantizers {
             // Added in the order of the Gaussians, so that the sum does not depend on the threads.

@@ -1,6 +1,6 @@
 //! Training of the shape in each parameterization (paper, paragraph "2D Gaussian Splatting" of the
-//! section "Methodology"): the gradients, the frames in which steps are taken, and the bounds that
-//! keep shapes valid.
+//! section "Methodology"): the gradients, a Gaussian's own frame, and the bounds that keep shapes
+//! valid.
 
 use glam::{Mat2, Mat3, Vec2, Vec3};
 
@@ -69,41 +69,48 @@ impl GeometrySums {
     }
 }
 
-/// The frame in which the optimizer steps: the change of the centre, or of the shape, is the matrix
-/// of the frame times the optimizer's step, and the gradient by that step is the transposed matrix
-/// times the gradient.
+/// A Gaussian's own frame, in which its centre moves in standard deviations and its shape changes
+/// relative to itself.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct StepFrame {
+pub(crate) struct OwnFrame {
+    /// The Cholesky factor L: the derivative of the centre by its coordinates (u, v) in the frame.
     pub(crate) center: Mat2,
+    /// The derivatives of the three shape values by the logarithms of size and ratio, and by the slant,
+    /// in columns: L becomes L (I + D), where D is the identity for the size, diag(1, -1) for the
+    /// ratio, and 1 in the lower left corner for the slant.
     pub(crate) shape: Mat3,
 }
 
-impl StepFrame {
-    /// [`Units::Absolute`](super::training::Units::Absolute): pixels, and the parameterization's
-    /// own units.
-    pub(crate) const ABSOLUTE: Self = Self { center: Mat2::IDENTITY, shape: Mat3::IDENTITY };
-
-    /// [`Units::Relative`](super::training::Units::Relative), the Gaussian's own frame: the centre
-    /// moves in standard deviations, and the shape changes relative to itself.
-    pub(crate) fn relative(parameterization: Parameterization, values: Vec3) -> Self {
+impl OwnFrame {
+    pub(crate) fn new(parameterization: Parameterization, values: Vec3) -> Self {
         let [l11, l21, l22] = parameterization.to_cholesky(values.into());
         let center = Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22));
+        // The derivatives of the covariance (xx, xy, yy): L (D + D^T) L^T.
+        let by_ratio = 2.0 * Vec3::new(l11 * l11, l11 * l21, l21 * l21 - l22 * l22);
+        let by_slant = Vec3::new(0.0, l11 * l22, 2.0 * l21 * l22);
         let shape = match parameterization {
-            // L becomes L (I + D), with D the lower triangular step.
-            Parameterization::Cholesky => Mat3::from_cols(
-                Vec3::new(l11, l21, 0.0),
-                Vec3::new(0.0, l22, 0.0),
-                Vec3::new(0.0, 0.0, l22),
-            ),
-            Parameterization::Covariance => {
-                let [xx, _, yy] = values.into();
-                Mat3::from_diagonal(Vec3::new(xx, (xx * yy).sqrt(), yy))
+            Parameterization::Cholesky => {
+                Mat3::from_cols(values, Vec3::new(l11, l21, -l22), Vec3::new(0.0, l22, 0.0))
             }
+            Parameterization::Covariance => Mat3::from_cols(2.0 * values, by_ratio, by_slant),
             Parameterization::RotationScale => {
-                // The more the axes differ, the more a rotation changes the picture.
-                let ratio = values.x / values.y;
-                let turn = 1.0 / (ratio - 1.0 / ratio).abs().max(1.0);
-                Mat3::from_diagonal(Vec3::new(values.x, values.y, turn))
+                let (axis1, axis2) = axes(values.z);
+                let [s1, s2, _] = values.into();
+                // The angle of a circle does not matter; near one it would change without bound.
+                let difference = (s1 * s1 - s2 * s2).abs().max(0.1 * s1 * s2).copysign(s1 - s2);
+                let changed = |change: Vec3| {
+                    let change = Mat2::from_cols(
+                        Vec2::new(change.x, change.y),
+                        Vec2::new(change.y, change.z),
+                    );
+                    let along = |a: Vec2, b: Vec2| a.dot(change * b);
+                    Vec3::new(
+                        along(axis1, axis1) / (2.0 * s1),
+                        along(axis2, axis2) / (2.0 * s2),
+                        along(axis1, axis2) / difference,
+                    )
+                };
+                Mat3::from_cols(Vec3::new(s1, s2, 0.0), changed(by_ratio), changed(by_slant))
             }
         };
         Self { center, shape }
@@ -247,6 +254,39 @@ mod tests {
                 prop_assert!(
                     gaussian.is_drawable(),
                     "{parameterization:?} {values:?}: {cholesky:?}"
+                );
+            }
+        }
+    }
+
+    /// In its own frame, a Gaussian changes as a step says: L becomes L (I + D).
+    #[test]
+    fn the_own_frame_has_the_derivatives_of_the_shape() {
+        const STEP: f32 = 1e-3;
+        let (l11, l21, l22) = (3.0, -1.0, 2.0);
+        for parameterization in PARAMETERIZATIONS {
+            let values = from_cholesky(parameterization, [l11, l21, l22]);
+            let frame = OwnFrame::new(parameterization, values);
+            assert!(
+                frame
+                    .center
+                    .abs_diff_eq(Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22)), 1e-5)
+            );
+            // Size, ratio and slant.
+            for (column, [d11, d21, d22]) in
+                [[1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [0.0, 1.0, 0.0]].into_iter().enumerate()
+            {
+                let at = |step: f32| {
+                    let (d11, d21, d22) = (step * d11, step * d21, step * d22);
+                    let changed =
+                        [l11 * (1.0 + d11), l21 * (1.0 + d11) + l22 * d21, l22 * (1.0 + d22)];
+                    from_cholesky(parameterization, changed)
+                };
+                let expected = (at(STEP) - at(-STEP)) / (2.0 * STEP);
+                let found = frame.shape.col(column);
+                assert!(
+                    found.abs_diff_eq(expected, 2e-2),
+                    "{parameterization:?} {column}: {found}, {expected}"
                 );
             }
         }

@@ -29,8 +29,10 @@ pub struct Training {
     pub densification: Densification,
     /// The variance of new Gaussians (the content-aware Gaussian filter, CAF, in the paper).
     pub filter: GaussianFilter,
-    /// The optimizer with its learning rates and their schedule.
+    /// The optimizer with its learning rates.
     pub optimizer: Optimizer,
+    /// How the learning rates fall during training.
+    pub schedule: LearningRateSchedule,
     /// Quantization-aware training (QAT), for [`Precision::Packed`](crate::Precision::Packed) only.
     pub quantization: Quantization,
 }
@@ -152,12 +154,21 @@ pub enum GaussianFilter {
     Constant(f32),
 }
 
-/// The optimizer, Adam, and its learning rates.
+/// The optimizer.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Optimizer {
-    /// The units of the learning rates of centre and shape.
-    pub units: Units,
+pub enum Optimizer {
+    /// Adam (paper).
+    Adam(Adam),
+    /// Gauss-Newton steps with momentum: gradients divided by curvatures.
+    GaussNewton(GaussNewton),
+}
+
+/// Adam (paper). The centre moves in pixels, and the shape changes in the parameterization's own
+/// units.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Adam {
     /// Learning rate of the centre, positive.
     pub center: f32,
     /// Learning rate of the shape, positive.
@@ -170,19 +181,28 @@ pub struct Optimizer {
     pub beta2: f32,
     /// What is added to the square root of the latter, at least 0 (paper: 1e-15).
     pub epsilon: f32,
-    /// How the learning rates fall during training.
-    pub schedule: LearningRateSchedule,
 }
 
-/// The units of the optimizer's steps of centre and shape.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Gauss-Newton steps with momentum: every gradient is divided by the curvature of the squared error
+/// of the Gaussian alone, which integrals of the kernel tell. What overlapping Gaussians do to each
+/// other, the pace of each makes up for: it rises while gradients agree, and falls when they turn
+/// round.
+///
+/// A step is taken in the Gaussian's own frame: its centre moves in standard deviations, and its shape
+/// changes relative to itself. The same rate suits Gaussians of all sizes and colours.
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Units {
-    /// Pixels and the parameterization's own units (paper).
-    Absolute,
-    /// The Gaussian's own frame: the centre in standard deviations, the shape relative to itself.
-    /// The same rate suits Gaussians of all sizes.
-    Relative,
+pub struct GaussNewton {
+    /// Learning rate at first, positive: 1 takes a Gaussian without neighbours to its optimum.
+    pub rate: f32,
+    /// Decay of the moving average of the gradient, in [0, 1).
+    pub momentum: f32,
+    /// What is added to the magnitude of the colour in the curvature by the geometry, positive, where
+    /// a full sample is 1: the geometry of a faint Gaussian is uncertain.
+    pub damping: f32,
+    /// The trust region: the largest change of the geometry in a step, in standard deviations and
+    /// relative to the shape, positive.
+    pub trust_region: f32,
 }
 
 /// How the learning rates fall during training.
@@ -222,13 +242,12 @@ pub struct Quantization {
 impl Training {
     /// The encoder's defaults, tuned for quality in few iterations. Growth is early, in many steps
     /// and beyond the budget; new Gaussians are spread by the distortion, and the surplus is culled
-    /// by importance. The optimizer steps in each Gaussian's own frame, and the learning rates fall
-    /// to 0.
+    /// by importance. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
-        let steps = (iterations / 30).clamp(20, 160);
+        let steps = (iterations / 15).clamp(10, 160);
         // A long run gains more from iterations after growth.
-        let (end, culled) = if iterations > 2_400 { (0.4, 0.5) } else { (0.5, 0.65) };
+        let (end, culled) = if iterations > 1_200 { (0.4, 0.5) } else { (0.5, 0.6) };
         Self {
             iterations,
             kernel: Kernel::Quartic,
@@ -240,25 +259,21 @@ impl Training {
                 portion: Portion::Even,
                 surplus: 0.3,
                 culled,
-                replaced: (2.0 / steps as f32).max(0.05),
+                replaced: (4.0 / steps as f32).clamp(0.05, 0.2),
                 distortion: Distortion::L3,
                 placement: Placement::Spread,
-                color: NewColor::Residual(0.1),
+                color: NewColor::Residual(0.3),
                 shape: NewShape::Point,
                 prune_interval: 25,
             },
             filter: GaussianFilter::PAPER,
-            optimizer: Optimizer {
-                units: Units::Relative,
-                center: 0.1,
-                shape: 0.1,
-                // In a short run, the colours have fewer steps to converge.
-                color: 0.015 * (300.0 / iterations.max(1) as f32).clamp(1.0, 4.0).sqrt(),
-                beta1: 0.9,
-                beta2: 0.99,
-                epsilon: 1e-15,
-                schedule: LearningRateSchedule::Linear(0.6),
-            },
+            optimizer: Optimizer::GaussNewton(GaussNewton {
+                rate: 1.0,
+                momentum: 0.7,
+                damping: 0.02,
+                trust_region: 0.2,
+            }),
+            schedule: LearningRateSchedule::Linear(0.7),
             quantization: Quantization {
                 warm_up: 0.6,
                 position_bits: 12,
@@ -296,16 +311,15 @@ impl Training {
                 prune_interval: 100,
             },
             filter: GaussianFilter::PAPER,
-            optimizer: Optimizer {
-                units: Units::Absolute,
+            optimizer: Optimizer::Adam(Adam {
                 center: 0.18,
                 shape: 0.18,
                 color: 0.18,
                 beta1: 0.9,
                 beta2: 0.999,
                 epsilon: 1e-15,
-                schedule: LearningRateSchedule::Halving(20_000),
-            },
+            }),
+            schedule: LearningRateSchedule::Halving(20_000),
             quantization: Quantization {
                 warm_up: 0.12,
                 position_bits: 12,
@@ -323,7 +337,15 @@ impl Training {
         let share = |value: f32| value > 0.0 && value <= 1.0;
         let positive = |value: f32| value > 0.0 && value.is_finite();
         let depth = |bits: u8| (1..=16).contains(&bits);
-        let Self { densification: d, optimizer: o, quantization: q, .. } = self;
+        let Self { densification: d, quantization: q, .. } = self;
+        let (rates, decays, epsilon) = match &self.optimizer {
+            Optimizer::Adam(adam) => {
+                ([adam.center, adam.shape, adam.color], [adam.beta1, adam.beta2], adam.epsilon)
+            }
+            Optimizer::GaussNewton(o) => {
+                ([o.rate, o.damping, o.trust_region], [o.momentum, 0.0], 0.0)
+            }
+        };
         let rules = [
             (self.iterations >= 1, "iterations must be at least 1"),
             (share(d.initial), "densification.initial must be in (0, 1]"),
@@ -344,16 +366,16 @@ impl Training {
                 "filter must be finite, its alpha and cap positive, and not negative",
             ),
             (
-                [o.center, o.shape, o.color, q.learning_rate].into_iter().all(positive),
-                "learning rates must be positive and finite",
+                rates.into_iter().all(positive) && positive(q.learning_rate),
+                "learning rates, damping and trust_region must be positive and finite",
             ),
             (
-                [o.beta1, o.beta2].iter().all(|beta| (0.0..1.0).contains(beta)),
-                "beta1 and beta2 must be in [0, 1)",
+                decays.iter().all(|decay| (0.0..1.0).contains(decay)),
+                "beta1, beta2 and momentum must be in [0, 1)",
             ),
-            (o.epsilon >= 0.0 && o.epsilon.is_finite(), "epsilon must be finite, not negative"),
+            (epsilon >= 0.0 && epsilon.is_finite(), "epsilon must be finite, not negative"),
             (
-                o.schedule != LearningRateSchedule::Halving(0),
+                self.schedule != LearningRateSchedule::Halving(0),
                 "the halving interval must be at least 1",
             ),
             (share(q.warm_up), "quantization.warm_up must be in (0, 1]"),

@@ -1,19 +1,8 @@
 //! A quadratic model of the squared error as a function of a small change of a Gaussian's geometry.
-//!
-//! Changes are measured in the Gaussian's own frame: with its Cholesky factor L and its centre m, a
-//! point p has the coordinates (u, v) = L^-1 (p - m), and q = u^2 + v^2. When the area of a
-//! Gaussian changes, its colour changes too, such that its strength, colour times the square root
-//! of the area, and with it the sum of its squares, remains the same. That is how the codes store
-//! colours.
+//! The curvatures, and the frame in which changes are measured, are those of `encode/curvature.rs`.
 
+use crate::encode::curvature::{POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::Gaussian;
-
-/// Half of the second derivatives of the squared error by the components of a [`GeometryChange`],
-/// for a Gaussian of strength 1: integrals of the derivatives of the quartic kernel (1 - q/4)^2.
-const POSITION: f32 = 2.094_395;
-const SIZE: f32 = 4.188_79;
-const RATIO: f32 = 3.351_032;
-const SLANT: f32 = 0.837_758;
 
 /// A change of a Gaussian's geometry, or a gradient by its components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

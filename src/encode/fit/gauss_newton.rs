@@ -1,0 +1,190 @@
+//! A Gauss-Newton step with momentum.
+//!
+//! The curvature is that of a Gaussian alone. Those that overlap take their steps at the same time, and
+//! together they would go too far, or, where they share the way, not far enough. So every Gaussian has
+//! a pace of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
+//! falls when they turn round (as in Rprop; Riedmiller and Braun, 1993).
+
+use glam::{Vec2, Vec3};
+
+use super::parameterization::OwnFrame;
+use super::parameters::{Slope, State};
+use super::row::{Row, RowBounds, shape_of};
+use super::training::GaussNewton;
+use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
+use crate::gaussian::MAX_COMPONENTS;
+
+/// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
+/// all of them would take the same step, and never come to rest.
+pub(super) const FIRST_PACE: f32 = 0.4;
+/// The change of the pace, and its range.
+const FASTER: f32 = 1.2;
+const SLOWER: f32 = 0.85;
+const LEAST_PACE: f32 = 0.1;
+const MOST_PACE: f32 = 4.0;
+
+/// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
+/// the centre, the logarithms of size and ratio, the slant, and the colour.
+pub(super) fn step(
+    row: &mut Row,
+    state: &mut State,
+    slope: &Slope,
+    options: &GaussNewton,
+    bounds: RowBounds,
+    factor: f32,
+) {
+    let frame = OwnFrame::new(bounds.parameterization, shape_of(row));
+    let mut gradient = slope.gradient;
+    let center = frame.center.transpose() * Vec2::from_slice(&gradient);
+    let mut shape = frame.shape.transpose() * shape_of(&gradient);
+    // The colour falls as the size grows.
+    let colors = row[5..].iter().zip(&gradient[5..]);
+    shape.x -= colors.map(|(color, gradient)| color * gradient).sum::<f32>();
+    gradient[..2].copy_from_slice(&center.to_array());
+    gradient[2..5].copy_from_slice(&shape.to_array());
+
+    let area = frame.center.determinant() * slope.sensitivity;
+    let squared_color = row[5..].iter().map(|color| color * color).sum::<f32>();
+    let squared_strength = (squared_color + options.damping * options.damping) * area;
+    let curvatures: Row = [
+        POSITION * squared_strength,
+        POSITION * squared_strength,
+        SIZE * squared_strength,
+        RATIO * squared_strength,
+        SLANT * squared_strength,
+        COLOR * area,
+        COLOR * area,
+        COLOR * area,
+        COLOR * area,
+    ];
+    let momentum = options.momentum;
+    let agreement: f32 = (0..MAX_COMPONENTS)
+        .map(|index| state.mean[index] * gradient[index] / curvatures[index])
+        .sum();
+    // Before the first step there is nothing to agree with.
+    if state.age > 0 {
+        let change = if agreement < 0.0 { SLOWER } else { FASTER };
+        state.pace = (state.pace * change).clamp(LEAST_PACE, MOST_PACE);
+    }
+    let rate = options.rate * state.pace * factor / (1.0 - momentum.powi(state.aged()));
+    let mut steps = [0.0; MAX_COMPONENTS];
+    for index in 0..MAX_COMPONENTS {
+        let mean = &mut state.mean[index];
+        *mean = momentum * *mean + (1.0 - momentum) * gradient[index];
+        steps[index] = rate * *mean / curvatures[index];
+    }
+    let trusted = |step: f32| step.clamp(-options.trust_region, options.trust_region);
+    let center = frame.center * Vec2::from_slice(&steps).map(trusted);
+    let by_shape = shape_of(&steps).map(trusted);
+    let shape: Vec3 = shape_of(row) - frame.shape * by_shape;
+    row[0] -= center.x;
+    row[1] -= center.y;
+    row[2..5].copy_from_slice(&shape.to_array());
+    let faded = by_shape.x.exp();
+    for (value, step) in row[5..].iter_mut().zip(&steps[5..]) {
+        *value = *value * faded - step;
+    }
+    *row = bounds.clamped(*row);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::{Gaussian, Parameterization};
+
+    const OPTIONS: GaussNewton =
+        GaussNewton { rate: 1.0, momentum: 0.7, damping: 1e-3, trust_region: 0.2 };
+    const CHANNELS: usize = 1;
+    /// Pixels in a row or column, and for each unit of length.
+    const SIDE: i32 = 96;
+    const DENSITY: f32 = 2.0;
+
+    fn bounds(parameterization: Parameterization) -> RowBounds {
+        let length = SIDE as f32 / DENSITY;
+        RowBounds { parameterization, channels: CHANNELS, size: Vec2::splat(length) }
+    }
+
+    /// The quartic kernel of a row at all pixels.
+    fn rendering(row: &Row, parameterization: Parameterization) -> Vec<f64> {
+        let Gaussian { center, cholesky, color } =
+            Gaussian::from_components(&row[..5 + CHANNELS], parameterization);
+        let [l11, l21, l22] = cholesky.map(f64::from);
+        let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
+        pixels
+            .map(|(x, y)| {
+                let at = |pixel: i32| (f64::from(pixel) + 0.5) / f64::from(DENSITY);
+                let u = (at(x) - f64::from(center[0])) / l11;
+                let v = (at(y) - f64::from(center[1]) - l21 * u) / l22;
+                f64::from(color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
+            })
+            .collect()
+    }
+
+    /// Half of the squared error per unit of area.
+    fn loss(row: &Row, source: &[f64], parameterization: Parameterization) -> f64 {
+        let rendering = rendering(row, parameterization);
+        let squares = rendering.iter().zip(source).map(|(value, source)| (value - source).powi(2));
+        0.5 * squares.sum::<f64>() / f64::from(DENSITY * DENSITY)
+    }
+
+    fn gradient(row: &Row, source: &[f64], parameterization: Parameterization) -> Row {
+        let mut gradient = [0.0; MAX_COMPONENTS];
+        for (index, value) in gradient.iter_mut().enumerate().take(5 + CHANNELS) {
+            let at = |step: f32| {
+                let mut row = *row;
+                row[index] += step;
+                loss(&row, source, parameterization)
+            };
+            *value = ((at(1e-2) - at(-1e-2)) / 2e-2) as f32;
+        }
+        gradient
+    }
+
+    #[test]
+    fn a_gaussian_alone_comes_to_its_optimum() {
+        for parameterization in [Parameterization::Covariance, Parameterization::Cholesky] {
+            let from = |[l11, l21, l22]: [f32; 3], center: [f32; 2], color: f32| {
+                let shape = super::super::parameterization::from_cholesky(
+                    parameterization,
+                    [l11, l21, l22],
+                );
+                [center[0], center[1], shape.x, shape.y, shape.z, color, 0.0, 0.0, 0.0]
+            };
+            let optimum = from([5.0, -2.0, 3.0], [24.0, 22.0], 0.5);
+            let source = rendering(&optimum, parameterization);
+            let mut row = from([4.0, 0.0, 4.0], [25.5, 21.0], 0.1);
+            let before = loss(&row, &source, parameterization);
+            let mut state = State::NEW;
+            for _ in 0..40 {
+                let gradient = gradient(&row, &source, parameterization);
+                let slope = Slope { gradient, sensitivity: 1.0 };
+                step(&mut row, &mut state, &slope, &OPTIONS, bounds(parameterization), 1.0);
+            }
+            let after = loss(&row, &source, parameterization);
+            assert!(after < 1e-3 * before, "{parameterization:?}: {before}, {after}, {row:?}");
+            assert!(row.iter().zip(optimum).all(|(a, b)| (a - b).abs() < 0.1), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn the_pace_rises_with_agreement_and_falls_with_contradiction() {
+        let mut row = [24.0, 24.0, 3.0, 0.0, 3.0, 0.5, 0.0, 0.0, 0.0];
+        let mut state = State::NEW;
+        let mut paced = |by_color: f32| {
+            let mut gradient = [0.0; MAX_COMPONENTS];
+            gradient[5] = by_color;
+            let slope = Slope { gradient, sensitivity: 1.0 };
+            let bounds = bounds(Parameterization::Cholesky);
+            step(&mut row, &mut state, &slope, &OPTIONS, bounds, 0.01);
+            state.pace
+        };
+        let paces = [1.0, 1.0, 1.0, -9.0, 9.0].map(&mut paced);
+        assert_eq!(paces[0], FIRST_PACE);
+        assert!(paces[0] < paces[1] && paces[1] < paces[2], "{paces:?}");
+        assert!(paces[2] > paces[3] && paces[3] > paces[4], "{paces:?}");
+        for _ in 0..50 {
+            paced(9.0);
+        }
+        assert_eq!(paced(9.0), MOST_PACE);
+    }
+}
