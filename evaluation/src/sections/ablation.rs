@@ -21,7 +21,7 @@ const QUICK_GAUSSIANS: u32 = 2_500;
 const CURVE: [u32; 4] = [1_500, 2_500, 4_000, 6_500];
 const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
 /// Iterations of our encoder for bit depths and seeds.
-const OWN_ITERATIONS: u32 = 600;
+const OWN_ITERATIONS: u32 = 320;
 const QUICK_OWN_ITERATIONS: u32 = 150;
 /// How many pictures: for components and seeds, and for the tables with more settings.
 const PICTURES: usize = 8;

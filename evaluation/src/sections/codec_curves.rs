@@ -21,7 +21,7 @@ pub(super) struct Variant {
 }
 
 /// Rates to ask an encoder for.
-pub(super) const RATES: &[Target] = &[
+const RATES: &[Target] = &[
     Target::BitsPerPixel(0.1),
     Target::BitsPerPixel(0.15),
     Target::BitsPerPixel(0.25),
@@ -53,6 +53,7 @@ pub(super) fn setting(target: Target) -> String {
     let target = match target {
         Target::BitsPerPixel(rate) => format!("{rate} bpp"),
         Target::Quality(quality) => format!("quality {quality}"),
+        Target::Lambda(lambda) => format!("lambda {lambda}"),
         other => format!("{other:?}"),
     };
     format!("{target}, effort {}", gip::EFFORT)
