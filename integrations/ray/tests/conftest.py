@@ -19,6 +19,8 @@ os.environ |= {
     "RAY_DISABLE_DOCKER_CPU_WARNING": "1",
     "RAY_DISABLE_IMPORT_WARNING": "1",
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    # As by default on Windows and macOS: no name but that of the loopback address.
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
 }
 

@@ -206,12 +206,8 @@ def test_decoding_shards(container: Container, manifest: Path, tmp_path: Path) -
     arguments: dict[str, Any] = {"operation": "decode", "options": {"format": "png"}}
     out = run_serially(inputs, tmp_path / "out", **arguments)
     (name,) = contents(out)
-    decoded = dict(
-        zip(
-            *pyarrow.parquet.read_table(out / name)[["key", "bytes"]].to_pydict().values(),
-            strict=True,
-        )
-    )
+    rows = pyarrow.parquet.read_table(out / name).to_pylist()
+    decoded = {row["key"]: row["bytes"] for row in rows}
     files = dict(containers.pictures(inputs[0]))
     assert list(files) == list(decoded)
     assert len(files) == 9

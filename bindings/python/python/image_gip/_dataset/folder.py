@@ -87,23 +87,24 @@ def begin(folder: Path, plan: Mapping[str, Any]) -> None:
     Raises:
         ValueError: It holds something else.
     """
-    (folder / _ERRORS).mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     path = folder / _PLAN
     try:
         known = json.loads(path.read_bytes())
     except FileNotFoundError:
         remove_leftovers(folder)
-        if any(entry.name != _ERRORS for entry in folder.iterdir()):
+        if any(folder.iterdir()):
             raise ValueError(f"{folder}: not empty, and not the result of an earlier run") from None
         with replacing(path) as file:
             file.write(json.dumps(plan, indent=2).encode() + b"\n")
-        return
+        known = plan
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     if known != plan:
-        names = [
+        differing = [
             name for name in plan if not isinstance(known, dict) or known.get(name) != plan[name]
         ]
         raise ValueError(
-            f"{folder}: holds a result with other {', '.join(names)}; choose another folder"
+            f"{folder}: holds a result with other {', '.join(differing)}; choose another folder"
         )
+    (folder / _ERRORS).mkdir(exist_ok=True)

@@ -6,7 +6,7 @@ import errno
 import io
 import re
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal
@@ -73,15 +73,14 @@ class Job:
             return
         errors: list[dict[str, str]] = []
         with replacing(target) as file:
-            writer = self._writer(file)
-            for key, path, load in self._pictures(shard):
-                try:
-                    picture = _OPERATIONS[self.operation](load(), **self.options)
-                except _BadPictureError as error:
-                    errors.append({"key": key, "path": path, "error": str(error)})
-                else:
-                    writer.add(key, picture)
-            writer.close()
+            with closing(self._writer(file)) as writer:
+                for key, path, load in self._pictures(shard):
+                    try:
+                        picture = _OPERATIONS[self.operation](load(), **self.options)
+                    except _BadPictureError as error:
+                        errors.append({"key": key, "path": path, "error": str(error)})
+                    else:
+                        writer.add(key, picture)
             # First, as a shard that is there is one that is done.
             write_errors(target, errors)
 
