@@ -104,14 +104,14 @@ def test_the_module_is_light() -> None:
 
 def test_the_recipes_run(cluster: Cluster, tmp_path: Path) -> None:
     assert len(RECIPES) == 2
-    (tmp_path / "photos").mkdir()
-    for index in range(3):
-        draw(index).save(tmp_path / "photos" / f"{index}.png")
-    names = "".join(f"photos/{index}.png\n" for index in range(3))
-    (tmp_path / "photos.txt").write_text(names)
     environment = os.environ | {"RAY_ADDRESS": cluster.address}
-    # The second finds what the first has made.
-    for code in RECIPES:
-        subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, check=True)
-    assert list((tmp_path / "encoded").glob("*.parquet"))
-    assert list((tmp_path / "thumbnails").glob("*.tar"))
+    for number, code in enumerate(RECIPES):
+        room = tmp_path / f"{number}"
+        (room / "photos").mkdir(parents=True)
+        names = [f"photos/{index}.png" for index in range(3)]
+        for index, name in enumerate(names):
+            draw(index).save(room / name)
+        (room / "photos.txt").write_text("".join(f"{name}\n" for name in names))
+        subprocess.run([sys.executable, "-c", code], cwd=room, env=environment, check=True)
+        assert list((room / "encoded").glob("*.parquet"))
+        assert list((room / "thumbnails").glob("*.tar"))

@@ -26,7 +26,7 @@ address, manifest, out, arguments = sys.argv[1:]
 ray.init(address, log_to_driver=False, logging_level="error")
 ray.data.DataContext.get_current().enable_progress_bars = False
 summary = image_gip.ray.encode_dataset(manifest, out, **json.loads(arguments))
-print(summary.shards, summary.skipped, summary.bad)
+print("\\nsummary", summary.shards, summary.skipped, summary.bad)
 """
 
 
@@ -40,7 +40,9 @@ def finish(driver: subprocess.Popen[str]) -> tuple[int, int, int]:
     """The shards, those that were skipped, and the bad pictures."""
     output, _ = driver.communicate(timeout=PATIENCE)
     assert driver.returncode == 0
-    shards, skipped, bad = map(int, output.split())
+    # Ray prints as well.
+    (line,) = [line for line in output.splitlines() if line.startswith("summary ")]
+    shards, skipped, bad = map(int, line.split()[1:])
     return shards, skipped, bad
 
 
