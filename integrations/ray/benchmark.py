@@ -1,14 +1,15 @@
 """Measures how long image_gip.ray takes beside `gip batch`, with the same number of cores.
 
-    python benchmark.py PICTURE... [--gip ../../target/release/gip] [--copies 2] [--rounds 2]
+    python benchmark.py PICTURE... [--gip ../../target/release/gip] [--cores 2] [--rounds 3]
 
-Both encode the pictures with two cores, in turns. The cluster is running before, with its workers
+Both encode the pictures with as many cores, in turns. The cluster runs before, with its workers
 warmed up by a run that is not counted; what it takes to start is reported by itself.
 """
 
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import shutil
 import statistics
@@ -16,6 +17,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pyarrow.parquet
@@ -24,7 +26,6 @@ import ray.data
 
 import image_gip.ray
 
-CORES = 2
 SHARD_SIZE = 4
 
 
@@ -34,14 +35,14 @@ def seconds(task: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def connect() -> None:
+def connect(cores: int) -> None:
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     ray.init(
-        num_cpus=CORES,
+        num_cpus=cores,
         include_dashboard=False,
         object_store_memory=80 << 20,
         log_to_driver=False,
-        logging_level="error",
+        logging_level=logging.ERROR,
         _node_ip_address="127.0.0.1",
     )
     ray.data.DataContext.get_current().enable_progress_bars = False
@@ -51,8 +52,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("pictures", nargs="+", type=Path)
     parser.add_argument("--gip", type=Path, default=Path("../../target/release/gip"))
-    parser.add_argument("--copies", type=int, default=2)
-    parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--copies", type=int, default=1)
+    parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--effort", type=int, default=1)
     arguments = parser.parse_args()
 
@@ -66,23 +68,23 @@ def main() -> None:
         pictures = sorted(photos.iterdir())
 
         def batch(out: Path) -> None:
-            options = ["--jobs", f"{CORES}", "--effort", f"{arguments.effort}"]
+            options = ["--jobs", f"{arguments.cores}", "--effort", f"{arguments.effort}"]
             command = [arguments.gip, "batch", photos, "--out", out, "--bpp", "0.5", *options]
-            subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+            subprocess.run(command, check=True, capture_output=True)
 
         def on_ray(out: Path, pictures: list[Path] = pictures) -> None:
             image_gip.ray.encode_dataset(
                 pictures, out, shard_size=SHARD_SIZE, bpp=0.5, effort=arguments.effort
             )
 
-        print(f"start of a node: {seconds(connect):.1f} s")
-        warm = seconds(lambda: on_ray(scratch / "warm", pictures[: CORES * SHARD_SIZE]))
-        print(f"first {CORES * SHARD_SIZE} pictures: {warm:.1f} s")
+        print(f"start of a node: {seconds(partial(connect, arguments.cores)):.1f} s")
+        few = pictures[: arguments.cores * SHARD_SIZE]
+        print(f"first {len(few)} pictures: {seconds(partial(on_ray, scratch / 'few', few)):.1f} s")
         ratios = []
         for turn in range(arguments.rounds):
             times = [
-                seconds(lambda turn=turn: batch(scratch / f"batch-{turn}")),
-                seconds(lambda turn=turn: on_ray(scratch / f"ray-{turn}")),
+                seconds(partial(batch, scratch / f"batch-{turn}")),
+                seconds(partial(on_ray, scratch / f"ray-{turn}")),
             ]
             ratios.append(times[1] / times[0])
             print(f"{len(pictures)} pictures: gip batch {times[0]:.1f} s, Ray {times[1]:.1f} s")

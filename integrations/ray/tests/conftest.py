@@ -131,4 +131,4 @@ def cluster() -> Iterator[Cluster]:
         add_worker(cluster)
         yield cluster
     finally:
-        cluster.shutdown()
+        cluster.shutdown()  # type: ignore[no-untyped-call]

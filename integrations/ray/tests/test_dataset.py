@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import subprocess
@@ -14,7 +15,7 @@ import ray
 from conftest import OPTIONS, contents, draw, make_pictures, run_serially
 from ray.cluster_utils import Cluster
 
-import image_gip.ray
+from image_gip._dataset import folder
 from image_gip.ray import Summary, decode_dataset, encode_dataset, thumbnail_dataset
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -28,7 +29,7 @@ RECIPES = [
 
 @pytest.fixture
 def connected(cluster: Cluster) -> Iterator[None]:
-    ray.init(cluster.address, log_to_driver=False, logging_level="error")
+    ray.init(cluster.address, log_to_driver=False, logging_level=logging.ERROR)
     try:
         yield
     finally:
@@ -89,7 +90,7 @@ def test_wrong_arguments_are_refused_at_once(tmp_path: Path) -> None:
 def test_other_options_need_another_folder(tmp_path: Path) -> None:
     draw(1).save(tmp_path / "a.png")
     out = tmp_path / "out"
-    image_gip.ray.folder.begin(out, {"operation": "encode", "options": OPTIONS})
+    folder.begin(out, {"operation": "encode", "options": OPTIONS})
     with pytest.raises(ValueError, match="other image_gip, options, container"):
         encode_dataset([tmp_path / "a.png"], out, effort=2)
 

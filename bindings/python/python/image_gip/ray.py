@@ -31,6 +31,7 @@ import contextlib
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -99,7 +100,7 @@ def encode_dataset(
         ray.exceptions.RayError: A task has failed for another reason than its node or a picture.
     """
     targets = {"bpp": bpp, "bytes": bytes, "quality": quality, "psnr": psnr, "gaussians": gaussians}
-    options = {name: value for name, value in targets.items() if value is not None}
+    options: dict[str, Any] = {name: v for name, v in targets.items() if v is not None}
     options |= {"effort": effort, "tune": tune, "seed": seed}
     _check_encoder_options(options)
     return _run("encode", options, pictures, out_uri, container, shard_size)
@@ -212,12 +213,12 @@ def _perform(job: Job, missing: list[Shard]) -> None:
         return
     # A block per shard: a task takes a block.
     dataset = ray.data.from_items(missing, override_num_blocks=len(missing))
-    done = dataset.map(_task, fn_kwargs={"job": job}, num_cpus=1)
+    done = dataset.map(partial(_task, job), num_cpus=1)
     for _ in done.iter_batches(batch_size=None):
         pass
 
 
-def _task(row: dict[str, Any], job: Job) -> dict[str, Any]:
+def _task(job: Job, row: dict[str, Any]) -> dict[str, Any]:
     shard: Shard = {
         "name": str(row["name"]),
         "keys": [str(key) for key in row["keys"]],

@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, Literal
 
@@ -94,10 +95,10 @@ class Job:
         if self.packed:
             (path,) = shard["paths"]
             for key, data in containers.pictures(Path(path)):
-                yield key, path, lambda data=data: data
+                yield key, path, partial(bytes, data)
         else:
             for key, path in zip(shard["keys"], shard["paths"], strict=True):
-                yield key, path, lambda path=path: _read(path)
+                yield key, path, partial(_read, path)
 
 
 class _BadPictureError(Exception):
