@@ -114,9 +114,9 @@ def add_worker(cluster: Cluster) -> Any:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def cluster() -> Iterator[Cluster]:
-    """A head without cores, and two workers."""
+    """A head without cores, and two workers. A test that takes one away adds another."""
     cluster = Cluster(
         initialize_head=True,
         head_node_args={
