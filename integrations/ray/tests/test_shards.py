@@ -73,6 +73,7 @@ def test_manifests(tmp_path: Path) -> None:
         ('{"path": "a.png", "key": "/a"}', "relative"),
         ('{"path": "a.png", "key": ""}', "relative"),
         ('{"path": "a.png", "key": "a\\nb"}', "control"),
+        ('{"path": "a\\u0000", "key": "a"}', "cannot be a path"),
         ('{"path": "s3://bucket/a.png"}', "only paths and file:/// URIs are supported"),
         ('{"path": "file://host/a.png"}', "only paths"),
         ('{"path": "a.tar"}\n{"path": "b.png"}', "is not a shard"),
@@ -154,7 +155,8 @@ def test_bad_pictures(tmp_path: Path) -> None:
     for name, data in pictures.items():
         (tmp_path / name).write_bytes(data)
     (tmp_path / "folder.png").mkdir()
-    bad = [*list(pictures)[:-1], "folder.png", "missing.png"]
+    os.mkfifo(tmp_path / "pipe.png")
+    bad = [*list(pictures)[:-1], "folder.png", "pipe.png", "missing.png"]
     paths = [tmp_path / name for name in [*bad, "good.png"]]
     runs = [run_serially(paths, tmp_path / name) for name in ("first", "second")]
     assert contents(runs[0]) == contents(runs[1])

@@ -18,6 +18,7 @@ from image_gip._dataset.folder import local_path
 _JSON_LINES = {".jsonl", ".ndjson"}
 #: Suffixes of shards.
 _PACKED = {".parquet", ".tar"}
+_NO_PATH = re.compile(r"[\x00\ud800-\udfff]")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")
 
 Pictures = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -109,6 +110,8 @@ def _parse(line: str) -> tuple[str, str | None]:
 
 
 def _entry(name: str, key: str | None, base: Path, place: str) -> _Entry:
+    if _NO_PATH.search(name):
+        raise ValueError(f"{place}: {name!r} cannot be a path: that is text in UTF-8 without NUL")
     path = local_path(name)
     if key is None:
         # The path as it was given, as the name of a WebDataset sample: it ends at the first dot.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import re
+import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -35,7 +36,7 @@ _FORMATS = (
 )
 #: Errors that belong to a path. With others, such as those of a disk, the shard is not made.
 _BAD_PATH = {
-    *(errno.ENOENT, errno.ENOTDIR, errno.EISDIR),
+    *(errno.ENOENT, errno.ENOTDIR),
     *(errno.EACCES, errno.ELOOP, errno.ENAMETOOLONG),
 }
 #: How lossy formats are written.
@@ -107,6 +108,9 @@ class _BadPictureError(Exception):
 
 def _read(path: str) -> bytes:
     try:
+        # A pipe or a device may have no end.
+        if not stat.S_ISREG(Path(path).stat().st_mode):
+            raise _BadPictureError("not a regular file")
         return Path(path).read_bytes()
     except OSError as error:
         if error.errno not in _BAD_PATH:
