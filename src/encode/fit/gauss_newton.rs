@@ -19,9 +19,9 @@ use crate::gaussian::MAX_COMPONENTS;
 pub(super) const FIRST_PACE: f32 = 0.4;
 /// The change of the pace, and its range.
 const FASTER: f32 = 1.2;
-const SLOWER: f32 = 0.85;
-const LEAST_PACE: f32 = 0.1;
-const MOST_PACE: f32 = 4.0;
+const SLOWER: f32 = 0.8;
+const LEAST_PACE: f32 = 0.02;
+const MOST_PACE: f32 = 3.0;
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
 /// the centre, the logarithms of size and ratio, the slant, and the colour.

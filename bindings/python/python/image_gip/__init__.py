@@ -1,7 +1,8 @@
 """Decodes and encodes ``.gip``: pictures stored as two-dimensional Gaussians.
 
 ``decode`` gives a NumPy array, at any size, of the whole picture or a part of it; ``encode`` makes
-a file of one. With ``image_gip.register()``, Pillow opens and saves ``.gip``.
+a file of one. With ``image_gip.register()``, Pillow opens and saves ``.gip``; and
+``image_gip.ray`` encodes and decodes data sets on a cluster.
 """
 
 from image_gip._errors import (
