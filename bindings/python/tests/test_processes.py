@@ -160,8 +160,10 @@ def bytes_in_use() -> int:
 
 
 def assert_no_leak(work: Callable[[], object], times: int) -> None:
-    """Calls of `work` leave nothing behind once the interpreter's caches are full: a leak shows in
-    every round, a cache that fills up late in one or two."""
+    """Calls of `work` leave nothing behind once the interpreter's caches are full.
+
+    A leak shows in every round, a cache that fills up late in one or two.
+    """
     for _ in range(500):
         work()
     growths = []

@@ -1,7 +1,7 @@
 //! A step of Adam (paper, appendix, section "Implementation Details").
 
-use super::parameters::State;
 use super::row::{Row, RowBounds};
+use super::state::State;
 use super::training::Adam;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 

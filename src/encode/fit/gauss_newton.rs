@@ -8,15 +8,12 @@
 use glam::{Vec2, Vec3};
 
 use super::parameterization::OwnFrame;
-use super::parameters::{Slope, State};
 use super::row::{Row, RowBounds, shape_of};
+use super::state::{Slope, State};
 use super::training::GaussNewton;
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;
 
-/// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
-/// all of them would take the same step, and never come to rest.
-pub(super) const FIRST_PACE: f32 = 0.4;
 /// The change of the pace, and its range.
 const FASTER: f32 = 1.2;
 const SLOWER: f32 = 0.8;
@@ -90,6 +87,7 @@ pub(super) fn step(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::fit::state::FIRST_PACE;
     use crate::gaussian::{Gaussian, Parameterization};
 
     const OPTIONS: GaussNewton =
