@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::bins::{RowBins, TileRow};
 use super::parameterization::GeometrySums;
-use super::training_tile::{RenderingError, Slot, TrainingTile, slots_per_span};
+use super::training_tile::{RenderingError, Slot, TileState, TrainingTile, slots_per_span};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
@@ -242,7 +242,7 @@ impl Pass {
                         splats,
                         indices,
                     };
-                    states.resize(indices.len(), [[0.0; TILE_WIDTH]; TILE_HEIGHT]);
+                    states.resize(indices.len(), TileState::ZERO);
                     let residual = residual.try_into().expect("a tile has all channels");
                     *error = *error + tile.run(level, kernel, &mut states, slots, residual);
                 }

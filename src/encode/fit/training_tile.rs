@@ -1,11 +1,15 @@
 //! One tile of the training pass, in SIMD code: rendering, residuals and gradient sums.
+//!
+//! The rendering of a tile stays in registers where there are 32 of them. Products are added with a
+//! single rounding, so that all machines get the same bits; those without such an instruction (x86
+//! before 2013) emulate it, and take longer.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
 use crate::encode::raster::{FULL_SCALE, SamplePlane, TILE_WIDTH, TilePlane, centers};
 use crate::encode::sensitivity::Sensitivity;
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -19,18 +23,38 @@ pub(super) const fn slots_per_span(channels: usize) -> usize {
     (5 + channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
 }
 
+/// What the backward pass needs to know of a splat at each pixel of a tile.
+#[repr(align(64))]
+#[derive(Clone, Copy)]
+pub(super) struct TileState(TilePlane);
+
+impl TileState {
+    pub(super) const ZERO: Self = Self([[0.0; TILE_WIDTH]; TILE_HEIGHT]);
+}
+
 /// A kernel and its derivative.
 trait TrainingKernel: Copy {
+    /// The factor on distances that makes the kernel's formula short.
+    const SCALE: f32;
+    /// The part of the kernel that depends on u only, which all points of a column share.
+    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S>;
     /// The state to keep per pixel for the backward pass, and the weight.
-    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>);
+    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>);
     /// The weight and the slope, -2 dweight/dq, from the state.
     fn backward<S: Simd>(self, state: f32x16<S>) -> (f32x16<S>, f32x16<S>);
 }
 
 impl TrainingKernel for simd_kernel::Exponential {
+    const SCALE: f32 = 1.0;
+
     #[inline(always)]
-    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let weight = self.at(simd, q);
+    fn column<S: Simd>(self, _: S, u: f32x16<S>) -> f32x16<S> {
+        u * u
+    }
+
+    #[inline(always)]
+    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let weight = self.at(simd, v.mul_add_precise(v, column));
         (weight, weight)
     }
 
@@ -41,15 +65,23 @@ impl TrainingKernel for simd_kernel::Exponential {
 }
 
 impl TrainingKernel for simd_kernel::Quartic {
+    // 1 - q / 4 is then 1 - u^2 - v^2.
+    const SCALE: f32 = 1.0 / QUARTIC_RADIUS;
+
     #[inline(always)]
-    fn forward<S: Simd>(self, simd: S, q: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let t = self.root(simd, q);
-        (t, t * t)
+    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S> {
+        (-u).mul_add_precise(u, f32x16::splat(simd, 1.0))
     }
 
     #[inline(always)]
-    fn backward<S: Simd>(self, t: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        (t * t, t)
+    fn forward<S: Simd>(self, _: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let root = (-v).mul_add_precise(v, column).max(0.0);
+        (root, root * root)
+    }
+
+    #[inline(always)]
+    fn backward<S: Simd>(self, root: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        (root * root, root)
     }
 }
 
@@ -103,7 +135,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
         &self,
         level: Level,
         kernel: Kernel,
-        states: &mut [TilePlane],
+        states: &mut [TileState],
         slots: &mut [Slot],
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
@@ -124,97 +156,112 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
         &self,
         simd: S,
         kernel: K,
-        states: &mut [TilePlane],
+        states: &mut [TileState],
         slots: &mut [Slot],
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
         let px = centers(simd, self.x);
-        let py: [f32; TILE_HEIGHT] =
-            core::array::from_fn(|row| (self.y as usize + row) as f32 + 0.5);
-        for (plane, base) in planes.iter_mut().zip(self.base) {
-            *plane = [[base; TILE_WIDTH]; TILE_HEIGHT];
-        }
+        let top = self.y as f32 + 0.5;
+        let mut rendering = self.base.map(|base| [f32x16::splat(simd, base); TILE_HEIGHT]);
         for (&index, state) in self.indices.iter().zip(&mut *states) {
             let splat = &self.splats[index as usize];
             let dx = px - splat.x;
-            let u = dx * splat.i11;
-            let (u2, slant) = (u * u, dx * splat.w);
+            let column = kernel.column(simd, dx * (splat.i11 * K::SCALE));
+            let rise = f32x16::splat(simd, splat.i22 * K::SCALE);
+            let mut v = dx * (splat.w * K::SCALE) + rise * (top - splat.y);
             for row in 0..TILE_HEIGHT {
-                let v = slant + splat.i22 * (py[row] - splat.y);
-                let (kept, weight) = kernel.forward(simd, u2 + v * v);
-                kept.store_array(&mut state[row]);
-                for (plane, color) in planes.iter_mut().zip(splat.color) {
-                    let sum = f32x16::load_array_ref(simd, &plane[row]) + weight * color;
-                    sum.store_array(&mut plane[row]);
+                let (kept, weight) = kernel.forward(simd, column, v);
+                kept.store_array(&mut state.0[row]);
+                for channel in 0..CHANNELS {
+                    let sum = &mut rendering[channel][row];
+                    *sum = weight.mul_add_precise(splat.color[channel], *sum);
                 }
+                v += rise;
             }
         }
-        let squared = self.residual(simd, planes);
+        let squared = self.residual(simd, &rendering, planes);
         let distortion = self.sensitivity.map_or(squared, |sensitivity| {
             let corner = [self.x as usize, self.y as usize];
             differentiate(sensitivity, corner, [self.columns, self.rows], planes)
+        });
+        let residuals: [[f32x16<S>; TILE_HEIGHT]; CHANNELS] = core::array::from_fn(|channel| {
+            core::array::from_fn(|row| f32x16::load_array_ref(simd, &planes[channel][row]))
         });
         for (&index, state) in self.indices.iter().zip(states) {
             let splat = &self.splats[index as usize];
             let zero = f32x16::splat(simd, 0.0);
             let (mut s0, mut s1, mut s2) = (zero, zero, zero);
-            let mut by_color = [zero; CHANNELS];
+            let mut by_color = [zero; 4];
             for row in 0..TILE_HEIGHT {
-                let (weight, slope) = kernel.backward(f32x16::load_array_ref(simd, &state[row]));
+                let (weight, slope) = kernel.backward(f32x16::load_array_ref(simd, &state.0[row]));
                 let mut along = zero;
                 for channel in 0..CHANNELS {
-                    let residual = f32x16::load_array_ref(simd, &planes[channel][row]);
-                    by_color[channel] += residual * weight;
-                    along += residual * splat.color[channel];
+                    let residual = residuals[channel][row];
+                    by_color[channel] = residual.mul_add_precise(weight, by_color[channel]);
+                    along = residual.mul_add_precise(splat.color[channel], along);
                 }
-                let dy = py[row] - splat.y;
                 let s = along * slope;
-                let t = s * dy;
+                let y = row as f32;
                 s0 += s;
-                s1 += t;
-                s2 += t * dy;
+                s1 = s.mul_add_precise(y, s1);
+                s2 = s.mul_add_precise(y * y, s2);
             }
+            // From the distance to the first row to that from the centre.
+            let dy = top - splat.y;
+            let (t1, t2) = (s1 + s0 * dy, s2 + (s1 * 2.0 + s0 * dy) * dy);
             let dx = px - splat.x;
             let x0 = dx * s0;
-            // In the order of the slots; the second slot is for the fourth channel only.
-            let mut all = [[zero; 8]; 2];
-            all[0][..5].copy_from_slice(&[x0, s1, dx * x0, dx * s1, s2]);
-            all.as_flattened_mut()[5..5 + CHANNELS].copy_from_slice(&by_color);
-            let per_span = slots_per_span(CHANNELS);
-            let slot = &mut slots[index as usize * per_span..][..per_span];
-            for (slot, vectors) in slot.iter_mut().zip(all) {
-                let sums = lane_sums(vectors);
-                *slot = core::array::from_fn(|lane| slot[lane] + sums[lane]);
+            let [c0, c1, c2, c3] = by_color;
+            let first = index as usize * slots_per_span(CHANNELS);
+            add(&mut slots[first], lane_sums([x0, t1, dx * x0, dx * t1, t2, c0, c1, c2]));
+            if CHANNELS == 4 {
+                add(
+                    &mut slots[first + 1],
+                    lane_sums([c3, zero, zero, zero, zero, zero, zero, zero]),
+                );
             }
         }
         RenderingError { squared, distortion }
     }
 
-    /// Turns the rendering in `planes` into residuals; returns the sum of squared errors.
+    /// Sets `planes` to the residuals of a rendering; returns the sum of squared errors.
     #[inline(always)]
-    fn residual<S: Simd>(&self, simd: S, planes: &mut [TilePlane; CHANNELS]) -> f64 {
+    fn residual<S: Simd>(
+        &self,
+        simd: S,
+        rendering: &[[f32x16<S>; TILE_HEIGHT]; 4],
+        planes: &mut [TilePlane; CHANNELS],
+    ) -> f64 {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
-        let mut inside = zero;
-        inside.as_mut_array()[..self.columns].fill(1.0);
+        let columns = self.columns as f32;
+        let inside = (centers(simd, 0)).simd_lt(columns).select(one, zero);
         let mut total = zero;
-        for row in 0..TILE_HEIGHT {
-            let inside = if row < self.rows { inside } else { zero };
-            for (plane, target) in planes.iter_mut().zip(self.target) {
-                let target =
-                    f32x16::from_fn(simd, |column| f32::from(target[row][column])) / FULL_SCALE;
-                let value = f32x16::load_array_ref(simd, &plane[row]);
+        for channel in 0..CHANNELS {
+            for row in 0..TILE_HEIGHT {
+                let inside = if row < self.rows { inside } else { zero };
+                let sample = &self.target[channel][row];
+                let sample = f32x16::from_fn(simd, |column| f32::from(sample[column]));
+                let target = sample * (1.0 / FULL_SCALE);
+                let value = rendering[channel][row];
                 let mut residual = (value - target) * inside;
                 // The output is clamped: where the source is white, a rendering above white is no
                 // error, and below black where the source is black.
-                residual = target.simd_ge(one).select(residual.min(zero), residual);
-                residual = target.simd_le(zero).select(residual.max(zero), residual);
-                residual.store_array(&mut plane[row]);
+                residual = sample.simd_ge(FULL_SCALE).select(residual.min(zero), residual);
+                residual = sample.simd_le(zero).select(residual.max(zero), residual);
+                residual.store_array(&mut planes[channel][row]);
                 let clamped = (value.max(zero).min(one) - target) * inside;
-                total += clamped * clamped;
+                total = clamped.mul_add_precise(clamped, total);
             }
         }
         total.to_array().iter().map(|&squared| f64::from(squared)).sum()
+    }
+}
+
+#[inline(always)]
+fn add(slot: &mut Slot, sums: Slot) {
+    for lane in 0..sums.len() {
+        slot[lane] += sums[lane];
     }
 }
 
