@@ -6,20 +6,16 @@
 //! residuals are 0. The distortion is quadratic in the residuals.
 
 use super::raster::{TILE_WIDTH, TilePlane};
-use super::sensitivity::{BLOCK, BlockSensitivity, SCALES, Sensitivity};
-use crate::render::tile_grid::TILE_HEIGHT;
-
-/// One row of a tile.
-type Line = [f32; TILE_WIDTH];
-/// The sensitivities of the blocks of a tile, row by row.
-type TileSensitivity = [[BlockSensitivity; TILE_WIDTH / BLOCK]; TILE_HEIGHT / BLOCK];
+use super::sensitivity::{BLOCK, SCALES, Sensitivity};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
 /// distortion by them, and returns the distortion. `size` is the number of columns and rows inside
 /// the picture; residuals outside are 0, and so are their gradients.
 ///
-/// The compiler turns the loops into code of the SIMD level that the caller is dispatched to.
+/// The compiler turns the loops into code of the SIMD level that the caller is dispatched to. They are
+/// over indices, as in `fit/training_tile.rs`.
 #[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "see above")]
 pub(crate) fn differentiate<const CHANNELS: usize>(
     sensitivity: &Sensitivity,
     [x, y]: [usize; 2],
@@ -27,42 +23,63 @@ pub(crate) fn differentiate<const CHANNELS: usize>(
     planes: &mut [TilePlane; CHANNELS],
 ) -> f64 {
     let (luma, colors) = (sensitivity.luma, sensitivity.colors);
-    let mut tile: TileSensitivity = [[[0.0; SCALES]; TILE_WIDTH / BLOCK]; TILE_HEIGHT / BLOCK];
-    for (row, blocks) in tile.iter_mut().enumerate().take(rows.div_ceil(BLOCK)) {
-        let sensitivities = &sensitivity.row(y / BLOCK + row)[x / BLOCK..];
-        blocks.iter_mut().zip(sensitivities).for_each(|(block, of_block)| *block = *of_block);
+    let mut inside = [0.0; TILE_WIDTH];
+    for x in 0..TILE_WIDTH {
+        inside[x] = if x < columns { 1.0 } else { 0.0 };
     }
-    let inside: Line = core::array::from_fn(|x| if x < columns { 1.0 } else { 0.0 });
     let mut total = [0.0; TILE_WIDTH];
-    for (group, blocks) in tile.iter().enumerate().take(rows.div_ceil(BLOCK)) {
-        let first = group * BLOCK;
-        let [fine, medium, coarse] =
-            [0, 1, 2].map(|scale| -> Line { core::array::from_fn(|x| blocks[x / BLOCK][scale]) });
-        let mut lines = [[0.0; TILE_WIDTH]; BLOCK];
-        for (plane, share) in planes.iter().zip(luma) {
-            for (line, residuals) in lines.iter_mut().zip(&plane[first..]) {
-                *line = core::array::from_fn(|x| line[x] + share * residuals[x]);
+    for first in (0..rows).step_by(BLOCK) {
+        let blocks = &sensitivity.row((y + first) / BLOCK)[x / BLOCK..];
+        let mut by_scale = [[0.0; TILE_WIDTH]; SCALES];
+        for x in 0..TILE_WIDTH {
+            // Where there is no block, residuals are 0.
+            let block = blocks[(x / BLOCK).min(blocks.len() - 1)];
+            for scale in 0..SCALES {
+                by_scale[scale][x] = block[scale];
             }
         }
-        // Sums over 2 x 2 and 4 x 4 pixels, in every column of their blocks.
-        let pairs: [Line; 2] = core::array::from_fn(|pair| {
-            let sums: Line = core::array::from_fn(|x| lines[2 * pair][x] + lines[2 * pair + 1][x]);
-            core::array::from_fn(|x| sums[x] + sums[x ^ 1])
-        });
-        let sums: Line = core::array::from_fn(|x| pairs[0][x] + pairs[1][x]);
-        let sums: Line = core::array::from_fn(|x| sums[x] + sums[x ^ 2]);
-        let flat: Line = core::array::from_fn(|x| fine[x] + medium[x] + coarse[x]);
-        let coarse: Line = core::array::from_fn(|x| coarse[x] * (sums[x] * (1.0 / 16.0)));
-        for row in first..rows.min(first + BLOCK) {
-            let pair = &pairs[(row - first) / 2];
-            let by_luma: Line =
-                core::array::from_fn(|x| (coarse[x] + medium[x] * (pair[x] * 0.25)) * inside[x]);
-            for (channel, plane) in planes.iter_mut().enumerate() {
-                let (residuals, share) = (&mut plane[row], luma[channel]);
-                // All of the sensitivity to alpha is to its single pixels.
-                let by_sample = if channel < colors { &fine } else { &flat };
+        let [fine, medium, coarse] = by_scale;
+        let mut lines = [[0.0; TILE_WIDTH]; BLOCK];
+        for channel in 0..CHANNELS {
+            for row in 0..BLOCK {
                 for x in 0..TILE_WIDTH {
-                    let gradient = by_sample[x] * residuals[x] + share * by_luma[x];
+                    lines[row][x] += luma[channel] * planes[channel][first + row][x];
+                }
+            }
+        }
+        // Half the gradients of the means' terms: sums over 2 x 2 and 4 x 4 pixels, in every column of
+        // their blocks.
+        let (mut pairs, mut by_luma) = ([[0.0; TILE_WIDTH]; 2], [[0.0; TILE_WIDTH]; 2]);
+        let (mut half, mut sums) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
+        for pair in 0..2 {
+            for x in 0..TILE_WIDTH {
+                sums[x] = lines[2 * pair][x] + lines[2 * pair + 1][x];
+            }
+            for x in 0..TILE_WIDTH {
+                pairs[pair][x] = sums[x] + sums[x ^ 1];
+            }
+        }
+        for x in 0..TILE_WIDTH {
+            half[x] = pairs[0][x] + pairs[1][x];
+        }
+        for pair in 0..2 {
+            for x in 0..TILE_WIDTH {
+                let by_coarse = coarse[x] * ((half[x] + half[x ^ 2]) * (1.0 / 16.0));
+                by_luma[pair][x] = (by_coarse + medium[x] * (pairs[pair][x] * 0.25)) * inside[x];
+            }
+        }
+        let mut flat = [0.0; TILE_WIDTH];
+        for x in 0..TILE_WIDTH {
+            flat[x] = fine[x] + medium[x] + coarse[x];
+        }
+        for channel in 0..CHANNELS {
+            // All of the sensitivity to alpha is to its single pixels.
+            let by_sample = if channel < colors { &fine } else { &flat };
+            for row in 0..BLOCK.min(rows - first) {
+                let residuals = &mut planes[channel][first + row];
+                for x in 0..TILE_WIDTH {
+                    let gradient =
+                        by_sample[x] * residuals[x] + luma[channel] * by_luma[row / 2][x];
                     total[x] += gradient * residuals[x];
                     residuals[x] = gradient;
                 }
@@ -116,6 +133,7 @@ pub(crate) fn plain_distortion(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::render::tile_grid::TILE_HEIGHT;
     use crate::encode::source::Source;
 
     /// Residuals in the tile whose first pixel is `corner`.

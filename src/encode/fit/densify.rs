@@ -10,6 +10,7 @@ use super::pass::Pass;
 use super::row::{Row, RowBounds};
 use super::training::{Densification, Distortion, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
+use crate::encode::sensitivity::BLOCK;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -118,42 +119,47 @@ impl Densifier<'_> {
     /// The distortion of every pixel of a tile; 0 where the output is exact already.
     fn distortions(&self, tile: usize) -> TilePlane {
         let residuals = self.pass.residuals(tile, self.raster.channels);
-        let over_channels = |combine: &dyn Fn(f32, f32) -> f32| -> TilePlane {
-            let mut plane = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
-            for residual in residuals {
-                for (value, residual) in
-                    plane.as_flattened_mut().iter_mut().zip(residual.as_flattened())
-                {
-                    *value = combine(*value, residual.abs());
-                }
-            }
-            plane
-        };
+        let largest = over_channels(residuals, |largest, residual| {
+            if residual > largest { residual } else { largest }
+        });
         let mut distortions = match self.options.distortion {
-            Distortion::L1 => over_channels(&|sum, residual| sum + residual),
+            Distortion::L1 => over_channels(residuals, |sum, residual| sum + residual),
             Distortion::L3 => {
-                let mut plane = over_channels(&|sum, residual| sum + residual * residual);
-                for value in plane.as_flattened_mut() {
-                    *value *= value.sqrt();
-                }
-                plane
+                let squares = over_channels(residuals, |sum, residual| sum + residual * residual);
+                squares.map(|line| line.map(|square| square * square.sqrt()))
             }
         };
-        let largest = over_channels(&f32::max);
         let [columns, _] = self.tile_grid();
         let (left, top) = (tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT);
-        for (y, (values, largest)) in distortions.iter_mut().zip(&largest).enumerate() {
-            for (x, (value, &largest)) in values.iter_mut().zip(largest).enumerate() {
+        for y in (0..TILE_HEIGHT).step_by(BLOCK) {
+            for x in (0..TILE_WIDTH).step_by(BLOCK) {
                 // A residual of less than half a quantization step disappears when samples are
                 // rounded.
                 let position = [(left + x) as f32, (top + y) as f32];
-                if largest < self.raster.half_step * self.raster.sensitivity_near(position) {
-                    *value = 0.0;
+                let exact = self.raster.half_step * self.raster.sensitivity_near(position);
+                for row in y..y + BLOCK {
+                    for column in x..x + BLOCK {
+                        let is_exact = largest[row][column] < exact;
+                        distortions[row][column] *= if is_exact { 0.0 } else { 1.0 };
+                    }
                 }
             }
         }
         distortions
     }
+}
+
+/// Combines the magnitudes of the residuals of all channels at every pixel of a tile.
+fn over_channels(residuals: &[TilePlane], combine: impl Fn(f32, f32) -> f32) -> TilePlane {
+    let mut plane = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
+    for residual in residuals {
+        for (line, residual) in plane.iter_mut().zip(residual) {
+            for (value, residual) in line.iter_mut().zip(residual) {
+                *value = combine(*value, residual.abs());
+            }
+        }
+    }
+    plane
 }
 
 /// [`Placement::Top`]: the `count` pixels of largest distortion, with the full variance. Of pixels

@@ -2,7 +2,8 @@
 //!
 //! The rendering of a tile stays in registers where there are 32 of them. Products are added with a
 //! single rounding, so that all machines get the same bits; those without such an instruction (x86
-//! before 2013) emulate it, and take longer.
+//! before 2013) emulate it, and take longer. Loops are over indices: closures and the functions of some
+//! iterators would be called, not inlined, and compiled for the least SIMD level.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
@@ -152,6 +153,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
     }
 
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
     fn run_with<S: Simd, K: TrainingKernel>(
         &self,
         simd: S,
@@ -162,9 +164,13 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
     ) -> RenderingError {
         let px = centers(simd, self.x);
         let top = self.y as f32 + 0.5;
-        let mut rendering = self.base.map(|base| [f32x16::splat(simd, base); TILE_HEIGHT]);
-        for (&index, state) in self.indices.iter().zip(&mut *states) {
-            let splat = &self.splats[index as usize];
+        let zero = f32x16::splat(simd, 0.0);
+        let mut rendering = [[zero; TILE_HEIGHT]; CHANNELS];
+        for channel in 0..CHANNELS {
+            rendering[channel] = [f32x16::splat(simd, self.base[channel]); TILE_HEIGHT];
+        }
+        for (entry, state) in states.iter_mut().enumerate() {
+            let splat = &self.splats[self.indices[entry] as usize];
             let dx = px - splat.x;
             let column = kernel.column(simd, dx * (splat.i11 * K::SCALE));
             let rise = f32x16::splat(simd, splat.i22 * K::SCALE);
@@ -180,16 +186,22 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
             }
         }
         let squared = self.residual(simd, &rendering, planes);
-        let distortion = self.sensitivity.map_or(squared, |sensitivity| {
-            let corner = [self.x as usize, self.y as usize];
-            differentiate(sensitivity, corner, [self.columns, self.rows], planes)
-        });
-        let residuals: [[f32x16<S>; TILE_HEIGHT]; CHANNELS] = core::array::from_fn(|channel| {
-            core::array::from_fn(|row| f32x16::load_array_ref(simd, &planes[channel][row]))
-        });
-        for (&index, state) in self.indices.iter().zip(states) {
-            let splat = &self.splats[index as usize];
-            let zero = f32x16::splat(simd, 0.0);
+        let distortion = match self.sensitivity {
+            Some(sensitivity) => {
+                let corner = [self.x as usize, self.y as usize];
+                differentiate(sensitivity, corner, [self.columns, self.rows], planes)
+            }
+            None => squared,
+        };
+        let mut residuals = [[zero; TILE_HEIGHT]; CHANNELS];
+        for channel in 0..CHANNELS {
+            for row in 0..TILE_HEIGHT {
+                residuals[channel][row] = f32x16::load_array_ref(simd, &planes[channel][row]);
+            }
+        }
+        for (entry, state) in states.iter().enumerate() {
+            let index = self.indices[entry] as usize;
+            let splat = &self.splats[index];
             let (mut s0, mut s1, mut s2) = (zero, zero, zero);
             let mut by_color = [zero; 4];
             for row in 0..TILE_HEIGHT {
@@ -212,7 +224,7 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
             let dx = px - splat.x;
             let x0 = dx * s0;
             let [c0, c1, c2, c3] = by_color;
-            let first = index as usize * slots_per_span(CHANNELS);
+            let first = index * slots_per_span(CHANNELS);
             add(&mut slots[first], lane_sums([x0, t1, dx * x0, dx * t1, t2, c0, c1, c2]));
             if CHANNELS == 4 {
                 add(
@@ -226,10 +238,11 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
 
     /// Sets `planes` to the residuals of a rendering; returns the sum of squared errors.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
     fn residual<S: Simd>(
         &self,
         simd: S,
-        rendering: &[[f32x16<S>; TILE_HEIGHT]; 4],
+        rendering: &[[f32x16<S>; TILE_HEIGHT]; CHANNELS],
         planes: &mut [TilePlane; CHANNELS],
     ) -> f64 {
         let zero = f32x16::splat(simd, 0.0);
