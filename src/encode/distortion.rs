@@ -133,8 +133,8 @@ pub(crate) fn plain_distortion(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
-    use crate::render::tile_grid::TILE_HEIGHT;
     use crate::encode::source::Source;
+    use crate::render::tile_grid::TILE_HEIGHT;
 
     /// Residuals in the tile whose first pixel is `corner`.
     fn tile<const CHANNELS: usize>(

@@ -5,12 +5,12 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::distortion_map;
 use super::parameterization;
-use super::pass::Pass;
+use super::pass::Rendered;
 use super::row::{Row, RowBounds};
-use super::training::{Densification, Distortion, GaussianFilter, NewColor, NewShape, Placement};
+use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
-use crate::encode::sensitivity::BLOCK;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -34,9 +34,8 @@ struct NewPosition {
 pub(crate) struct Densifier<'a> {
     pub(crate) options: &'a Densification,
     pub(crate) filter: GaussianFilter,
-    pub(crate) raster: &'a Raster,
-    /// The last pass over the picture.
-    pub(crate) pass: &'a Pass,
+    /// The last pass over the picture, which measured the distortion.
+    pub(crate) pass: Rendered<'a>,
     pub(crate) bounds: RowBounds,
     /// Number of Gaussians before.
     pub(crate) count: usize,
@@ -46,26 +45,72 @@ impl Densifier<'_> {
     /// Up to `count` new Gaussians where the distortion is large. There are fewer where fewer
     /// pixels have any distortion.
     pub(crate) fn new_gaussians(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+        let raster = self.pass.raster;
         let positions = match self.options.placement {
             Placement::Top => top(count, &self.distortion_map()),
             Placement::Spread => {
-                spread(count, self.raster.width, self.tile_grid(), rng.f64(), |tile| {
-                    self.distortions(tile)
-                })
+                let (grid, sums) = (self.tile_grid(), self.pass.pass.distortions());
+                spread(count, raster.width, grid, rng.f64(), sums, |tile| self.distortions(tile))
             }
         };
         let total = self.count + positions.len();
         let variance = self
             .filter
-            .variance(self.raster.pixels(), total)
+            .variance(raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        positions.into_iter().map(|position| self.new_gaussian(&position, variance, rng)).collect()
+        let colors = self.colors(&positions);
+        let new = positions.into_iter().zip(colors);
+        new.map(|(position, color)| self.new_gaussian(&position, color, variance, rng)).collect()
+    }
+
+    /// The colours of new Gaussians.
+    fn colors(&self, positions: &[NewPosition]) -> Vec<[f32; 4]> {
+        let raster = self.pass.raster;
+        let at = |position: &NewPosition| {
+            let pixel = position.pixel as usize;
+            (pixel % raster.width, pixel / raster.width)
+        };
+        let of_source = |position: &NewPosition| {
+            let (x, y) = at(position);
+            raster.sample(x, y)
+        };
+        let share = match self.options.color {
+            NewColor::Zero => return vec![[0.0; 4]; positions.len()],
+            NewColor::Source => return positions.iter().map(of_source).collect(),
+            NewColor::Residual(share) => share,
+        };
+        let [columns, _] = self.tile_grid();
+        let tile_of = |position: &NewPosition| {
+            let (x, y) = at(position);
+            y / TILE_HEIGHT * columns + x / TILE_WIDTH
+        };
+        let by_tile: Vec<_> = positions.chunk_by(|a, b| tile_of(a) == tile_of(b)).collect();
+        let colors = by_tile.into_par_iter().flat_map_iter(|positions| {
+            let planes = self.pass.residuals(tile_of(&positions[0]));
+            positions.iter().map(move |position| {
+                let (x, y) = at(position);
+                let mut color = [0.0; 4];
+                for (value, plane) in color.iter_mut().zip(&planes) {
+                    let residual = plane[y % TILE_HEIGHT][x % TILE_WIDTH];
+                    *value = -share * residual / raster.sensitivity(x, y);
+                }
+                color
+            })
+        });
+        colors.collect()
     }
 
     /// A new Gaussian, where `variance` is the filter's.
-    fn new_gaussian(&self, position: &NewPosition, variance: f32, rng: &mut fastrand::Rng) -> Row {
+    fn new_gaussian(
+        &self,
+        position: &NewPosition,
+        color: [f32; 4],
+        variance: f32,
+        rng: &mut fastrand::Rng,
+    ) -> Row {
+        let raster = self.pass.raster;
         let (pixel, variance) = (position.pixel as usize, variance * position.variance_share);
-        let (x, y) = (pixel % self.raster.width, pixel / self.raster.width);
+        let (x, y) = (pixel % raster.width, pixel / raster.width);
         let mut row = [0.0; MAX_COMPONENTS];
         row[0] = x as f32 + 0.5;
         row[1] = y as f32 + 0.5;
@@ -78,34 +123,34 @@ impl Densifier<'_> {
             NewShape::Random => random_shape(parameterization, variance, rng),
         };
         row[2..5].copy_from_slice(&shape.to_array());
-        let sensitivity = self.raster.sensitivity(x, y);
-        let weighted = self.pass.residual(x, y, self.raster.channels);
-        let residual = weighted.map(|value| value / sensitivity);
-        let source = self.raster.sample(x, y);
-        for channel in 0..self.raster.channels {
-            row[5 + channel] = match self.options.color {
-                NewColor::Zero => 0.0,
-                NewColor::Source => source[channel],
-                NewColor::Residual(share) => -share * residual[channel],
-            };
-        }
+        row[5..].copy_from_slice(&color);
         self.bounds.clamped(row)
     }
 
     /// Numbers of columns and rows of tiles.
     fn tile_grid(&self) -> [usize; 2] {
-        [self.raster.width.div_ceil(TILE_WIDTH), self.raster.height.div_ceil(TILE_HEIGHT)]
+        let Raster { width, height, .. } = self.pass.raster;
+        [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
+    }
+
+    /// The distortion of every pixel of a tile.
+    fn distortions(&self, tile: usize) -> TilePlane {
+        let [columns, _] = self.tile_grid();
+        let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
+        let planes = self.pass.residuals(tile);
+        distortion_map::of_tile(self.pass.raster, corner, &planes, self.options.distortion)
     }
 
     /// The distortion of every pixel, row by row.
     fn distortion_map(&self) -> Vec<f32> {
-        let mut map = vec![0.0; self.raster.pixels()];
+        let raster = self.pass.raster;
+        let mut map = vec![0.0; raster.pixels()];
         let [columns, _] = self.tile_grid();
-        let rows = map.par_chunks_mut(self.raster.width * TILE_HEIGHT).enumerate();
+        let rows = map.par_chunks_mut(raster.width * TILE_HEIGHT).enumerate();
         rows.for_each(|(row, lines)| {
             for column in 0..columns {
                 let distortions = self.distortions(row * columns + column);
-                let lines = lines.chunks_exact_mut(self.raster.width).zip(&distortions);
+                let lines = lines.chunks_exact_mut(raster.width).zip(&distortions);
                 for (line, values) in lines {
                     let line = &mut line[column * TILE_WIDTH..];
                     let length = line.len().min(TILE_WIDTH);
@@ -115,51 +160,6 @@ impl Densifier<'_> {
         });
         map
     }
-
-    /// The distortion of every pixel of a tile; 0 where the output is exact already.
-    fn distortions(&self, tile: usize) -> TilePlane {
-        let residuals = self.pass.residuals(tile, self.raster.channels);
-        let largest = over_channels(residuals, |largest, residual| {
-            if residual > largest { residual } else { largest }
-        });
-        let mut distortions = match self.options.distortion {
-            Distortion::L1 => over_channels(residuals, |sum, residual| sum + residual),
-            Distortion::L3 => {
-                let squares = over_channels(residuals, |sum, residual| sum + residual * residual);
-                squares.map(|line| line.map(|square| square * square.sqrt()))
-            }
-        };
-        let [columns, _] = self.tile_grid();
-        let (left, top) = (tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT);
-        for y in (0..TILE_HEIGHT).step_by(BLOCK) {
-            for x in (0..TILE_WIDTH).step_by(BLOCK) {
-                // A residual of less than half a quantization step disappears when samples are
-                // rounded.
-                let position = [(left + x) as f32, (top + y) as f32];
-                let exact = self.raster.half_step * self.raster.sensitivity_near(position);
-                for row in y..y + BLOCK {
-                    for column in x..x + BLOCK {
-                        let is_exact = largest[row][column] < exact;
-                        distortions[row][column] *= if is_exact { 0.0 } else { 1.0 };
-                    }
-                }
-            }
-        }
-        distortions
-    }
-}
-
-/// Combines the magnitudes of the residuals of all channels at every pixel of a tile.
-fn over_channels(residuals: &[TilePlane], combine: impl Fn(f32, f32) -> f32) -> TilePlane {
-    let mut plane = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
-    for residual in residuals {
-        for (line, residual) in plane.iter_mut().zip(residual) {
-            for (value, residual) in line.iter_mut().zip(residual) {
-                *value = combine(*value, residual.abs());
-            }
-        }
-    }
-    plane
 }
 
 /// [`Placement::Top`]: the `count` pixels of largest distortion, with the full variance. Of pixels
@@ -189,38 +189,42 @@ fn spread(
     width: usize,
     [columns, rows]: [usize; 2],
     phase: f64,
+    sums: &[f32],
     distortions: impl Fn(usize) -> TilePlane + Sync,
 ) -> Vec<NewPosition> {
-    // The tiles are summed up on all threads; then only those that contain a step are visited.
-    let sum_of =
-        |tile| distortions(tile).as_flattened().iter().map(|&value| f64::from(value)).sum();
-    let sums: Vec<f64> = (0..columns * rows).into_par_iter().map(sum_of).collect();
-    let total: f64 = sums.iter().sum();
+    let total: f64 = sums.iter().copied().map(f64::from).sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
-    let (mut sum, mut next) = (0.0, phase * step);
-    let mut positions = Vec::new();
+    // The tiles that contain a step, with the sum of all tiles before, and the first step in them.
+    let mut found: Vec<(usize, f64, f64)> = Vec::new();
+    let mut sum = 0.0;
     along_z([0, 0], [columns, rows], &mut |column, row| {
         let tile = row * columns + column;
-        let end = sum + sums[tile];
+        let end = sum + f64::from(sums[tile]);
+        let next = ((sum / step - phase).ceil() + phase) * step;
         if end > next {
-            let variance_share = (mean / sums[tile]).sqrt().min(1.0) as f32;
-            let first = row * TILE_HEIGHT * width + column * TILE_WIDTH;
-            for (y, line) in distortions(tile).iter().enumerate() {
-                for (x, &value) in line.iter().enumerate() {
-                    sum += f64::from(value);
-                    // Pixels that are exact or outside the picture have no distortion.
-                    if sum > next && value > 0.0 {
-                        let pixel = (first + y * width + x) as u32;
-                        positions.push(NewPosition { pixel, variance_share });
-                        // A pixel that contains several steps gets one Gaussian.
-                        next += step * ((sum - next) / step).ceil();
-                    }
-                }
-            }
+            found.push((tile, sum, next));
         }
         sum = end;
     });
-    positions
+    let positions = found.into_par_iter().flat_map_iter(|(tile, mut sum, mut next)| {
+        let variance_share = (mean / f64::from(sums[tile])).sqrt().min(1.0) as f32;
+        let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;
+        let mut positions = Vec::new();
+        for (y, line) in distortions(tile).iter().enumerate() {
+            for (x, &value) in line.iter().enumerate() {
+                sum += f64::from(value);
+                // Pixels that are exact or outside the picture have no distortion.
+                if sum > next && value > 0.0 {
+                    let pixel = (first + y * width + x) as u32;
+                    positions.push(NewPosition { pixel, variance_share });
+                    // A pixel that contains several steps gets one Gaussian.
+                    next += step * ((sum - next) / step).ceil();
+                }
+            }
+        }
+        positions
+    });
+    positions.collect()
 }
 
 /// Visits the points of a rectangle along a Z curve, on which neighbours follow each other closely.
@@ -279,6 +283,19 @@ mod tests {
         assert_eq!(pixels(&top(1, &map)), [1]);
         // Exact pixels get no Gaussian, however many are asked for.
         assert_eq!(pixels(&top(10, &map)), [1, 3, 5, 2]);
+    }
+
+    /// [`spread`], with the sums that it needs.
+    fn spread(
+        count: usize,
+        width: usize,
+        [columns, rows]: [usize; 2],
+        phase: f64,
+        tiles: impl Fn(usize) -> TilePlane + Sync,
+    ) -> Vec<NewPosition> {
+        let sums: Vec<f32> =
+            (0..columns * rows).map(|tile| tiles(tile).as_flattened().iter().sum()).collect();
+        super::spread(count, width, [columns, rows], phase, &sums, tiles)
     }
 
     /// A tile whose distortions depend on the picture's column alone.

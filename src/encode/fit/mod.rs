@@ -4,6 +4,7 @@ mod adam;
 mod bins;
 pub(crate) mod budget;
 mod densify;
+mod distortion_map;
 mod gauss_newton;
 mod lsq;
 mod parameterization;
@@ -23,7 +24,7 @@ use budget::Budget;
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use parameters::Parameters;
-use pass::Pass;
+use pass::{Pass, Rendered};
 use row::{Row, RowBounds, shape_of};
 use schedule::TrainingSchedule;
 use state::Slope;
@@ -126,7 +127,7 @@ impl<'a> Fit<'a> {
     pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
-        self.forward(observer)?;
+        self.forward(true, observer)?;
         let first = densification.initial * self.wanted(1.0) as f32;
         self.grow((first.ceil() as usize).max(1), observer)?;
         let mut kept = usize::MAX;
@@ -136,12 +137,14 @@ impl<'a> Fit<'a> {
                 self.start_quantization();
             }
             let factor = schedule.factor(iteration, *iterations);
-            self.iterate(factor, total, plan.is_settled(iteration), observer)?;
             let done = iteration + 1;
+            let growths_left = plan.growths_left(done);
+            let grows = growths_left.is_some();
+            self.iterate(factor, total, plan.is_settled(iteration), grows, observer)?;
             if done % densification.prune_interval == 0 {
                 self.prune();
             }
-            if let Some(steps_left) = plan.growths_left(done) {
+            if let Some(steps_left) = growths_left {
                 kept = self.wanted(FORESEEN);
                 let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
@@ -171,14 +174,14 @@ impl<'a> Fit<'a> {
             self.quantizers = best.quantizers;
             self.binned_for = 0;
         }
-        self.forward(observer)?;
+        self.forward(true, observer)?;
         self.cull(self.len().saturating_sub(count));
         self.grow(count.saturating_sub(self.len()), observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
         for iteration in 0..iterations {
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
-            self.iterate(factor, total, true, observer)?;
+            self.iterate(factor, total, true, false, observer)?;
         }
         self.settle(observer)
     }
@@ -255,15 +258,17 @@ impl<'a> Fit<'a> {
 
     /// One iteration: a pass, and a step of the optimizer, where `factor` scales all learning
     /// rates. `iterations` is how many are planned in total, for the progress report. If `settled`,
-    /// the state before the step may become the best so far.
+    /// the state before the step may become the best so far; `grows` tells that Gaussians are added
+    /// after it.
     fn iterate(
         &mut self,
         factor: f32,
         iterations: u32,
         settled: bool,
+        grows: bool,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        self.forward(observer)?;
+        self.forward(grows, observer)?;
         if settled {
             self.keep_if_best();
         }
@@ -281,7 +286,9 @@ impl<'a> Fit<'a> {
     }
 
     /// Renders the Gaussians as the file would store them, and computes error and gradients.
-    fn forward(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    /// Measures the distortions if Gaussians are to be added.
+    fn forward(&mut self, grows: bool, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+        let measure = grows.then_some(self.training.densification.distortion);
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         let components = 5 + self.raster.channels;
         self.splats.clear();
@@ -304,7 +311,8 @@ impl<'a> Fit<'a> {
         }
         self.binned_for -= 1;
         self.work.evaluations += self.pass.evaluations();
-        self.error = self.pass.run(self.raster, &self.splats, kernel, self.base, observer)?;
+        self.error =
+            self.pass.run(self.raster, &self.splats, kernel, self.base, measure, observer)?;
         Ok(())
     }
 
@@ -352,19 +360,24 @@ impl<'a> Fit<'a> {
         if count == 0 {
             return Ok(());
         }
-        // The bins will not be valid for the new Gaussians, and the distortion map needs memory.
-        self.free_bins();
+        let pass = Rendered {
+            pass: &self.pass,
+            raster: self.raster,
+            splats: &self.splats,
+            kernel: self.training.kernel,
+            base: self.base,
+        };
         let densifier = Densifier {
             options: &self.training.densification,
             filter: self.training.filter,
-            raster: self.raster,
-            pass: &self.pass,
+            pass,
             bounds: self.bounds,
             count: self.parameters.len(),
         };
         observer.poll()?;
         let rows = densifier.new_gaussians(count, &mut self.rng);
         observer.poll()?;
+        self.free_bins();
         self.parameters.extend(&rows);
         self.parameters.sort();
         self.invalidate();
@@ -442,7 +455,7 @@ impl<'a> Fit<'a> {
     /// frees memory.
     fn settle(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         self.binned_for = 0;
-        self.forward(observer)?;
+        self.forward(false, observer)?;
         self.keep_if_best();
         self.binned_for = 0;
         self.free_bins();

@@ -11,7 +11,9 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::bins::{RowBins, TileRow};
+use super::distortion_map;
 use super::parameterization::GeometrySums;
+use super::training::Distortion;
 use super::training_tile::{RenderingError, Slot, TileState, TrainingTile, slots_per_span};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
@@ -47,9 +49,8 @@ pub(crate) struct Pass {
     /// the spans of all rows.
     span_indices: Vec<u32>,
     span_ends: Vec<u32>,
-    /// Half the gradient of the distortion by the samples of the rendering, in the layout of the
-    /// [`Raster`].
-    residuals: Vec<TilePlane>,
+    /// The distortion of every tile, if the last pass measured it.
+    distortions: Vec<f32>,
     /// The error of every row of tiles.
     row_errors: Vec<RenderingError>,
 }
@@ -57,7 +58,6 @@ pub(crate) struct Pass {
 impl Pass {
     pub(crate) fn new(raster: &Raster) -> Self {
         let rows = raster.height.div_ceil(TILE_HEIGHT);
-        let tiles = raster.width.div_ceil(TILE_WIDTH) * rows;
         let region =
             Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
         Self {
@@ -67,7 +67,7 @@ impl Pass {
             slots: Vec::new(),
             span_indices: Vec::new(),
             span_ends: Vec::new(),
-            residuals: vec![[[0.0; TILE_WIDTH]; TILE_HEIGHT]; tiles * raster.channels],
+            distortions: Vec::new(),
             row_errors: vec![RenderingError::default(); rows],
         }
     }
@@ -106,7 +106,7 @@ impl Pass {
         (pairs * TILE_WIDTH * TILE_HEIGHT) as u64
     }
 
-    /// Frees the memory of the bins; the residuals stay.
+    /// Frees the memory of the bins.
     pub(crate) fn free_bins(&mut self) {
         self.tile_rows = Vec::new();
         self.slots = Vec::new();
@@ -115,7 +115,8 @@ impl Pass {
     }
 
     /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
-    /// computes residuals and gradients. Returns the error of the rendering.
+    /// computes residuals and gradients. Returns the error of the rendering. Measures the distortions
+    /// of tiles if a measure is given.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels; `observer` is polled every few
@@ -126,13 +127,14 @@ impl Pass {
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
+        measure: Option<Distortion>,
         observer: &mut Observer<'_>,
     ) -> Result<RenderingError, EncodeError> {
         match raster.channels {
-            1 => self.run_of::<1>(raster, splats, kernel, base, observer),
-            2 => self.run_of::<2>(raster, splats, kernel, base, observer),
-            3 => self.run_of::<3>(raster, splats, kernel, base, observer),
-            _ => self.run_of::<4>(raster, splats, kernel, base, observer),
+            1 => self.run_of::<1>(raster, splats, kernel, base, measure, observer),
+            2 => self.run_of::<2>(raster, splats, kernel, base, measure, observer),
+            3 => self.run_of::<3>(raster, splats, kernel, base, measure, observer),
+            _ => self.run_of::<4>(raster, splats, kernel, base, measure, observer),
         }?;
         Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
@@ -154,21 +156,9 @@ impl Pass {
         }
     }
 
-    /// The residual at a pixel, rendering minus source, by channel, times its sensitivity: half the
-    /// gradient of the distortion. It is 0 where the source is black or white and the rendering
-    /// lies beyond it, because the output is clamped.
-    pub(crate) fn residual(&self, x: usize, y: usize, channels: usize) -> [f32; 4] {
-        let tile = y / TILE_HEIGHT * self.bins.columns() + x / TILE_WIDTH;
-        let mut residual = [0.0; 4];
-        for (value, plane) in residual.iter_mut().zip(self.residuals(tile, channels)) {
-            *value = plane[y % TILE_HEIGHT][x % TILE_WIDTH];
-        }
-        residual
-    }
-
-    /// [`Pass::residual`] in a tile, one plane per channel; 0 outside the picture.
-    pub(crate) fn residuals(&self, tile: usize, channels: usize) -> &[TilePlane] {
-        &self.residuals[tile * channels..][..channels]
+    /// The distortions that the last pass measured: those of all tiles, row by row.
+    pub(crate) fn distortions(&self) -> &[f32] {
+        &self.distortions
     }
 
     /// Whether a splat touches the picture, by the present bins.
@@ -182,7 +172,7 @@ impl Pass {
             + self.tile_rows.iter().map(TileRow::memory).sum::<usize>()
             + self.slots.capacity() * size_of::<Slot>()
             + (self.span_ends.capacity() + self.span_indices.capacity()) * size_of::<u32>()
-            + size_of_val(&self.residuals[..])
+            + self.distortions.capacity() * size_of::<f32>()
     }
 
     /// The indices of the spans of a splat, in the order of the rows.
@@ -197,19 +187,25 @@ impl Pass {
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
+        measure: Option<Distortion>,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);
+        let tiles = if measure.is_some() { bins.columns() * bins.rows() } else { 0 };
+        self.distortions.resize(tiles, 0.0);
         let mut slots = &mut self.slots[..];
-        let residuals = self.residuals.chunks_exact_mut(bins.columns() * CHANNELS);
-        let rows = self.tile_rows.iter().zip(residuals).zip(&mut self.row_errors);
+        let mut distortions = &mut self.distortions[..];
+        let rows = self.tile_rows.iter().zip(&mut self.row_errors);
         let mut jobs: Vec<_> = (rows.enumerate())
-            .map(|(row, ((tiles, residuals), error))| {
-                let length = bins.spans(row).len() * per_span;
-                let (taken, rest) = core::mem::take(&mut slots).split_at_mut(length);
-                slots = rest;
-                (row, tiles, taken, residuals, error)
+            .map(|(row, (tiles, error))| {
+                let slots = slots
+                    .split_off_mut(..bins.spans(row).len() * per_span)
+                    .expect("there are slots for all rows");
+                let of_row = if measure.is_some() { bins.columns() } else { 0 };
+                let distortions =
+                    distortions.split_off_mut(..of_row).expect("there is one for each tile");
+                (row, tiles, slots, distortions, error)
             })
             .collect();
         let level = self.level;
@@ -224,31 +220,66 @@ impl Pass {
             let count = count.count();
             // One row per task, so that the last rows are shared by all threads.
             let band = jobs.par_drain(..count).with_max_len(1);
-            band.for_each(|(row, tiles, slots, residuals, error)| {
+            band.for_each(|(row, tiles, slots, distortions, error)| {
                 let splats = &bins.splats(row, splats);
                 let mut states = Vec::new();
+                let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
                 slots.fill(Slot::default());
                 *error = RenderingError::default();
-                for (column, residual) in residuals.chunks_exact_mut(CHANNELS).enumerate() {
+                for column in 0..bins.columns() {
                     let indices = tiles.splats(column);
-                    let tile = TrainingTile::<CHANNELS> {
-                        x: (column * TILE_WIDTH) as u32,
-                        y: (row * TILE_HEIGHT) as u32,
-                        columns: TILE_WIDTH.min(raster.width - column * TILE_WIDTH),
-                        rows: TILE_HEIGHT.min(raster.height - row * TILE_HEIGHT),
-                        target: raster.tile(row * bins.columns() + column),
-                        sensitivity: raster.sensitivity.as_ref(),
-                        base,
-                        splats,
-                        indices,
-                    };
+                    let tile = TrainingTile::new(raster, [column, row], base, splats, indices);
                     states.resize(indices.len(), TileState::ZERO);
-                    let residual = residual.try_into().expect("a tile has all channels");
-                    *error = *error + tile.run(level, kernel, &mut states, slots, residual);
+                    *error = *error + tile.run(level, kernel, &mut states, slots, &mut planes);
+                    if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
+                        let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
+                        let plane = distortion_map::of_tile(raster, corner, &planes, measure);
+                        *sum = plane.as_flattened().iter().sum();
+                    }
                 }
             });
         }
         Ok(())
+    }
+}
+
+/// A pass with what it rendered, from which it can render tiles again.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rendered<'a> {
+    pub(crate) pass: &'a Pass,
+    pub(crate) raster: &'a Raster,
+    pub(crate) splats: &'a [Splat],
+    pub(crate) kernel: Kernel,
+    pub(crate) base: [f32; 4],
+}
+
+impl Rendered<'_> {
+    /// Half the gradient of the distortion by the samples of the rendering of a tile, one plane per
+    /// channel: where nothing but squared error counts, rendering minus source. It is 0 where the
+    /// source is black or white and the rendering lies beyond it, because the output is clamped, and
+    /// outside the picture.
+    pub(crate) fn residuals(&self, tile: usize) -> Vec<TilePlane> {
+        match self.raster.channels {
+            1 => self.residuals_of::<1>(tile),
+            2 => self.residuals_of::<2>(tile),
+            3 => self.residuals_of::<3>(tile),
+            _ => self.residuals_of::<4>(tile),
+        }
+    }
+
+    fn residuals_of<const CHANNELS: usize>(&self, tile: usize) -> Vec<TilePlane> {
+        let Pass { level, bins, tile_rows, .. } = self.pass;
+        let (row, column) = (tile / bins.columns(), tile % bins.columns());
+        let spans = bins.spans(row);
+        let of_tile = tile_rows[row].splats(column);
+        let splat = |&span: &u32| self.splats[spans[span as usize].splat as usize];
+        let splats: Vec<Splat> = of_tile.iter().map(splat).collect();
+        let indices: Vec<u32> = (0..splats.len() as u32).collect();
+        let tile = TrainingTile::new(self.raster, [column, row], self.base, &splats, &indices);
+        let mut states = vec![TileState::ZERO; splats.len()];
+        let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        tile.residuals(*level, self.kernel, &mut states, &mut planes);
+        planes.to_vec()
     }
 }
 

@@ -8,7 +8,7 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
-use crate::encode::raster::{FULL_SCALE, SamplePlane, TILE_WIDTH, TilePlane, centers};
+use crate::encode::raster::{FULL_SCALE, Raster, SamplePlane, TILE_WIDTH, TilePlane, centers};
 use crate::encode::sensitivity::Sensitivity;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
@@ -110,23 +110,44 @@ impl core::ops::Add for RenderingError {
 /// One tile of the pass.
 pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     /// Column and row of its first pixel.
-    pub(super) x: u32,
-    pub(super) y: u32,
+    x: u32,
+    y: u32,
     /// Numbers of columns and rows inside the picture.
-    pub(super) columns: usize,
-    pub(super) rows: usize,
-    pub(super) target: &'a [SamplePlane; CHANNELS],
+    columns: usize,
+    rows: usize,
+    target: &'a [SamplePlane; CHANNELS],
     /// How much errors count; `None` if all count the same.
-    pub(super) sensitivity: Option<&'a Sensitivity>,
+    sensitivity: Option<&'a Sensitivity>,
     /// The base colour.
-    pub(super) base: [f32; 4],
+    base: [f32; 4],
     /// The splats of the row of tiles.
-    pub(super) splats: &'a [Splat],
+    splats: &'a [Splat],
     /// The splats of the tile, by their indices in `splats`.
-    pub(super) indices: &'a [u32],
+    indices: &'a [u32],
 }
 
-impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
+impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
+    /// The tile at a column and row of tiles.
+    pub(super) fn new(
+        raster: &'a Raster,
+        [column, row]: [usize; 2],
+        base: [f32; 4],
+        splats: &'a [Splat],
+        indices: &'a [u32],
+    ) -> Self {
+        Self {
+            x: (column * TILE_WIDTH) as u32,
+            y: (row * TILE_HEIGHT) as u32,
+            columns: TILE_WIDTH.min(raster.width - column * TILE_WIDTH),
+            rows: TILE_HEIGHT.min(raster.height - row * TILE_HEIGHT),
+            target: raster.tile(row * raster.width.div_ceil(TILE_WIDTH) + column),
+            sensitivity: raster.sensitivity.as_ref(),
+            base,
+            splats,
+            indices,
+        }
+    }
+
     /// Forward pass, residuals, backward pass. Returns the error.
     ///
     /// `states` is scratch memory with one plane for each splat of the tile. The gradient sums are
@@ -143,23 +164,51 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
         match kernel {
             Kernel::Exponential { cutoff } => {
                 let kernel = simd_kernel::Exponential { cutoff };
-                dispatch!(level, simd => self.run_with(simd, kernel, states, slots, planes))
+                dispatch!(level, simd => {
+                    let error = self.forward(simd, kernel, states, planes);
+                    self.backward(simd, kernel, states, slots, planes);
+                    error
+                })
             }
             Kernel::Quartic => {
                 let kernel = simd_kernel::Quartic;
-                dispatch!(level, simd => self.run_with(simd, kernel, states, slots, planes))
+                dispatch!(level, simd => {
+                    let error = self.forward(simd, kernel, states, planes);
+                    self.backward(simd, kernel, states, slots, planes);
+                    error
+                })
             }
         }
     }
 
+    /// The forward pass alone: what [`Self::run`] leaves in `planes`.
+    pub(super) fn residuals(
+        &self,
+        level: Level,
+        kernel: Kernel,
+        states: &mut [TileState],
+        planes: &mut [TilePlane; CHANNELS],
+    ) {
+        match kernel {
+            Kernel::Exponential { cutoff } => {
+                let kernel = simd_kernel::Exponential { cutoff };
+                dispatch!(level, simd => self.forward(simd, kernel, states, planes))
+            }
+            Kernel::Quartic => {
+                dispatch!(level, simd => {
+                    self.forward(simd, simd_kernel::Quartic, states, planes)
+                })
+            }
+        };
+    }
+
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
-    fn run_with<S: Simd, K: TrainingKernel>(
+    fn forward<S: Simd, K: TrainingKernel>(
         &self,
         simd: S,
         kernel: K,
         states: &mut [TileState],
-        slots: &mut [Slot],
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
         let px = centers(simd, self.x);
@@ -193,6 +242,22 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
             }
             None => squared,
         };
+        RenderingError { squared, distortion }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn backward<S: Simd, K: TrainingKernel>(
+        &self,
+        simd: S,
+        kernel: K,
+        states: &[TileState],
+        slots: &mut [Slot],
+        planes: &[TilePlane; CHANNELS],
+    ) {
+        let px = centers(simd, self.x);
+        let top = self.y as f32 + 0.5;
+        let zero = f32x16::splat(simd, 0.0);
         let mut residuals = [[zero; TILE_HEIGHT]; CHANNELS];
         for channel in 0..CHANNELS {
             for row in 0..TILE_HEIGHT {
@@ -233,7 +298,6 @@ impl<const CHANNELS: usize> TrainingTile<'_, CHANNELS> {
                 );
             }
         }
-        RenderingError { squared, distortion }
     }
 
     /// Sets `planes` to the residuals of a rendering; returns the sum of squared errors.

@@ -30,7 +30,7 @@ fn run(
     let mut silent = |_: &_| ControlFlow::Continue(());
     let mut observer = Observer::new(&mut silent, 0);
     pass.bin(raster, splats, kernel);
-    pass.run(raster, splats, kernel, base, &mut observer).expect("not cancelled")
+    pass.run(raster, splats, kernel, base, None, &mut observer).expect("not cancelled")
 }
 
 /// Half the distortion in f64, directly from the formulas of the paper.
