@@ -71,6 +71,7 @@ impl Gaussian {
     }
 
     /// A Gaussian from its components in the order of the file (spec, section 8.1).
+    #[inline]
     pub(crate) fn from_components(values: &[f32], parameterization: Parameterization) -> Self {
         let mut color = [0.0; 4];
         color[..values.len() - 5].copy_from_slice(&values[5..]);
@@ -126,6 +127,7 @@ impl Parameterization {
 
     /// The Cholesky factor (l11, l21, l22) of a stored shape. If that is not a covariance, an entry
     /// is not finite or not positive, so that the Gaussian is not drawn.
+    #[inline]
     pub(crate) fn to_cholesky(self, [a, b, c]: [f32; 3]) -> [f32; 3] {
         match self {
             Self::Covariance => {

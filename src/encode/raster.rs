@@ -84,12 +84,14 @@ impl Raster {
     }
 
     /// How much a squared error of a pixel counts.
+    #[inline]
     pub(crate) fn sensitivity(&self, x: usize, y: usize) -> f32 {
         self.sensitivity.as_ref().map_or(1.0, |sensitivity| sensitivity.at(x, y))
     }
 
     /// How much a squared error counts at a position in pixels, or at the nearest one inside the
     /// picture.
+    #[inline]
     pub(crate) fn sensitivity_near(&self, [x, y]: [f32; 2]) -> f32 {
         // Casts saturate.
         self.sensitivity((x as usize).min(self.width - 1), (y as usize).min(self.height - 1))

@@ -105,6 +105,7 @@ impl RateTerm {
 
     /// The gradient by the colour of half the rate term: the training loss is half the squared
     /// error.
+    #[inline]
     pub(crate) fn gradient(&self, gaussian: &Gaussian) -> [f32; 4] {
         let [l11, _, l22] = gaussian.cholesky;
         let area = l11 * l22;

@@ -78,11 +78,13 @@ impl Sensitivity {
     }
 
     /// A row of blocks.
+    #[inline]
     pub(crate) fn row(&self, row: usize) -> &[BlockSensitivity] {
         &self.blocks[row * self.columns..][..self.columns]
     }
 
     /// The sensitivity of a pixel to an error on all scales.
+    #[inline]
     pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
         self.row(y / BLOCK)[x / BLOCK].iter().sum()
     }

@@ -22,6 +22,7 @@ const MOST_PACE: f32 = 3.0;
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
 /// the centre, the logarithms of size and ratio, the slant, and the colour.
+#[inline]
 pub(super) fn step(
     row: &mut Row,
     state: &mut State,

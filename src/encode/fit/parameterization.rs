@@ -27,6 +27,7 @@ impl GeometrySums {
     /// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
     /// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
     /// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
+    #[inline]
     pub(crate) fn gradients(
         &self,
         parameterization: Parameterization,
@@ -82,6 +83,7 @@ pub(crate) struct OwnFrame {
 }
 
 impl OwnFrame {
+    #[inline]
     pub(crate) fn new(parameterization: Parameterization, values: Vec3) -> Self {
         let [l11, l21, l22] = parameterization.to_cholesky(values.into());
         let center = Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22));
@@ -144,6 +146,7 @@ pub(crate) fn widened(parameterization: Parameterization, values: Vec3, variance
 
 /// Shape values clamped so that they are a covariance with standard deviations from about
 /// [`MIN_DEVIATION`] to about `max`. Values that are not finite become a round Gaussian.
+#[inline]
 pub(crate) fn clamped(parameterization: Parameterization, values: Vec3, max: f32) -> Vec3 {
     if !values.is_finite() {
         return from_cholesky(parameterization, [1.0, 0.0, 1.0]);

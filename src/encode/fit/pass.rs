@@ -140,6 +140,7 @@ impl Pass {
     }
 
     /// The gradient of the last pass by a splat: the sum of its slots, in the order of the rows.
+    #[inline]
     pub(crate) fn gradient(&self, splat: usize, channels: usize) -> SplatGradient {
         let per_span = slots_per_span(channels);
         let mut sum = [Slot::default(); 2];
@@ -176,6 +177,7 @@ impl Pass {
     }
 
     /// The indices of the spans of a splat, in the order of the rows.
+    #[inline]
     fn spans_of(&self, splat: usize) -> &[u32] {
         let start = splat.checked_sub(1).map_or(0, |before| self.span_ends[before]);
         &self.span_indices[start as usize..self.span_ends[splat] as usize]

@@ -14,6 +14,7 @@ pub(crate) type Row = [f32; MAX_COMPONENTS];
 const MAX_COLOR: f32 = 8.0;
 
 /// The shape components of a row.
+#[inline]
 pub(crate) fn shape_of(row: &Row) -> Vec3 {
     Vec3::from_slice(&row[2..5])
 }
@@ -34,6 +35,7 @@ impl RowBounds {
     }
 
     /// The row with all values clamped, so that the shape is valid.
+    #[inline]
     pub(crate) fn clamped(self, mut row: Row) -> Row {
         let shape =
             parameterization::clamped(self.parameterization, shape_of(&row), self.max_deviation());
@@ -43,6 +45,7 @@ impl RowBounds {
     }
 
     /// Clamps everything but the shape.
+    #[inline]
     pub(crate) fn clamp_position_and_color(self, row: &mut Row) {
         // A centre farther outside would widen the range over which positions are quantized, for a
         // Gaussian of which little is visible.
