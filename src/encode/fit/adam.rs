@@ -1,21 +1,39 @@
 //! A step of Adam (paper, appendix, section "Implementation Details").
 
 use super::row::{Row, RowBounds};
-use super::state::State;
+use super::state::Slope;
 use super::training::Adam;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
+
+/// The state for one Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct State {
+    /// Moving average of the gradient.
+    mean: Row,
+    /// Moving average of the squared gradient.
+    square: Row,
+    /// Steps since the Gaussian was added, for the bias correction.
+    age: i32,
+}
+
+impl State {
+    pub(super) const NEW: Self =
+        Self { mean: [0.0; MAX_COMPONENTS], square: [0.0; MAX_COMPONENTS], age: 0 };
+}
 
 /// One step for one Gaussian.
 pub(super) fn step(
     row: &mut Row,
     state: &mut State,
-    gradient: &Row,
+    slope: &Slope,
     options: &Adam,
     bounds: RowBounds,
     factor: f32,
 ) {
     let (beta1, beta2) = (options.beta1, options.beta2);
-    let age = state.aged();
+    let gradient = &slope.gradient;
+    state.age = state.age.saturating_add(1);
+    let age = state.age;
     let rate = factor / (1.0 - beta1.powi(age));
     let unbias = 1.0 / (1.0 - beta2.powi(age));
     let Adam { center, shape, color, .. } = *options;

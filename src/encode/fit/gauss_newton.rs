@@ -9,16 +9,34 @@ use glam::{Vec2, Vec3};
 
 use super::parameterization::OwnFrame;
 use super::row::{Row, RowBounds, shape_of};
-use super::state::{Slope, State};
+use super::state::Slope;
 use super::training::GaussNewton;
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;
 
+/// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
+/// all of them would take the same step, and never come to rest.
+const FIRST_PACE: f32 = 0.4;
 /// The change of the pace, and its range.
 const FASTER: f32 = 1.2;
 const SLOWER: f32 = 0.8;
 const LEAST_PACE: f32 = 0.02;
 const MOST_PACE: f32 = 3.0;
+
+/// The state for one Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct State {
+    /// Moving average of the gradient.
+    mean: Row,
+    /// The factor on steps.
+    pace: f32,
+    /// Steps since the Gaussian was added, for the bias correction.
+    age: i32,
+}
+
+impl State {
+    pub(super) const NEW: Self = Self { mean: [0.0; MAX_COMPONENTS], pace: FIRST_PACE, age: 0 };
+}
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
 /// the centre, the logarithms of size and ratio, the slant, and the colour.
@@ -64,7 +82,8 @@ pub(super) fn step(
         let change = if agreement < 0.0 { SLOWER } else { FASTER };
         state.pace = (state.pace * change).clamp(LEAST_PACE, MOST_PACE);
     }
-    let rate = options.rate * state.pace * factor / (1.0 - momentum.powi(state.aged()));
+    state.age = state.age.saturating_add(1);
+    let rate = options.rate * state.pace * factor / (1.0 - momentum.powi(state.age));
     let mut steps = [0.0; MAX_COMPONENTS];
     for index in 0..MAX_COMPONENTS {
         let mean = &mut state.mean[index];
@@ -88,7 +107,6 @@ pub(super) fn step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::encode::fit::state::FIRST_PACE;
     use crate::gaussian::{Gaussian, Parameterization};
 
     const OPTIONS: GaussNewton =

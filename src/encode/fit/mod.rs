@@ -111,7 +111,7 @@ impl<'a> Fit<'a> {
                 channels: raster.channels,
                 size: Vec2::new(raster.width as f32, raster.height as f32),
             },
-            parameters: Parameters::default(),
+            parameters: Parameters::new(&training.optimizer),
             quantizers: None,
             best: None,
             pass: Pass::new(raster),
@@ -321,11 +321,11 @@ impl<'a> Fit<'a> {
     fn step(&mut self, factor: f32) {
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
-        let (optimizer, raster) = (&self.training.optimizer, self.raster);
+        let raster = self.raster;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(optimizer, self.bounds, factor, |index, row, sum| {
+            self.parameters.step(self.bounds, factor, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
                 let by_splat = pass.gradient(index, channels);
                 let (center, shape) =

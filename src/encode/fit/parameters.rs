@@ -3,21 +3,26 @@
 use rayon::prelude::*;
 
 use super::row::{Row, RowBounds};
-use super::state::{Slope, State};
+use super::state::{Slope, States, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
 
-/// Trained values and their optimizer state, one entry of each per Gaussian.
-#[derive(Debug, Default)]
+/// Trained values with their optimizer.
+#[derive(Debug)]
 pub(crate) struct Parameters {
     pub(crate) values: Vec<Row>,
-    states: Vec<State>,
+    states: States,
 }
 
 impl Parameters {
+    /// Without Gaussians.
+    pub(crate) fn new(optimizer: &Optimizer) -> Self {
+        Self { values: Vec::new(), states: States::new(optimizer) }
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.values.len()
     }
@@ -26,23 +31,20 @@ impl Parameters {
     pub(crate) fn extend(&mut self, rows: &[Row]) {
         self.values.reserve_exact(rows.len());
         self.values.extend_from_slice(rows);
-        self.states.reserve_exact(rows.len());
-        self.states.resize(self.values.len(), State::NEW);
+        self.states.extend(self.values.len());
     }
 
     /// Replaces all Gaussians by those of `values`; the optimizer starts again.
     pub(crate) fn replace(&mut self, values: Vec<Row>) {
         self.states.clear();
-        self.states.resize(values.len(), State::NEW);
+        self.states.extend(values.len());
         self.values = values;
     }
 
     /// Removes the Gaussians for whose index `keep` is false.
     pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
-        let mut index = 0..;
-        self.values.retain(|_| keep(index.next().expect("endless")));
-        let mut index = 0..;
-        self.states.retain(|_| keep(index.next().expect("endless")));
+        retain(&mut self.values, &keep);
+        self.states.retain(keep);
     }
 
     /// Sorts the Gaussians along a Z curve, so that neighbours in the picture are neighbours in
@@ -58,7 +60,7 @@ impl Parameters {
             .collect();
         order.par_sort_unstable();
         self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
-        self.states = order.iter().map(|&(_, index)| self.states[index as usize]).collect();
+        self.states.reorder(order.iter().map(|&(_, index)| index as usize));
     }
 
     /// Takes one step against the gradients, which `slope` returns for an index and its row.
@@ -66,38 +68,50 @@ impl Parameters {
     /// [`CHUNK`] Gaussians, and all of them are returned in order.
     pub(crate) fn step<Sum: Default + Send>(
         &mut self,
-        optimizer: &Optimizer,
         bounds: RowBounds,
         factor: f32,
         slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Sync,
     ) -> Vec<Sum> {
-        let values = self.values.par_chunks_mut(CHUNK);
-        let chunks = values.zip(self.states.par_chunks_mut(CHUNK)).enumerate();
-        let sums = chunks.map(|(chunk, (values, states))| {
-            let mut sum = Sum::default();
-            let rows = values.iter_mut().zip(states);
-            for (index, (row, state)) in (chunk * CHUNK..).zip(rows) {
-                let slope = slope(index, row, &mut sum);
-                // A Gaussian whose gradient is not finite stays as it is until it is pruned.
-                if !slope.gradient.iter().all(|value| value.is_finite()) {
-                    continue;
-                }
-                match optimizer {
-                    Optimizer::Adam(options) => {
-                        adam::step(row, state, &slope.gradient, options, bounds, factor);
-                    }
-                    Optimizer::GaussNewton(options) => {
-                        gauss_newton::step(row, state, &slope, options, bounds, factor);
-                    }
-                }
+        let values = &mut self.values;
+        match &mut self.states {
+            States::Adam(options, states) => {
+                step_all(values, states, slope, |row, state, slope| {
+                    adam::step(row, state, slope, options, bounds, factor);
+                })
             }
-            sum
-        });
-        sums.collect()
+            States::GaussNewton(options, states) => {
+                step_all(values, states, slope, |row, state, slope| {
+                    gauss_newton::step(row, state, slope, options, bounds, factor);
+                })
+            }
+        }
     }
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        self.values.capacity() * size_of::<Row>() + self.states.capacity() * size_of::<State>()
+        self.values.capacity() * size_of::<Row>() + self.states.memory()
     }
+}
+
+/// Takes a step for every Gaussian, and returns the sums in order.
+fn step_all<State: Send, Sum: Default + Send>(
+    values: &mut [Row],
+    states: &mut [State],
+    slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Sync,
+    step: impl Fn(&mut Row, &mut State, &Slope) + Sync,
+) -> Vec<Sum> {
+    let chunks = values.par_chunks_mut(CHUNK).zip(states.par_chunks_mut(CHUNK)).enumerate();
+    let sums = chunks.map(|(chunk, (values, states))| {
+        let mut sum = Sum::default();
+        let rows = values.iter_mut().zip(states);
+        for (index, (row, state)) in (chunk * CHUNK..).zip(rows) {
+            let slope = slope(index, row, &mut sum);
+            // A Gaussian whose gradient is not finite stays as it is until it is pruned.
+            if slope.gradient.iter().all(|value| value.is_finite()) {
+                step(row, state, &slope);
+            }
+        }
+        sum
+    });
+    sums.collect()
 }
