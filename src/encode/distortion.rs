@@ -116,6 +116,7 @@ pub(crate) fn plain_distortion(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
     use crate::encode::source::Source;
 
     /// Residuals in the tile whose first pixel is `corner`.
@@ -142,7 +143,7 @@ mod tests {
         let samples: Vec<u8> = (0..width * height * CHANNELS).map(|_| rng.u8(..)).collect();
         let source =
             Source::new_u8(width as u32, height as u32, model, &samples).expect("the sizes agree");
-        let sensitivity = Sensitivity::new(&source);
+        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
         let mut residuals: Vec<f64> = samples.iter().map(|_| rng.f64() - 0.4).collect();
 
         let mut distortion = 0.0;

@@ -34,10 +34,11 @@ pub(crate) fn count_for_size(
     most: usize,
     tune: Tune,
     layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
 ) -> Result<usize, EncodeError> {
     let lattice = rate_model::lattice(0.0, layout.header().color);
     let empty = LatticeCodes { lattice, codes: Vec::new() };
-    let least = layout.write_entropy(&empty).len() as u64;
+    let least = layout.write_entropy(&empty, observer)?.len() as u64;
     layout.check_size(bytes, least)?;
     Ok((((bytes - least) * 8) as f64 / rate_model::bits_per_gaussian(tune)).min(most as f64)
         as usize)
@@ -68,8 +69,7 @@ pub(crate) fn finish(
     drop(fit);
     let search = TargetSearch::new(job.source, raster, judge, layout, job.passes);
     let coded = search.run(&gaussians, distortion, job.target, observer)?;
-    observer.poll()?;
-    Ok((layout.write_entropy(&coded), work))
+    Ok((layout.write_entropy(&coded, observer)?, work))
 }
 
 /// Extends a fit until its squared error is at most `error`, or nothing helps.

@@ -64,12 +64,12 @@ fn encode_for_target(
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
     let Job { source, target, precision, training, .. } = *job;
-    let raster = Raster::new(source, job.tune);
+    let raster = Raster::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, raster.mean(), kernel, parameterization, job.metadata);
+    let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
-    let budget = budget(job, &raster, &layout)?;
-    let judge = Judge::new(source);
+    let budget = budget(job, &raster, &layout, observer)?;
+    let judge = Judge::new(source, observer)?;
     let peak_before = work.peak_memory;
     let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
@@ -83,8 +83,7 @@ fn encode_for_target(
     let pixels = raster.pixels();
     // The decoder needs memory, too.
     drop(raster);
-    observer.poll()?;
-    let verified = Verified::new(&file, source);
+    let verified = Verified::new(&file, source, observer)?;
     let gaussians = verified.gaussians();
     let distortion = verified.distortion(gaussians, observer)?;
     let dissimilarity = judge.dissimilarity(&verified.picture(), observer)?;
@@ -97,13 +96,18 @@ fn encode_for_target(
 }
 
 /// What decides the number of Gaussians during training.
-fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Budget, EncodeError> {
+fn budget(
+    job: &Job<'_>,
+    raster: &Raster,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Budget, EncodeError> {
     let Job { target, precision, training, .. } = *job;
     let is_coded = precision == Precision::Entropy;
     if let Some(bytes) = target.bytes(raster.pixels()) {
         let most = raster.pixels();
         let count = if is_coded {
-            entropy::count_for_size(bytes, most, job.tune, layout)
+            entropy::count_for_size(bytes, most, job.tune, layout, observer)
         } else {
             packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
         };
@@ -113,7 +117,7 @@ fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Bud
         let dissimilarity = quality::dissimilarity_at(quality);
         let means = match &raster.sensitivity {
             Some(sensitivity) => sensitivity.means,
-            None => Sensitivity::new(job.source).means,
+            None => Sensitivity::new(job.source, observer)?.means,
         };
         let count = quality::count_for(dissimilarity, raster.pixels(), means);
         return Ok(Budget::Count(count));

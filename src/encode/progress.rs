@@ -3,12 +3,16 @@
 use core::fmt;
 use core::ops::ControlFlow;
 
+use rayon::prelude::*;
+
 use super::error::EncodeError;
 
 /// The progress of an encoding.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Progress {
+    /// The share of the work that is done, from 0 to 1: an estimate, which never falls.
+    pub fraction: f64,
     /// Iterations of training done so far.
     pub iteration: u32,
     /// Iterations planned in total. The number grows when a finished fit is extended to meet its
@@ -20,11 +24,20 @@ pub struct Progress {
     pub psnr: f64,
 }
 
+/// Work of each thread from one poll of the observer to the next: a few milliseconds.
+const WORK_PER_POLL: f64 = 4e6;
+/// When more work is done than was expected, each piece of it takes this share of what is left.
+const SHARE_BEYOND: f64 = 0.05;
+
 /// The caller's callback and the last progress reported to it. Code that runs for more than a few
 /// milliseconds polls it, so that the caller can cancel at any time.
+///
+/// Work is counted in the nanoseconds that it takes one core, about (`workload.rs`).
 pub(crate) struct Observer<'a> {
     callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     progress: Progress,
+    /// Work that is left.
+    left: f64,
 }
 
 impl<'a> Observer<'a> {
@@ -32,16 +45,41 @@ impl<'a> Observer<'a> {
         callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
         iterations: u32,
     ) -> Self {
-        let progress = Progress { iteration: 0, iterations, gaussians: 0, psnr: 0.0 };
-        Self { callback, progress }
+        let progress =
+            Progress { fraction: 0.0, iteration: 0, iterations, gaussians: 0, psnr: 0.0 };
+        Self { callback, progress, left: 0.0 }
     }
 
-    /// Reports progress to the caller.
+    /// Reports the progress of training to the caller.
     ///
     /// # Errors
     /// As [`Observer::poll`].
-    pub(crate) fn report(&mut self, progress: Progress) -> Result<(), EncodeError> {
-        self.progress = progress;
+    pub(crate) fn report(
+        &mut self,
+        iteration: u32,
+        iterations: u32,
+        gaussians: usize,
+        psnr: f64,
+    ) -> Result<(), EncodeError> {
+        let fraction = self.progress.fraction;
+        self.progress =
+            Progress { fraction, iteration, iterations, gaussians: gaussians as u32, psnr };
+        self.poll()
+    }
+
+    /// Replaces the estimate of the work that is left.
+    pub(crate) fn expect(&mut self, work: f64) {
+        self.left = work;
+    }
+
+    /// Reports that work is done.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn advance(&mut self, work: f64) -> Result<(), EncodeError> {
+        let share = if work < self.left { work / self.left } else { SHARE_BEYOND };
+        self.progress.fraction += share * (1.0 - self.progress.fraction);
+        self.left = (self.left - work).max(0.0);
         self.poll()
     }
 
@@ -55,10 +93,39 @@ impl<'a> Observer<'a> {
             ControlFlow::Break(()) => Err(EncodeError::Cancelled),
         }
     }
+
+    /// What `task` makes of every item, in their order. All threads share the tasks, each of which is so
+    /// much work, and every few milliseconds there is a poll on this one.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn map<T: Send, R: Send>(
+        &mut self,
+        work: f64,
+        mut items: impl ExactSizeIterator<Item = T>,
+        task: impl Fn(T) -> R + Send + Sync,
+    ) -> Result<Vec<R>, EncodeError> {
+        // The cast saturates.
+        let portion = ((WORK_PER_POLL / work) as usize).max(1) * rayon::current_num_threads();
+        let mut results = Vec::with_capacity(items.len());
+        while items.len() > 0 {
+            self.poll()?;
+            let items: Vec<T> = items.by_ref().take(portion).collect();
+            results.par_extend(items.into_par_iter().map(&task));
+        }
+        Ok(results)
+    }
 }
 
 impl fmt::Debug for Observer<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_struct("Observer").field("progress", &self.progress).finish_non_exhaustive()
     }
+}
+
+/// Calls `work` with an observer that does nothing.
+#[cfg(test)]
+pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T, EncodeError>) -> T {
+    let mut callback = |_: &Progress| ControlFlow::Continue(());
+    work(&mut Observer::new(&mut callback, 0)).expect("no one cancels")
 }

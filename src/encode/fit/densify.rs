@@ -3,12 +3,13 @@
 //! Gaussian Filters").
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::parameterization;
 use super::pass::Pass;
 use super::row::{Row, RowBounds};
 use super::training::{Densification, Distortion, GaussianFilter, NewColor, NewShape, Placement};
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -16,6 +17,10 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
 /// pruned: a 16th of the quantization step of 8 bits.
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
+/// Work for the distortions of a tile.
+const WORK: f64 = 2000.0;
+/// Tiles that get new Gaussians from one poll of the observer to the next.
+const PART: usize = 1 << 11;
 
 /// The position of a new Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,13 +49,20 @@ pub(crate) struct Densifier<'a> {
 impl Densifier<'_> {
     /// Up to `count` new Gaussians where the distortion is large. There are fewer where fewer
     /// pixels have any distortion.
-    pub(crate) fn new_gaussians(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new_gaussians(
+        &self,
+        count: usize,
+        rng: &mut fastrand::Rng,
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<Row>, EncodeError> {
         let positions = match self.options.placement {
-            Placement::Top => top(count, &self.distortion_map()),
+            Placement::Top => top(count, &self.distortion_map(observer)?),
             Placement::Spread => {
-                spread(count, self.raster.width, self.tile_grid(), rng.f64(), |tile| {
-                    self.distortions(tile)
-                })
+                let (width, tiles, phase) = (self.raster.width, self.tile_grid(), rng.f64());
+                spread(count, width, tiles, phase, |tile| self.distortions(tile), observer)?
             }
         };
         let total = self.count + positions.len();
@@ -58,7 +70,8 @@ impl Densifier<'_> {
             .filter
             .variance(self.raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        positions.into_iter().map(|position| self.new_gaussian(&position, variance, rng)).collect()
+        let new = positions.into_iter().map(|position| self.new_gaussian(&position, variance, rng));
+        Ok(new.collect())
     }
 
     /// A new Gaussian, where `variance` is the filter's.
@@ -97,11 +110,11 @@ impl Densifier<'_> {
     }
 
     /// The distortion of every pixel, row by row.
-    fn distortion_map(&self) -> Vec<f32> {
+    fn distortion_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
         let mut map = vec![0.0; self.raster.pixels()];
         let [columns, _] = self.tile_grid();
-        let rows = map.par_chunks_mut(self.raster.width * TILE_HEIGHT).enumerate();
-        rows.for_each(|(row, lines)| {
+        let rows = map.chunks_mut(self.raster.width * TILE_HEIGHT).enumerate();
+        observer.map(WORK * columns as f64, rows, |(row, lines)| {
             for column in 0..columns {
                 let distortions = self.distortions(row * columns + column);
                 let lines = lines.chunks_exact_mut(self.raster.width).zip(&distortions);
@@ -111,8 +124,8 @@ impl Densifier<'_> {
                     line[..length].copy_from_slice(&values[..length]);
                 }
             }
-        });
-        map
+        })?;
+        Ok(map)
     }
 
     /// The distortion of every pixel of a tile; 0 where the output is exact already.
@@ -183,17 +196,23 @@ fn spread(
     width: usize,
     [columns, rows]: [usize; 2],
     phase: f64,
-    distortions: impl Fn(usize) -> TilePlane + Sync,
-) -> Vec<NewPosition> {
+    distortions: impl Fn(usize) -> TilePlane + Send + Sync,
+    observer: &mut Observer<'_>,
+) -> Result<Vec<NewPosition>, EncodeError> {
     // The tiles are summed up on all threads; then only those that contain a step are visited.
     let sum_of =
         |tile| distortions(tile).as_flattened().iter().map(|&value| f64::from(value)).sum();
-    let sums: Vec<f64> = (0..columns * rows).into_par_iter().map(sum_of).collect();
+    let sums: Vec<f64> = observer.map(WORK, 0..columns * rows, sum_of)?;
     let total: f64 = sums.iter().sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
     let (mut sum, mut next) = (0.0, phase * step);
     let mut positions = Vec::new();
-    along_z([0, 0], [columns, rows], &mut |column, row| {
+    let mut order = Vec::with_capacity(sums.len());
+    along_z([0, 0], [columns, rows], &mut |column, row| order.push([column, row]));
+    for (at, [column, row]) in order.into_iter().enumerate() {
+        if at.is_multiple_of(PART) {
+            observer.poll()?;
+        }
         let tile = row * columns + column;
         let end = sum + sums[tile];
         if end > next {
@@ -213,8 +232,8 @@ fn spread(
             }
         }
         sum = end;
-    });
-    positions
+    }
+    Ok(positions)
 }
 
 /// Visits the points of a rectangle along a Z curve, on which neighbours follow each other closely.
@@ -261,6 +280,7 @@ fn random_shape(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::progress::unobserved;
 
     fn pixels(positions: &[NewPosition]) -> Vec<u32> {
         positions.iter().map(|position| position.pixel).collect()
@@ -284,13 +304,15 @@ mod tests {
     fn spread_pixels_follow_the_distortion() {
         // The right half has three times the distortion of the left one.
         let width = 50;
-        let positions = spread(397, width, [4, 5], 0.5, |tile| {
+        let distortions = |tile| {
             tile_of(tile % 4, |x| match x {
                 0..25 => 1.0,
                 25..50 => 3.0,
                 _ => 0.0,
             })
-        });
+        };
+        let positions =
+            unobserved(|observer| spread(397, width, [4, 5], 0.5, distortions, observer));
         let pixels = pixels(&positions);
         assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
@@ -324,10 +346,13 @@ mod tests {
     #[test]
     fn spread_skips_exact_pixels() {
         let exact = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
-        assert!(spread(10, 7, [1, 1], 0.0, |_| exact).is_empty());
+        let spread = |phase: f64, tile: TilePlane| {
+            unobserved(|observer| spread(10, 7, [1, 1], phase, |_| tile, observer))
+        };
+        assert!(spread(0.0, exact).is_empty());
         let mut map = exact;
         (map[2][3], map[2][4]) = (2.0, 1e-3);
-        let pixels = pixels(&spread(10, 7, [1, 1], 0.9, |_| map));
+        let pixels = pixels(&spread(0.9, map));
         assert!(pixels == [17] || pixels == [17, 18], "{pixels:?}");
     }
 

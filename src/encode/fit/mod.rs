@@ -32,7 +32,7 @@ use training_tile::RenderingError;
 
 use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
-use super::progress::{Observer, Progress};
+use super::progress::Observer;
 use super::raster::Raster;
 use super::rate_model::RateTerm;
 use crate::coding::packed::{PackedCodes, Quantizer};
@@ -267,14 +267,9 @@ impl<'a> Fit<'a> {
         if settled {
             self.keep_if_best();
         }
-        observer.report(Progress {
-            iteration: self.work.iterations,
-            iterations,
-            gaussians: self.parameters.len() as u32,
-            psnr: self.psnr(),
-        })?;
+        observer.report(self.work.iterations, iterations, self.len(), self.psnr())?;
         self.work.iterations += 1;
-        self.step(factor);
+        self.step(factor, observer)?;
         let memory = self.memory();
         self.work.peak_memory = self.work.peak_memory.max(memory);
         Ok(())
@@ -298,8 +293,7 @@ impl<'a> Fit<'a> {
             .collect_into_vec(&mut self.splats);
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
-            observer.poll()?;
-            self.pass.bin(self.raster, &self.splats, kernel);
+            self.pass.bin(self.raster, &self.splats, kernel, observer)?;
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
@@ -310,14 +304,14 @@ impl<'a> Fit<'a> {
 
     /// The rest of the backward pass, from the gradients by splats to those by trained values and
     /// quantizers, and a step of the optimizer against both.
-    fn step(&mut self, factor: f32) {
+    fn step(&mut self, factor: f32, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let (optimizer, raster) = (&self.training.optimizer, self.raster);
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(optimizer, self.bounds, factor, |index, row, sum| {
+            self.parameters.step(optimizer, self.bounds, factor, observer, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
                 let by_splat = pass.gradient(index, channels);
                 let (center, shape) =
@@ -337,7 +331,7 @@ impl<'a> Fit<'a> {
                 }
                 let sensitivity = raster.sensitivity_near([decoded[0], decoded[1]]);
                 Slope { gradient, sensitivity }
-            });
+            })?;
         if let Some(quantizers) = &mut self.quantizers {
             // Added in the order of the Gaussians, so that the sum does not depend on the threads.
             let mut total = QuantizerGradients::default();
@@ -345,6 +339,7 @@ impl<'a> Fit<'a> {
             let rate = self.training.quantization.learning_rate * factor;
             quantizers.step(&total, &self.parameters.values, rate);
         }
+        Ok(())
     }
 
     /// Densification: adds up to `count` Gaussians where the distortion is large.
@@ -362,8 +357,7 @@ impl<'a> Fit<'a> {
             bounds: self.bounds,
             count: self.parameters.len(),
         };
-        observer.poll()?;
-        let rows = densifier.new_gaussians(count, &mut self.rng);
+        let rows = densifier.new_gaussians(count, &mut self.rng, observer)?;
         observer.poll()?;
         self.parameters.extend(&rows);
         self.parameters.sort();

@@ -6,9 +6,13 @@ use super::row::{Row, RowBounds};
 use super::state::{Slope, State};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
+/// Work to step a Gaussian.
+const WORK: f64 = 200.0;
 
 /// Trained values and their optimizer state, one entry of each per Gaussian.
 #[derive(Debug, Default)]
@@ -64,16 +68,20 @@ impl Parameters {
     /// Takes one step against the gradients, which `slope` returns for an index and its row.
     /// `factor` scales all learning rates. `slope` may also add to a sum; there is one for every
     /// [`CHUNK`] Gaussians, and all of them are returned in order.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn step<Sum: Default + Send>(
         &mut self,
         optimizer: &Optimizer,
         bounds: RowBounds,
         factor: f32,
-        slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Sync,
-    ) -> Vec<Sum> {
-        let values = self.values.par_chunks_mut(CHUNK);
-        let chunks = values.zip(self.states.par_chunks_mut(CHUNK)).enumerate();
-        let sums = chunks.map(|(chunk, (values, states))| {
+        observer: &mut Observer<'_>,
+        slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Send + Sync,
+    ) -> Result<Vec<Sum>, EncodeError> {
+        let values = self.values.chunks_mut(CHUNK);
+        let chunks = values.zip(self.states.chunks_mut(CHUNK)).enumerate();
+        observer.map(WORK * CHUNK as f64, chunks, |(chunk, (values, states))| {
             let mut sum = Sum::default();
             let rows = values.iter_mut().zip(states);
             for (index, (row, state)) in (chunk * CHUNK..).zip(rows) {
@@ -92,8 +100,7 @@ impl Parameters {
                 }
             }
             sum
-        });
-        sums.collect()
+        })
     }
 
     /// Size in bytes.

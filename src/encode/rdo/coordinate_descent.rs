@@ -19,6 +19,10 @@ use crate::kernel::QUARTIC_RADIUS;
 const BLOCK: usize = 16;
 /// Gaussians from one poll of the observer to the next.
 const POLL_INTERVAL: usize = 256;
+/// Work to find the window of a Gaussian.
+const WORK: f64 = 200.0;
+/// Windows that are put into batches from one poll of the observer to the next.
+const PART: usize = 1 << 14;
 
 /// The trust region of the quadratic model: the largest change of each component of the geometry in
 /// a step to the model's minimum.
@@ -73,8 +77,7 @@ impl CoordinateDescent<'_> {
     ) -> Result<usize, EncodeError> {
         let mut kept = vec![true; codes.len()];
         let mut changed = 0;
-        observer.poll()?;
-        for batch in self.independent_batches(residuals, codes) {
+        for batch in self.independent_batches(residuals, codes, observer)? {
             for part in batch.chunks(POLL_INTERVAL) {
                 observer.poll()?;
                 let shared = &*residuals;
@@ -117,23 +120,29 @@ impl CoordinateDescent<'_> {
     /// Large windows, which overlap many others, come first. Neighbours in the order of the codes
     /// are mostly neighbours in the picture; windows of about the same size are therefore taken in
     /// bit-reversed order.
-    fn independent_batches(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
+    fn independent_batches(
+        &self,
+        residuals: &Residuals,
+        codes: &[Code],
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<Vec<usize>>, EncodeError> {
         let columns = residuals.width().div_ceil(BLOCK);
-        let mut windows: Vec<_> = (codes.iter().enumerate())
-            .map(|(index, code)| {
-                let blocks = residuals
-                    .window(&self.gaussian(code))
-                    .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
-                // Gaussians outside the picture go into the first batch, and will be removed.
-                let [x, y] = blocks.unwrap_or_default();
-                let area = (x.len() * y.len()) as u32;
-                (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
-            })
-            .collect();
+        let mut windows = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
+            let blocks = residuals
+                .window(&self.gaussian(code))
+                .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
+            // Gaussians outside the picture go into the first batch, and will be removed.
+            let [x, y] = blocks.unwrap_or_default();
+            let area = (x.len() * y.len()) as u32;
+            (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
+        })?;
         windows.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
         let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
         let mut batches: Vec<Vec<usize>> = Vec::new();
-        for (_, order, x, y) in windows {
+        for (at, (_, order, x, y)) in windows.into_iter().enumerate() {
+            if at.is_multiple_of(PART) {
+                observer.poll()?;
+            }
             let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
             let batch = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
             blocks.for_each(|block| next[block] = batch + 1);
@@ -142,7 +151,7 @@ impl CoordinateDescent<'_> {
             }
             batches[batch].push(order.reverse_bits() as usize);
         }
-        batches
+        Ok(batches)
     }
 
     /// The code of least cost among a code and its candidates; `None` if it costs less to remove

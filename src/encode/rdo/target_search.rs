@@ -77,7 +77,7 @@ impl<'a> TargetSearch<'a> {
             _ => rate_model::step_for(distortion, gaussians.len()),
         };
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            let mut coded = self.codes.rounded(gaussians, step);
+            let mut coded = self.codes.rounded(gaussians, step, observer)?;
             self.codes.descend(&mut coded, 0.0, self.passes, observer)?;
             return Ok(coded);
         };
@@ -167,9 +167,8 @@ impl<'a> TargetSearch<'a> {
             return Ok(search.at);
         }
         for _ in 0..MOST_ROUNDING_TRIES {
-            observer.poll()?;
-            let mut coded = self.codes.rounded(gaussians, search.at);
-            self.codes.written(&mut coded);
+            let mut coded = self.codes.rounded(gaussians, search.at, observer)?;
+            self.codes.written(&mut coded, observer)?;
             let deviation = self.deviation(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
             if search.is_exhausted(deviation) {
                 break;
@@ -195,7 +194,7 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(LatticeCodes, f64), EncodeError> {
-        let mut coded = self.codes.rounded(gaussians, step);
+        let mut coded = self.codes.rounded(gaussians, step, observer)?;
         self.codes.descend(&mut coded, 0.0, passes, observer)?;
         let deviation = self.deviation(&coded, aim, observer)?;
         Ok((coded, deviation))
@@ -236,17 +235,16 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
-        observer.poll()?;
-        let file = self.layout.write_entropy(coded);
+        let file = self.layout.write_entropy(coded, observer)?;
         Ok(match aim {
             Aim::Size { most } => (file.len() as f64 / most).log2(),
             Aim::Psnr(psnr) => {
-                let verified = Verified::new(&file, self.source);
+                let verified = Verified::new(&file, self.source, observer)?;
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
                 ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
             Aim::Dissimilarity(dissimilarity) => {
-                let verified = Verified::new(&file, self.source);
+                let verified = Verified::new(&file, self.source, observer)?;
                 let reached = self.judge.dissimilarity(&verified.picture(), observer)?;
                 (reached / dissimilarity).log2().max(-LARGEST_DEVIATION)
             }
@@ -261,8 +259,7 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         loop {
-            observer.poll()?;
-            let size = self.layout.write_entropy(coded).len() as u64;
+            let size = self.layout.write_entropy(coded, observer)?.len() as u64;
             let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else {
                 return Ok(());
             };
