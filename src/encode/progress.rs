@@ -26,8 +26,8 @@ pub struct Progress {
 
 /// Work of each thread from one poll of the observer to the next: a few milliseconds.
 const WORK_PER_POLL: f64 = 4e6;
-/// When more work is done than was expected, each piece of it takes this share of what is left.
-const SHARE_BEYOND: f64 = 0.05;
+/// At least so much work is taken to be left, as a share of what is done: an estimate may be too low.
+const LEAST_LEFT: f64 = 0.03;
 
 /// The caller's callback and the last progress reported to it. Code that runs for more than a few
 /// milliseconds polls it, so that the caller can cancel at any time.
@@ -36,7 +36,8 @@ const SHARE_BEYOND: f64 = 0.05;
 pub(crate) struct Observer<'a> {
     callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     progress: Progress,
-    /// Work that is left.
+    /// Work that is done, and work that is left.
+    done: f64,
     left: f64,
 }
 
@@ -47,7 +48,7 @@ impl<'a> Observer<'a> {
     ) -> Self {
         let progress =
             Progress { fraction: 0.0, iteration: 0, iterations, gaussians: 0, psnr: 0.0 };
-        Self { callback, progress, left: 0.0 }
+        Self { callback, progress, done: 0.0, left: 0.0 }
     }
 
     /// Reports the progress of training to the caller.
@@ -77,9 +78,12 @@ impl<'a> Observer<'a> {
     /// # Errors
     /// As [`Observer::poll`].
     pub(crate) fn advance(&mut self, work: f64) -> Result<(), EncodeError> {
-        let share = if work < self.left { work / self.left } else { SHARE_BEYOND };
-        self.progress.fraction += share * (1.0 - self.progress.fraction);
-        self.left = (self.left - work).max(0.0);
+        let left = self.left.max(LEAST_LEFT * self.done).max(work);
+        if left > 0.0 {
+            self.progress.fraction += work / left * (1.0 - self.progress.fraction);
+        }
+        self.done += work;
+        self.left -= work;
         self.poll()
     }
 

@@ -88,7 +88,7 @@ fn divide<'a>(
 ) -> Result<Vec<&'a mut [Code]>, EncodeError> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
-    codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    codes.sort_by_cached_key(|code| core::cmp::Reverse(code.strength()));
     let mut layers = Vec::new();
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {

@@ -19,7 +19,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
 /// Work for the distortions of a tile.
 const WORK: f64 = 2000.0;
-/// Tiles that get new Gaussians from one poll of the observer to the next.
+/// Tiles that get new Gaussians from one poll of the observer to the next, and new Gaussians.
 const PART: usize = 1 << 11;
 
 /// The position of a new Gaussian.
@@ -70,8 +70,12 @@ impl Densifier<'_> {
             .filter
             .variance(self.raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        let new = positions.into_iter().map(|position| self.new_gaussian(&position, variance, rng));
-        Ok(new.collect())
+        let mut rows = Vec::with_capacity(positions.len());
+        for positions in positions.chunks(PART) {
+            observer.poll()?;
+            rows.extend(positions.iter().map(|at| self.new_gaussian(at, variance, rng)));
+        }
+        Ok(rows)
     }
 
     /// A new Gaussian, where `variance` is the filter's.

@@ -17,7 +17,6 @@ mod training_tile;
 pub(crate) mod vector_quantizer;
 
 use glam::Vec2;
-use rayon::prelude::*;
 
 use budget::Budget;
 use densify::{Densifier, MIN_COLOR};
@@ -35,6 +34,7 @@ use super::options::{MAX_GAUSSIANS, Precision};
 use super::progress::Observer;
 use super::raster::Raster;
 use super::rate_model::RateTerm;
+use super::workload::Workload;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::render::splat::Splat;
@@ -44,8 +44,8 @@ use crate::render::splat::Splat;
 const FORESEEN: f64 = 0.75;
 /// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
-/// Gaussians that one task turns into splats.
-const CHUNK: usize = 512;
+/// Work to turn a Gaussian into a splat, or to look at it.
+const WORK: f64 = 40.0;
 
 /// What fits have cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -122,8 +122,12 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Trains from nothing.
-    pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    /// Trains from nothing. `workload` is what was expected of it, for the progress that is told.
+    pub(crate) fn run(
+        &mut self,
+        workload: Workload,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
         self.forward(observer)?;
@@ -132,6 +136,8 @@ impl<'a> Fit<'a> {
         let mut kept = usize::MAX;
         let total = self.work.iterations + iterations;
         for iteration in 0..*iterations {
+            let grown = 2.0 * f64::from(iteration) / f64::from(*iterations);
+            observer.advance(workload.iteration(grown.min(1.0)))?;
             if iteration == plan.quantized_from {
                 self.start_quantization();
             }
@@ -139,13 +145,13 @@ impl<'a> Fit<'a> {
             self.iterate(factor, total, plan.is_settled(iteration), observer)?;
             let done = iteration + 1;
             if done % densification.prune_interval == 0 {
-                self.prune();
+                self.prune(observer)?;
             }
             if let Some(steps_left) = plan.growths_left(done) {
                 kept = self.wanted(FORESEEN);
                 let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
-                self.cull(replaced);
+                self.cull(replaced, observer)?;
                 self.grow(portion + replaced, observer)?;
             }
             if let Some(culls_left) = plan.culls_left(done) {
@@ -153,7 +159,7 @@ impl<'a> Fit<'a> {
                 kept = kept.max(self.wanted(FORESEEN));
                 // Growth may have ended before the budget, where there is little to correct.
                 let surplus = self.len().saturating_sub(kept);
-                self.cull(surplus / (culls_left as usize + 1));
+                self.cull(surplus / (culls_left as usize + 1), observer)?;
             }
         }
         self.settle(observer)
@@ -172,11 +178,13 @@ impl<'a> Fit<'a> {
             self.binned_for = 0;
         }
         self.forward(observer)?;
-        self.cull(self.len().saturating_sub(count));
+        self.cull(self.len().saturating_sub(count), observer)?;
         self.grow(count.saturating_sub(self.len()), observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
+        let workload = Workload::new(self.raster.pixels(), self.len());
         for iteration in 0..iterations {
+            observer.advance(workload.iteration(1.0))?;
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
             self.iterate(factor, total, true, observer)?;
         }
@@ -279,18 +287,12 @@ impl<'a> Fit<'a> {
     fn forward(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         let components = 5 + self.raster.channels;
-        self.splats.clear();
-        self.splats.reserve_exact(self.parameters.len());
-        self.parameters
-            .values
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map(|row| {
-                let row = decoded(quantizers.as_ref(), row);
-                let gaussian = Gaussian::from_components(&row[..components], parameterization);
-                Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
-            })
-            .collect_into_vec(&mut self.splats);
+        self.splats = Vec::new();
+        self.splats = observer.map(WORK, self.parameters.values.iter(), |row| {
+            let row = decoded(quantizers.as_ref(), row);
+            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
+        })?;
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
             self.pass.bin(self.raster, &self.splats, kernel, observer)?;
@@ -360,7 +362,7 @@ impl<'a> Fit<'a> {
         let rows = densifier.new_gaussians(count, &mut self.rng, observer)?;
         observer.poll()?;
         self.parameters.extend(&rows);
-        self.parameters.sort();
+        self.parameters.sort(observer)?;
         self.invalidate();
         Ok(())
     }
@@ -373,20 +375,18 @@ impl<'a> Fit<'a> {
     }
 
     /// Culling: removes the `count` Gaussians of least importance.
-    fn cull(&mut self, count: usize) {
+    fn cull(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let count = count.min(self.len());
         if count == 0 {
-            return;
+            return Ok(());
         }
         let (parameterization, components) =
             (self.bounds.parameterization, 5 + self.raster.channels);
-        let rows = self.parameters.values.par_iter();
-        let importances: Vec<f32> = rows
-            .map(|row| {
-                let gaussian = Gaussian::from_components(&row[..components], parameterization);
-                gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
-            })
-            .collect();
+        let importances = observer.map(WORK, self.parameters.values.iter(), |row| {
+            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
+        })?;
+        observer.poll()?;
         let mut order: Vec<u32> = (0..importances.len() as u32).collect();
         order.select_nth_unstable_by(count - 1, |a, b| {
             importances[*a as usize].total_cmp(&importances[*b as usize]).then_with(|| a.cmp(b))
@@ -395,12 +395,14 @@ impl<'a> Fit<'a> {
         for &index in &order[..count] {
             keep[index as usize] = false;
         }
+        observer.poll()?;
         self.parameters.retain(|index| keep[index]);
         self.invalidate();
+        observer.poll()
     }
 
     /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
-    fn prune(&mut self) {
+    fn prune(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let values = &self.parameters.values;
         let (parameterization, components) =
             (self.bounds.parameterization, 5 + self.raster.channels);
@@ -412,11 +414,12 @@ impl<'a> Fit<'a> {
             let is_inside = self.pass.touches(index);
             gaussian.is_drawable() && has_color && is_inside
         };
-        let keep: Vec<bool> = (0..values.len()).into_par_iter().map(is_visible).collect();
+        let keep = observer.map(WORK, 0..values.len(), is_visible)?;
         if keep.contains(&false) {
             self.parameters.retain(|index| keep[index]);
             self.invalidate();
         }
+        observer.poll()
     }
 
     /// Starts quantization-aware training (paper, section "Compression Framework").

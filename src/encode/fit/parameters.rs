@@ -51,7 +51,10 @@ impl Parameters {
 
     /// Sorts the Gaussians along a Z curve, so that neighbours in the picture are neighbours in
     /// memory.
-    pub(crate) fn sort(&mut self) {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let spread = |value: f32| {
             // The bits of the other coordinate go between those of this one.
             (0..16).fold(0, |sum, bit| sum | (value.max(0.0) as u32 >> bit & 1) << (2 * bit))
@@ -60,9 +63,13 @@ impl Parameters {
             .zip(&self.values)
             .map(|(index, row)| (spread(row[0] / 4.0) | spread(row[1] / 4.0) << 1, index))
             .collect();
+        observer.poll()?;
         order.par_sort_unstable();
+        observer.poll()?;
         self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
+        observer.poll()?;
         self.states = order.iter().map(|&(_, index)| self.states[index as usize]).collect();
+        Ok(())
     }
 
     /// Takes one step against the gradients, which `slope` returns for an index and its row.

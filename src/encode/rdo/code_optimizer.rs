@@ -1,6 +1,8 @@
 //! The codes of Gaussians for a quantization step: rounding to the lattice, and passes of
 //! coordinate descent over the codes.
 
+use core::ops::Range;
+
 use super::coordinate_descent::{CodeContext, CoordinateDescent, touched_tiles};
 use super::residuals::Residuals;
 use crate::coding::entropy::{CenterGrid, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
@@ -11,6 +13,7 @@ use crate::encode::progress::Observer;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
 use crate::encode::strips;
+use crate::encode::workload::Workload;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
@@ -64,8 +67,8 @@ impl<'a> CodeOptimizer<'a> {
         Ok(LatticeCodes { lattice, codes })
     }
 
-    /// Runs up to `passes` passes of coordinate descent over the codes, and ends early when a pass
-    /// changes none. The Lagrange multiplier is 2^`lambda` times that of the rate model. The codes
+    /// Runs these passes of coordinate descent over the codes, counted from rounding, and ends early
+    /// when a pass changes none. The Lagrange multiplier is 2^`lambda` times that of the rate model. The codes
     /// are then in the order of the file.
     ///
     /// # Errors
@@ -74,12 +77,13 @@ impl<'a> CodeOptimizer<'a> {
         &self,
         coded: &mut LatticeCodes,
         lambda: f64,
-        passes: u32,
+        passes: Range<u32>,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let lambda = rate_model::lambda(&coded.lattice) * lambda.exp2() as f32;
         let mut residuals = Residuals::new(self.raster, observer)?;
-        for _ in 0..passes {
+        let workload = Workload::new(self.raster.pixels(), coded.codes.len());
+        for pass in passes {
             let layers = self.written(coded, observer)?;
             let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
             self.render(coded, &mut residuals, observer)?;
@@ -97,8 +101,9 @@ impl<'a> CodeOptimizer<'a> {
             let tree_bits = 8.0 * bytes as f32 - attribute_bits;
             let tree_bits = (tree_bits / coded.codes.len().max(1) as f32).max(0.0);
             let tile_bits = DECODING_TIME_BITS * coded.codes.len() as f32 / tiles.max(1.0);
+            let work = workload.descent(pass + 1, 1);
             let descent =
-                CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda };
+                CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda, work };
             if descent.pass(&mut residuals, &mut coded.codes, &contexts, observer)? == 0 {
                 break;
             }
