@@ -2,6 +2,7 @@
 
 use super::step_search::Aim;
 use crate::encode::job::Job;
+use crate::encode::options::Tune;
 use crate::encode::workload::Workload;
 
 /// Most passes of coordinate descent until a target is met.
@@ -18,13 +19,14 @@ pub(crate) struct SearchWork {
     workload: Workload,
     /// Passes that the effort sets.
     pub(super) passes: u32,
+    tune: Tune,
     aim: Option<Aim>,
 }
 
 impl SearchWork {
     pub(crate) fn new(job: &Job<'_>, gaussians: usize) -> Self {
         let aim = Aim::new(job.target, job.pixels());
-        Self { workload: job.workload(gaussians), passes: job.passes, aim }
+        Self { workload: job.workload(gaussians), passes: job.passes, tune: job.tune, aim }
     }
 
     /// Passes of a try before lambda is adjusted.
@@ -68,7 +70,9 @@ impl SearchWork {
         let adjusted = |passes| self.passes(first, passes) + f64::from(passes) * self.comparison();
         let tries = match self.aim {
             Some(Aim::Size { .. }) => adjusted(usual.max(LEAST_PASSES)),
-            // Usually, the first try ends beside the target.
+            // It takes all passes, and if the codes are not tuned for it, the first try usually ends
+            // beside the target.
+            Some(Aim::Psnr(_)) if self.tune == Tune::Psnr => adjusted(MOST_PASSES - first),
             Some(Aim::Psnr(_)) => {
                 adjusted(MOST_PASSES - first) + self.first_try() + adjusted(usual.max(3))
             }
