@@ -133,3 +133,62 @@ pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T, En
     let mut callback = |_: &Progress| ControlFlow::Continue(());
     work(&mut Observer::new(&mut callback, 0)).expect("no one cancels")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fractions that the callback gets.
+    fn fractions(work: impl FnOnce(&mut Observer<'_>) -> Result<(), EncodeError>) -> Vec<f64> {
+        let mut fractions = Vec::new();
+        let mut callback = |progress: &Progress| {
+            fractions.push(progress.fraction);
+            ControlFlow::Continue(())
+        };
+        work(&mut Observer::new(&mut callback, 1)).expect("no one cancels");
+        fractions
+    }
+
+    #[test]
+    fn the_fraction_never_falls_whatever_is_expected() {
+        let steps = fractions(|observer| {
+            observer.expect(10.0);
+            observer.advance(5.0)?;
+            // More is left than was expected.
+            observer.expect(20.0);
+            observer.advance(5.0)?;
+            // Less is left.
+            observer.expect(5.0);
+            observer.advance(4.0)
+        });
+        let expected = [0.5, 0.625, 0.925];
+        for (step, expected) in steps.iter().zip(expected) {
+            assert!((step - expected).abs() < 1e-9, "{steps:?}");
+        }
+        let beyond = fractions(|observer| {
+            observer.expect(3.0);
+            (0..50).try_for_each(|_| observer.advance(1.0))
+        });
+        assert!(beyond.is_sorted() && beyond[49] <= 1.0, "{beyond:?}");
+        assert!(fractions(|observer| observer.advance(0.0)) == [0.0]);
+    }
+
+    #[test]
+    fn tasks_keep_their_order_and_there_is_a_poll_every_few_milliseconds() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        pool.install(|| {
+            let mut polls = 0;
+            let mut callback = |_: &Progress| {
+                polls += 1;
+                if polls > 260 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let mut observer = Observer::new(&mut callback, 1);
+            let doubled = observer.map(1e6, 0..1000, |number| 2 * number).expect("few polls");
+            assert_eq!(doubled, (0..1000).map(|number| 2 * number).collect::<Vec<_>>());
+            // A task that is longer than that has a poll of its own.
+            let long = observer.map(1e9, 0..11, |number| number);
+            assert!(matches!(long, Err(EncodeError::Cancelled)));
+            assert_eq!(polls, 261);
+        });
+    }
+}
