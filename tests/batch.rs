@@ -10,7 +10,7 @@ use std::fs;
 use common::layered;
 use image::{ColorType, DynamicImage, ImageEncoder, ImageReader};
 use image_gip::{Encoder, GipEncoder, Target};
-use room::{Room, text};
+use room::{Room, by_input};
 use serde_json::Value;
 
 const SIZE: (u32, u32) = (48, 32);
@@ -28,36 +28,9 @@ fn room_with_pictures() -> Room {
         ("in/2024/c.tiff", ColorType::Rgb16),
         ("in/2024/may/d.e.png", ColorType::La8),
     ] {
-        save(&room, name, &pictures::picture(SIZE, color));
+        room.save(name, &pictures::picture(SIZE, color));
     }
     room
-}
-
-fn save(room: &Room, name: &str, picture: &DynamicImage) {
-    room.write(name, "");
-    picture.save(room.path(name)).expect("the format takes the colour type");
-}
-
-/// Runs `gip batch`, which must end with this status. Returns what it printed and the errors.
-#[track_caller]
-fn batch(room: &Room, status: i32, args: &[&str]) -> (String, String) {
-    let output = room.run(&[&["batch"], args].concat());
-    let (printed, errors) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(status), "{args:?}: {printed}{errors}");
-    (printed, errors)
-}
-
-/// The lines of a manifest by their inputs.
-#[track_caller]
-fn lines(manifest: &[u8]) -> BTreeMap<String, Value> {
-    let lines = text(manifest);
-    let parse = |line: &str| -> (String, Value) {
-        let value: Value = serde_json::from_str(line).expect("JSON");
-        (value["input"].as_str().expect("a name").into(), value)
-    };
-    let by_input: BTreeMap<_, _> = lines.lines().map(parse).collect();
-    assert_eq!(by_input.len(), lines.lines().count(), "a line per file: {lines}");
-    by_input
 }
 
 #[test]
@@ -66,14 +39,14 @@ fn a_folder_keeps_its_structure_and_files_are_those_of_encode() {
     room.write("in/notes.txt", "no picture");
     room.write("in/.hidden.png", "no picture");
     let args = ["in", "--out", "new/out", "--manifest", "m.jsonl", "--jobs", "2"];
-    let (printed, errors) = batch(&room, 0, &[&args[..], &QUICK].concat());
+    let (printed, errors) = room.batch(0, &[&args[..], &QUICK].concat());
     assert!(printed.starts_with("4 files: 4 written, 0 skipped, 0 failed, 0 left; "), "{printed}");
     assert_eq!(errors, "", "no bar without a terminal");
 
     let found = room.files("new/out");
     let names = ["2024/c.gip", "2024/may/d.e.gip", "a.gip", "b.gip"];
     assert!(found.keys().eq(&names), "{:?}", found.keys());
-    let manifest = lines(&room.read("m.jsonl"));
+    let manifest = by_input(&room.read("m.jsonl"));
     let sources = ["in/2024/c.tiff", "in/2024/may/d.e.png", "in/a.png", "in/b.JPG"];
     assert!(manifest.keys().eq(&sources), "{manifest:?}");
     for (source, name) in sources.iter().zip(names) {
@@ -92,7 +65,7 @@ fn a_folder_keeps_its_structure_and_files_are_those_of_encode() {
 
     // Neither jobs nor budget change anything: here, every picture is larger than the budget.
     for limits in [["--jobs", "1"], ["--budget", "0.001"]] {
-        batch(&room, 0, &[&["in", "--out", "again"], &limits[..], &QUICK].concat());
+        room.batch(0, &[&["in", "--out", "again"], &limits[..], &QUICK].concat());
         assert_eq!(room.files("again"), found, "{limits:?}");
     }
 }
@@ -101,7 +74,7 @@ fn a_folder_keeps_its_structure_and_files_are_those_of_encode() {
 fn files_are_named_one_by_one_too() {
     let room = room_with_pictures();
     let args = ["in/2024/c.tiff", "in/2024/may", "in/b.JPG", "in/b.JPG", "--out", "out"];
-    batch(&room, 0, &[&args[..], &QUICK].concat());
+    room.batch(0, &[&args[..], &QUICK].concat());
     assert!(room.files("out").keys().eq(&["b.gip", "c.gip", "d.e.gip"]));
 }
 
@@ -109,8 +82,8 @@ fn files_are_named_one_by_one_too() {
 fn the_manifest_goes_to_standard_output_on_request() {
     let room = room_with_pictures();
     let args = ["in", "--out", "out", "--manifest", "-"];
-    let (manifest, rest) = batch(&room, 0, &[&args[..], &QUICK].concat());
-    assert_eq!(lines(manifest.as_bytes()).len(), 4);
+    let (manifest, rest) = room.batch(0, &[&args[..], &QUICK].concat());
+    assert_eq!(by_input(manifest.as_bytes()).len(), 4);
     assert!(rest.starts_with("4 files: 4 written"), "the rest is on standard error: {rest}");
 }
 
@@ -123,10 +96,10 @@ fn bad_pictures_are_reported_and_skipped() {
     room.write("in/text.jpg", "not a picture");
     room.write("out/short.gip", "precious");
     let args = ["in", "--out", "out", "--manifest", "m.jsonl"];
-    let (printed, errors) = batch(&room, 3, &[&args[..], &QUICK].concat());
+    let (printed, errors) = room.batch(3, &[&args[..], &QUICK].concat());
     assert!(printed.starts_with("7 files: 4 written, 0 skipped, 3 failed, 0 left"), "{printed}");
     assert_eq!(errors.lines().count(), 3, "{errors}");
-    let manifest = lines(&room.read("m.jsonl"));
+    let manifest = by_input(&room.read("m.jsonl"));
     for name in ["in/empty.png", "in/short.png", "in/text.jpg"] {
         let line = &manifest[name];
         assert_eq!(line["status"], "failed");
@@ -141,7 +114,7 @@ fn bad_pictures_are_reported_and_skipped() {
     assert_eq!(room.read("out/short.gip"), b"precious");
 
     // A target that one picture cannot meet is its own failure.
-    let (_, errors) = batch(&room, 3, &["in/a.png", "--out", "out", "--size", "20"]);
+    let (_, errors) = room.batch(3, &["in/a.png", "--out", "out", "--size", "20"]);
     assert!(errors.starts_with("error: in/a.png: "), "{errors}");
 }
 
@@ -151,7 +124,7 @@ fn conflicts_end_the_run_before_it_begins() {
     room.write("in/a.jpg", "its result has the same name");
     room.write("m.jsonl", "precious");
     let run = ["--out", "out", "--manifest", "m.jsonl"];
-    let (_, errors) = batch(&room, 2, &[&["in"], &run[..]].concat());
+    let (_, errors) = room.batch(2, &[&["in"], &run[..]].concat());
     assert_eq!(errors, "error: in/a.jpg and in/a.png both become out/a.gip\n");
     fs::remove_file(room.path("in/a.jpg")).expect("it is there");
     for (args, words) in [
@@ -164,13 +137,13 @@ fn conflicts_end_the_run_before_it_begins() {
         (&["in", "--out", "out", "--jobs", "0"], "--jobs"),
         (&["in", "--out", "out", "--thumbnail", "0"], "--thumbnail"),
     ] {
-        let (_, errors) = batch(&room, 2, args);
+        let (_, errors) = room.batch(2, args);
         assert!(errors.starts_with("error: ") && errors.contains(words), "{errors}");
     }
-    let (_, errors) = batch(&room, 1, &[&["in", "missing"], &run[..]].concat());
+    let (_, errors) = room.batch(1, &[&["in", "missing"], &run[..]].concat());
     assert!(errors.starts_with("error: missing: "), "{errors}");
     room.write("file", "");
-    let (_, errors) = batch(&room, 1, &["in", "--out", "file"]);
+    let (_, errors) = room.batch(1, &["in", "--out", "file"]);
     assert!(errors.starts_with("error: file: "), "{errors}");
     assert_eq!(room.names(), ["file", "in", "m.jsonl"], "nothing was made");
     assert_eq!(room.read("m.jsonl"), b"precious");
@@ -180,20 +153,20 @@ fn conflicts_end_the_run_before_it_begins() {
 fn a_folder_without_pictures_is_no_error() {
     let room = Room::new();
     room.write("in/notes.txt", "no picture");
-    let (printed, _) = batch(&room, 0, &["in", "--out", "out"]);
+    let (printed, _) = room.batch(0, &["in", "--out", "out"]);
     assert!(printed.starts_with("0 files: ") && printed.contains("\nnote: "), "{printed}");
 }
 
 #[test]
 fn decoding_is_that_of_decode() {
     let room = room_with_pictures();
-    batch(&room, 0, &[&["in", "--out", "gips"], &QUICK[..]].concat());
+    room.batch(0, &[&["in", "--out", "gips"], &QUICK[..]].concat());
     let run = ["gips", "--decode", "--out"];
-    batch(&room, 0, &[&run[..], &["png", "--manifest", "m.jsonl"]].concat());
+    room.batch(0, &[&run[..], &["png", "--manifest", "m.jsonl"]].concat());
     let pngs = room.files("png");
     let names = ["2024/c", "2024/may/d.e", "a", "b"];
     assert!(pngs.keys().eq(&names.map(|name| format!("{name}.png"))), "{:?}", pngs.keys());
-    let manifest = lines(&room.read("m.jsonl"));
+    let manifest = by_input(&room.read("m.jsonl"));
     for name in names {
         room.ok(&["decode", &format!("gips/{name}.gip"), "alone.png"]);
         let png = &pngs[&format!("{name}.png")];
@@ -205,11 +178,11 @@ fn decoding_is_that_of_decode() {
     }
 
     // JPEG has no alpha, and d.e.gip has.
-    let (_, errors) = batch(&room, 3, &[&run[..], &["jpg", "--format", "jpg"]].concat());
+    let (_, errors) = room.batch(3, &[&run[..], &["jpg", "--format", "jpg"]].concat());
     assert!(errors.starts_with("error: gips/2024/may/d.e.gip: ") && errors.contains("alpha"));
     assert!(room.files("jpg").keys().eq(&["2024/c.jpg", "a.jpg", "b.jpg"]));
     // Files that are named are tried, whatever their names.
-    let (_, errors) = batch(&room, 3, &["in/a.png", "--decode", "--out", "no"]);
+    let (_, errors) = room.batch(3, &["in/a.png", "--decode", "--out", "no"]);
     assert!(errors.starts_with("error: in/a.png: "), "{errors}");
 }
 
@@ -220,13 +193,13 @@ fn thumbnails_fit_and_read_only_what_they_need() {
     // notice that a later one is damaged.
     room.write("gips/whole.gip", layered::damaged(&[]));
     room.write("gips/hurt.gip", layered::damaged(&[20]));
-    let (_, errors) = batch(&room, 3, &["gips", "--decode", "--out", "whole"]);
+    let (_, errors) = room.batch(3, &["gips", "--decode", "--out", "whole"]);
     assert!(errors.starts_with("error: gips/hurt.gip: "), "{errors}");
     let args = ["gips", "--thumbnail", "30", "--out", "thumbs", "--manifest", "m.jsonl"];
-    batch(&room, 0, &args);
+    room.batch(0, &args);
     let thumbs = room.files("thumbs");
     assert_eq!(thumbs["hurt.png"], thumbs["whole.png"]);
-    let line = &lines(&room.read("m.jsonl"))["gips/hurt.gip"];
+    let line = &by_input(&room.read("m.jsonl"))["gips/hurt.gip"];
     assert_eq!((&line["width"], &line["height"]), (&30.into(), &20.into()));
     assert_eq!(line["gaussians"], 4 * layered::IN_A_LAYER);
 
@@ -241,7 +214,7 @@ fn thumbnails_fit_and_read_only_what_they_need() {
         ("100x7", (11, 7)),
         ("5000", (300, 200)),
     ] {
-        batch(&room, 0, &["gips/whole.gip", "--thumbnail", bounds, "--out", "sized"]);
+        room.batch(0, &["gips/whole.gip", "--thumbnail", bounds, "--out", "sized"]);
         assert_eq!(size("sized/whole.png"), expected, "{bounds}");
     }
 
@@ -252,6 +225,6 @@ fn thumbnails_fit_and_read_only_what_they_need() {
     encoder.set_exif_metadata(EXIF_ROTATE_90.into()).expect(".gip has Exif");
     pictures::picture(SIZE, ColorType::Rgb8).write_with_encoder(encoder).expect("in memory");
     room.write("turned.gip", turned);
-    batch(&room, 0, &["turned.gip", "--thumbnail", "48x12", "--out", "sized"]);
+    room.batch(0, &["turned.gip", "--thumbnail", "48x12", "--out", "sized"]);
     assert_eq!(size("sized/turned.png"), (8, 12));
 }

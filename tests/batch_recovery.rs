@@ -11,7 +11,7 @@ use std::process::Output;
 use std::time::{Duration, SystemTime};
 
 use image::ColorType;
-use room::{Room, text};
+use room::{Room, by_input, text};
 use serde_json::Value;
 
 /// Options that make files of some 2,000 bytes quickly.
@@ -25,9 +25,7 @@ fn room_with_pictures() -> (Room, Files) {
     let room = Room::new();
     for number in 0..PICTURES {
         let name = format!("in/{}/{number}.png", number % 2);
-        room.write(&name, "");
-        let picture = pictures::picture((40 + number as u32, 32), ColorType::Rgb8);
-        picture.save(room.path(&name)).expect("writable");
+        room.save(&name, &pictures::picture((40 + number as u32, 32), ColorType::Rgb8));
     }
     batch(&room, 0, &["--out", "undisturbed", "--manifest", "undisturbed.jsonl"]);
     let files = room.files("undisturbed");
@@ -42,10 +40,7 @@ fn args<'a>(more: &[&'a str]) -> Vec<&'a str> {
 /// Runs `gip batch in`, which must end with this status. Returns what it printed.
 #[track_caller]
 fn batch(room: &Room, status: i32, more: &[&str]) -> String {
-    let output = room.run(&args(more));
-    let (printed, errors) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(status), "{more:?}: {printed}{errors}");
-    printed
+    room.batch(status, &args(more)[1..]).0
 }
 
 /// Sets when a file was changed last, in seconds from now.
@@ -58,16 +53,10 @@ fn touch(room: &Room, name: &str, seconds: i64) {
 }
 
 /// A manifest without what differs from run to run: by input, the result's size and PSNR.
-fn results(manifest: &[u8]) -> BTreeMap<String, [Value; 3]> {
-    let lines = text(manifest);
-    let parse = |line: &str| {
-        let value: Value = serde_json::from_str(line).expect("JSON");
-        let fields = ["bytes", "psnr", "status"].map(|field| value[field].clone());
-        (value["input"].as_str().expect("a name").to_owned(), fields)
-    };
-    let results: BTreeMap<_, _> = lines.lines().map(parse).collect();
-    assert_eq!(results.len(), lines.lines().count(), "a line per file: {lines}");
-    results
+#[track_caller]
+fn results(bytes: &[u8]) -> BTreeMap<String, [Value; 3]> {
+    let fields = |line: Value| ["bytes", "psnr", "status"].map(|field| line[field].clone());
+    by_input(bytes).into_iter().map(|(input, line)| (input, fields(line))).collect()
 }
 
 #[test]
@@ -357,9 +346,7 @@ mod killed {
     #[test]
     fn a_signal_stops_an_encoding_at_once() {
         let room = Room::new();
-        room.write("in/large.png", "");
-        let picture = pictures::picture((400, 300), ColorType::Rgb8);
-        picture.save(room.path("in/large.png")).expect("writable");
+        room.save("in/large.png", &pictures::picture((400, 300), ColorType::Rgb8));
         for signal in [SIGINT, SIGTERM] {
             let mut gip = room.spawn(&["batch", "in", "--out", "out", "--effort", "9"]);
             wait(&mut gip, || room.path("out").exists());

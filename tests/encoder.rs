@@ -602,11 +602,12 @@ fn what_a_target_does_not_reach_is_told() {
 fn progress_is_told_and_may_cancel() {
     let samples = scene(64, 64, 3);
     let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("sizes agree");
-    let mut seen = Vec::new();
+    let (mut seen, mut fractions) = (Vec::new(), Vec::new());
     let encoder = quick(Target::Gaussians(100));
     let encoded = encoder.encode_with(&source, &mut |progress| {
         assert!(progress.iteration < progress.iterations);
         seen.push((progress.iteration, progress.gaussians));
+        fractions.push(progress.fraction);
         ControlFlow::Continue(())
     });
     let iterations = encoded.expect("it encodes").report.iterations;
@@ -615,6 +616,8 @@ fn progress_is_told_and_may_cancel() {
     told.dedup();
     assert_eq!(told, (0..iterations).collect::<Vec<_>>());
     assert!(seen.last().expect("not empty").1 > seen[0].1);
+    assert!(fractions.is_sorted() && fractions[0] < 0.1, "{fractions:?}");
+    assert!((0.8..=1.0).contains(fractions.last().expect("not empty")), "{fractions:?}");
     // Whenever it is stopped, during training or at the very end, it is not called again.
     for stop in [1, 5, seen.len()] {
         let mut calls = 0;
@@ -624,6 +627,53 @@ fn progress_is_told_and_may_cancel() {
         });
         assert!(matches!(error, Err(EncodeError::Cancelled)));
         assert_eq!(calls, stop);
+    }
+}
+
+#[test]
+fn every_stage_polls_often_and_can_be_cancelled() {
+    // Half a megapixel, so that every stage takes several polls.
+    let (width, height) = (1024, 512);
+    let samples = scene(width, height, 3);
+    let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
+    for (target, tune, precision) in [
+        (Target::Quality(40.0), Tune::Visual, Precision::Entropy),
+        (Target::BitsPerPixel(0.2), Tune::Psnr, Precision::Entropy),
+        (Target::Gaussians(3_000), Tune::Visual, Precision::Packed),
+    ] {
+        let encoder = Encoder::new()
+            .with_effort(1)
+            .with_target(target)
+            .with_tune(tune)
+            .with_precision(precision)
+            .with_training(Training::fast(4))
+            .with_threads(Threads::One);
+        // Polls before training, in each iteration, and after the last.
+        let mut polls = [0; 5];
+        let mut calls = 0;
+        let encoded = encoder.encode_with(&source, &mut |progress| {
+            let is_training = progress.gaussians > 0;
+            polls[progress.iteration as usize + usize::from(is_training)] += 1;
+            calls += 1;
+            ControlFlow::Continue(())
+        });
+        let case = format!("{target:?} {precision:?}: {polls:?}");
+        assert_eq!(encoded.expect("it encodes").report.iterations, 4, "{case}");
+        let megapixels = f64::from(width * height) / 1e6;
+        // A poll for at most so many megapixels: of preparation, of a pass of training, and of the
+        // passes over the picture that code and verify.
+        for (stage, least) in [(0, 16.0), (1, 4.0), (2, 4.0), (3, 4.0), (4, 32.0)] {
+            assert!(f64::from(polls[stage]) >= least * megapixels, "stage {stage} of {case}");
+        }
+        for stop in (1..=6).map(|part| calls * part / 6) {
+            let mut calls = 0;
+            let result = encoder.encode_with(&source, &mut |_| {
+                calls += 1;
+                if calls == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            assert!(matches!(result, Err(EncodeError::Cancelled)), "{stop}: {case}");
+            assert_eq!(calls, stop, "{case}");
+        }
     }
 }
 

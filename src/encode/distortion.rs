@@ -133,6 +133,7 @@ pub(crate) fn plain_distortion(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
     use crate::encode::source::Source;
     use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -160,7 +161,7 @@ mod tests {
         let samples: Vec<u8> = (0..width * height * CHANNELS).map(|_| rng.u8(..)).collect();
         let source =
             Source::new_u8(width as u32, height as u32, model, &samples).expect("the sizes agree");
-        let sensitivity = Sensitivity::new(&source);
+        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
         let mut residuals: Vec<f64> = samples.iter().map(|_| rng.f64() - 0.4).collect();
 
         let mut distortion = 0.0;

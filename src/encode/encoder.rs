@@ -171,8 +171,8 @@ impl Encoder {
     }
 
     /// As [`Encoder::encode`], with a callback: `progress` is called at every iteration of
-    /// training, and every few milliseconds during everything that takes longer. It cancels the
-    /// encoding by returning [`ControlFlow::Break`].
+    /// training, and every few milliseconds during everything that takes longer, always on one thread.
+    /// It cancels the encoding by returning [`ControlFlow::Break`].
     ///
     /// # Errors
     /// Those of [`Encoder::encode`], and [`EncodeError::Cancelled`] when `progress` cancels.

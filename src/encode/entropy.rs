@@ -12,7 +12,7 @@ use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
-use super::rdo::{Residuals, TargetSearch};
+use super::rdo::{Residuals, SearchWork, TargetSearch};
 use crate::coding::entropy::{Code, LatticeCodes};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
@@ -34,10 +34,11 @@ pub(crate) fn count_for_size(
     most: usize,
     tune: Tune,
     layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
 ) -> Result<usize, EncodeError> {
     let lattice = rate_model::lattice(0.0, layout.header().color);
     let empty = LatticeCodes { lattice, codes: Vec::new() };
-    let least = layout.write_entropy(&empty).len() as u64;
+    let least = layout.write_entropy(&empty, observer)?.len() as u64;
     layout.check_size(bytes, least)?;
     Ok((((bytes - least) * 8) as f64 / rate_model::bits_per_gaussian(tune)).min(most as f64)
         as usize)
@@ -53,11 +54,11 @@ pub(crate) fn finish(
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
     if let Target::Psnr(psnr) = job.target {
-        extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), observer)?;
+        extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), job, observer)?;
     }
     if let Some(quality) = job.target.quality() {
         let dissimilarity = rate_model::SHARE_OF_FIT * quality::dissimilarity_at(quality);
-        correct(&mut fit, dissimilarity, judge, layout, observer)?;
+        correct(&mut fit, dissimilarity, job, judge, layout, observer)?;
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -66,14 +67,20 @@ pub(crate) fn finish(
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);
-    let search = TargetSearch::new(job.source, raster, judge, layout, job.passes);
-    let coded = search.run(&gaussians, distortion, job.target, observer)?;
     observer.poll()?;
-    Ok((layout.write_entropy(&coded), work))
+    let search_work = SearchWork::new(job, gaussians.len());
+    let search = TargetSearch::new(job.source, raster, judge, layout, search_work);
+    let coded = search.run(&gaussians, distortion, job.target, observer)?;
+    Ok((layout.write_entropy(&coded, observer)?, work))
 }
 
 /// Extends a fit until its squared error is at most `error`, or nothing helps.
-fn extend(fit: &mut Fit<'_>, error: f64, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+fn extend(
+    fit: &mut Fit<'_>,
+    error: f64,
+    job: &Job<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<(), EncodeError> {
     for _ in 0..MAX_ROUNDS {
         let before = fit.len();
         let squared = fit.best_error().squared;
@@ -81,6 +88,10 @@ fn extend(fit: &mut Fit<'_>, error: f64, observer: &mut Observer<'_>) -> Result<
         if squared <= error || wanted <= before {
             break;
         }
+        observer.expect(
+            job.workload(wanted).retraining(job.training.iterations)
+                + SearchWork::new(job, wanted).whole(),
+        );
         fit.resize(wanted, observer)?;
         if fit.len() == before {
             break;
@@ -93,6 +104,7 @@ fn extend(fit: &mut Fit<'_>, error: f64, observer: &mut Observer<'_>) -> Result<
 fn correct(
     fit: &mut Fit<'_>,
     dissimilarity: f64,
+    job: &Job<'_>,
     judge: &Judge,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
@@ -111,6 +123,10 @@ fn correct(
         if is_close || wanted == before {
             break;
         }
+        observer.expect(
+            job.workload(wanted).retraining(job.training.iterations)
+                + SearchWork::new(job, wanted).whole(),
+        );
         fit.resize(wanted, observer)?;
         if fit.len() == before {
             break;

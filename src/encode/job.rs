@@ -3,6 +3,7 @@
 use super::fit::training::Training;
 use super::options::{Precision, Target, Tune};
 use super::source::Source;
+use super::workload::Workload;
 use crate::container::Metadata;
 
 /// A picture to encode, and the options to encode it with.
@@ -17,4 +18,16 @@ pub(crate) struct Job<'a> {
     pub(crate) training: &'a Training,
     /// Passes of rate-distortion optimization over the codes of an entropy-coded file.
     pub(crate) passes: u32,
+}
+
+impl Job<'_> {
+    /// Number of pixels.
+    pub(crate) fn pixels(&self) -> usize {
+        self.source.width() as usize * self.source.height() as usize
+    }
+
+    /// The work if the picture gets so many Gaussians.
+    pub(crate) fn workload(&self, gaussians: usize) -> Workload {
+        Workload::new(self.pixels(), gaussians)
+    }
 }

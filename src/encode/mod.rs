@@ -24,6 +24,7 @@ mod shortfall;
 mod source;
 mod strips;
 mod verify;
+mod workload;
 
 pub use encoder::{Encoded, Encoder, Report, encode};
 pub use error::{EncodeError, OptionError, SourceError};

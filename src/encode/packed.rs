@@ -95,7 +95,7 @@ fn missing(
 ) -> Result<usize, EncodeError> {
     Ok(match (target, budget) {
         (Target::Psnr(target), _) => {
-            let psnr = Verified::new(file, source).distortion(u32::MAX, observer)?.psnr;
+            let psnr = Verified::new(file, source, observer)?.distortion(u32::MAX, observer)?.psnr;
             // A decibel takes somewhat less than 0.3 times as many Gaussians again.
             if psnr >= target {
                 0
@@ -124,10 +124,10 @@ fn trimmed(
     target: f64,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<u8>, EncodeError> {
-    let fewest = least_prefix(&Verified::new(&file, source), target, observer)?;
+    let fewest = least_prefix(&Verified::new(&file, source, observer)?, target, observer)?;
     fitted.codes.truncate(fewest as usize);
     file = layout.write_packed(&fitted);
-    let mut psnr = Verified::new(&file, source).distortion(u32::MAX, observer)?.psnr;
+    let mut psnr = Verified::new(&file, source, observer)?.distortion(u32::MAX, observer)?.psnr;
     for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
         if psnr <= target + PSNR_TOLERANCE {
             break;
@@ -135,7 +135,7 @@ fn trimmed(
         let mut fewer = fitted.clone();
         fewer.codes.remove(index);
         let trial = layout.write_packed(&fewer);
-        let reached = Verified::new(&trial, source).distortion(u32::MAX, observer)?.psnr;
+        let reached = Verified::new(&trial, source, observer)?.distortion(u32::MAX, observer)?.psnr;
         if reached >= target {
             (fitted, file, psnr) = (fewer, trial, reached);
         }

@@ -10,6 +10,7 @@ use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
+use super::rdo::SearchWork;
 use super::sensitivity::Sensitivity;
 use super::shortfall::{Reached, Shortfall};
 use super::verify::{FilePsnr, Verified};
@@ -23,6 +24,10 @@ const PIXELS_PER_GAUSSIAN_OF_LARGE: usize = 4;
 const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
 /// What twice the size must bring, in dB: on the way from 0.25 to 1 bit per pixel it brings 3.
 const LEAST_GAIN: f64 = 0.5;
+/// Pixels for each Gaussian, about, and how often their number is corrected, for the progress that is
+/// told until that is known.
+const USUAL_PIXELS: usize = 100;
+const USUAL_CORRECTIONS: f64 = 0.5;
 
 /// A finished encoding, verified.
 #[derive(Debug)]
@@ -39,7 +44,7 @@ pub(crate) struct Outcome {
 /// The file for the target, or a smaller one where the target's size brings too little.
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
     let outcome = encode_for_target(job, Work::default(), observer)?;
-    let pixels = job.source.width() as usize * job.source.height() as usize;
+    let pixels = job.pixels();
     let is_large = outcome.gaussians as usize > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
     if job.target.bytes(pixels).is_none() || !is_large {
         return Ok(outcome);
@@ -64,46 +69,71 @@ fn encode_for_target(
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
     let Job { source, target, precision, training, .. } = *job;
-    let raster = Raster::new(source, job.tune);
+    let preparation = job.workload(0).preparation();
+    observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
+    let raster = Raster::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, raster.mean(), kernel, parameterization, job.metadata);
+    let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
-    let budget = budget(job, &raster, &layout)?;
-    let judge = Judge::new(source);
+    let budget = budget(job, &raster, &layout, observer)?;
+    let judge = Judge::new(source, observer)?;
+    let expected = match budget {
+        Budget::Count(count) => count,
+        _ => job.pixels() / USUAL_PIXELS,
+    };
+    observer.advance(preparation)?;
+    observer.expect(work_from_training(job, expected));
     let peak_before = work.peak_memory;
     let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
-    fit.run(observer)?;
+    fit.run(job.workload(expected), observer)?;
 
     let (file, mut work) = match precision {
         Precision::Entropy => entropy::finish(fit, job, &raster, &judge, &layout, observer),
         Precision::Packed | Precision::Float => packed::finish(fit, job, budget, &layout, observer),
     }?;
 
-    let pixels = raster.pixels();
     // The decoder needs memory, too.
     drop(raster);
-    observer.poll()?;
-    let verified = Verified::new(&file, source);
+    let verified = Verified::new(&file, source, observer)?;
     let gaussians = verified.gaussians();
+    let workload = job.workload(gaussians as usize);
+    observer.expect(workload.verification());
     let distortion = verified.distortion(gaussians, observer)?;
+    observer.advance(workload.error())?;
     let dissimilarity = judge.dissimilarity(&verified.picture(), observer)?;
     let peaks = [work.peak_memory + judge.memory(), judge.memory_at_work(), peak_before];
     work.peak_memory = peaks.into_iter().max().unwrap_or(0);
     let quality = quality::quality(dissimilarity).max(0.0);
     let reached = Reached { bytes: file.len(), psnr: distortion.psnr, quality, gaussians };
-    let shortfall = Shortfall::of(target, pixels, reached);
+    let shortfall = Shortfall::of(target, job.pixels(), reached);
     Ok(Outcome { file, work, gaussians, distortion, quality, shortfall })
 }
 
+/// The work from training on, about, with so many Gaussians.
+fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
+    let (workload, iterations) = (job.workload(gaussians), job.training.iterations);
+    let later = match job.precision {
+        Precision::Entropy => SearchWork::new(job, gaussians).whole(),
+        Precision::Packed | Precision::Float => workload.verification(),
+    };
+    let rounds = if job.target.is_by_error() { USUAL_CORRECTIONS } else { 0.0 };
+    workload.training(iterations) + rounds * workload.retraining(iterations) + later
+}
+
 /// What decides the number of Gaussians during training.
-fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Budget, EncodeError> {
+fn budget(
+    job: &Job<'_>,
+    raster: &Raster,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Budget, EncodeError> {
     let Job { target, precision, training, .. } = *job;
     let is_coded = precision == Precision::Entropy;
     if let Some(bytes) = target.bytes(raster.pixels()) {
         let most = raster.pixels();
         let count = if is_coded {
-            entropy::count_for_size(bytes, most, job.tune, layout)
+            entropy::count_for_size(bytes, most, job.tune, layout, observer)
         } else {
             packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
         };
@@ -113,7 +143,7 @@ fn budget(job: &Job<'_>, raster: &Raster, layout: &FileLayout<'_>) -> Result<Bud
         let dissimilarity = quality::dissimilarity_at(quality);
         let means = match &raster.sensitivity {
             Some(sensitivity) => sensitivity.means,
-            None => Sensitivity::new(job.source).means,
+            None => Sensitivity::new(job.source, observer)?.means,
         };
         let count = quality::count_for(dissimilarity, raster.pixels(), means);
         return Ok(Budget::Count(count));

@@ -3,12 +3,16 @@
 use core::fmt;
 use core::ops::ControlFlow;
 
+use rayon::prelude::*;
+
 use super::error::EncodeError;
 
 /// The progress of an encoding.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Progress {
+    /// The share of the work that is done, from 0 to 1: an estimate, which never falls.
+    pub fraction: f64,
     /// Iterations of training done so far.
     pub iteration: u32,
     /// Iterations planned in total. The number grows when a finished fit is extended to meet its
@@ -20,11 +24,21 @@ pub struct Progress {
     pub psnr: f64,
 }
 
+/// Work of each thread from one poll of the observer to the next: a few milliseconds.
+const WORK_PER_POLL: f64 = 4e6;
+/// At least so much work is taken to be left, as a share of what is done: an estimate may be too low.
+const LEAST_LEFT: f64 = 0.03;
+
 /// The caller's callback and the last progress reported to it. Code that runs for more than a few
 /// milliseconds polls it, so that the caller can cancel at any time.
+///
+/// Work is counted in the nanoseconds that it takes one core, about (`workload.rs`).
 pub(crate) struct Observer<'a> {
     callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     progress: Progress,
+    /// Work that is done, and work that is left.
+    done: f64,
+    left: f64,
 }
 
 impl<'a> Observer<'a> {
@@ -32,16 +46,44 @@ impl<'a> Observer<'a> {
         callback: &'a mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
         iterations: u32,
     ) -> Self {
-        let progress = Progress { iteration: 0, iterations, gaussians: 0, psnr: 0.0 };
-        Self { callback, progress }
+        let progress =
+            Progress { fraction: 0.0, iteration: 0, iterations, gaussians: 0, psnr: 0.0 };
+        Self { callback, progress, done: 0.0, left: 0.0 }
     }
 
-    /// Reports progress to the caller.
+    /// Reports the progress of training to the caller.
     ///
     /// # Errors
     /// As [`Observer::poll`].
-    pub(crate) fn report(&mut self, progress: Progress) -> Result<(), EncodeError> {
-        self.progress = progress;
+    pub(crate) fn report(
+        &mut self,
+        iteration: u32,
+        iterations: u32,
+        gaussians: usize,
+        psnr: f64,
+    ) -> Result<(), EncodeError> {
+        let fraction = self.progress.fraction;
+        self.progress =
+            Progress { fraction, iteration, iterations, gaussians: gaussians as u32, psnr };
+        self.poll()
+    }
+
+    /// Replaces the estimate of the work that is left.
+    pub(crate) fn expect(&mut self, work: f64) {
+        self.left = work;
+    }
+
+    /// Reports that work is done.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn advance(&mut self, work: f64) -> Result<(), EncodeError> {
+        let left = self.left.max(LEAST_LEFT * self.done).max(work);
+        if left > 0.0 {
+            self.progress.fraction += work / left * (1.0 - self.progress.fraction);
+        }
+        self.done += work;
+        self.left -= work;
         self.poll()
     }
 
@@ -55,10 +97,98 @@ impl<'a> Observer<'a> {
             ControlFlow::Break(()) => Err(EncodeError::Cancelled),
         }
     }
+
+    /// What `task` makes of every item, in their order. All threads share the tasks, each of which is so
+    /// much work, and every few milliseconds there is a poll on this one.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn map<T: Send, R: Send>(
+        &mut self,
+        work: f64,
+        mut items: impl ExactSizeIterator<Item = T>,
+        task: impl Fn(T) -> R + Send + Sync,
+    ) -> Result<Vec<R>, EncodeError> {
+        // The cast saturates.
+        let portion = ((WORK_PER_POLL / work) as usize).max(1) * rayon::current_num_threads();
+        let mut results = Vec::with_capacity(items.len());
+        while items.len() > 0 {
+            self.poll()?;
+            let items: Vec<T> = items.by_ref().take(portion).collect();
+            results.par_extend(items.into_par_iter().map(&task));
+        }
+        Ok(results)
+    }
 }
 
 impl fmt::Debug for Observer<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.debug_struct("Observer").field("progress", &self.progress).finish_non_exhaustive()
+    }
+}
+
+/// Calls `work` with an observer that does nothing.
+#[cfg(test)]
+pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T, EncodeError>) -> T {
+    let mut callback = |_: &Progress| ControlFlow::Continue(());
+    work(&mut Observer::new(&mut callback, 0)).expect("no one cancels")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fractions that the callback gets.
+    fn fractions(work: impl FnOnce(&mut Observer<'_>) -> Result<(), EncodeError>) -> Vec<f64> {
+        let mut fractions = Vec::new();
+        let mut callback = |progress: &Progress| {
+            fractions.push(progress.fraction);
+            ControlFlow::Continue(())
+        };
+        work(&mut Observer::new(&mut callback, 1)).expect("no one cancels");
+        fractions
+    }
+
+    #[test]
+    fn the_fraction_never_falls_whatever_is_expected() {
+        let steps = fractions(|observer| {
+            observer.expect(10.0);
+            observer.advance(5.0)?;
+            // More is left than was expected.
+            observer.expect(20.0);
+            observer.advance(5.0)?;
+            // Less is left.
+            observer.expect(5.0);
+            observer.advance(4.0)
+        });
+        let expected = [0.5, 0.625, 0.925];
+        for (step, expected) in steps.iter().zip(expected) {
+            assert!((step - expected).abs() < 1e-9, "{steps:?}");
+        }
+        let beyond = fractions(|observer| {
+            observer.expect(3.0);
+            (0..50).try_for_each(|_| observer.advance(1.0))
+        });
+        assert!(beyond.is_sorted() && beyond[49] <= 1.0, "{beyond:?}");
+        assert!(fractions(|observer| observer.advance(0.0)) == [0.0]);
+    }
+
+    #[test]
+    fn tasks_keep_their_order_and_there_is_a_poll_every_few_milliseconds() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        pool.install(|| {
+            let mut polls = 0;
+            let mut callback = |_: &Progress| {
+                polls += 1;
+                if polls > 260 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let mut observer = Observer::new(&mut callback, 1);
+            let doubled = observer.map(1e6, 0..1000, |number| 2 * number).expect("few polls");
+            assert_eq!(doubled, (0..1000).map(|number| 2 * number).collect::<Vec<_>>());
+            // A task that is longer than that has a poll of its own.
+            let long = observer.map(1e9, 0..11, |number| number);
+            assert!(matches!(long, Err(EncodeError::Cancelled)));
+            assert_eq!(polls, 261);
+        });
     }
 }

@@ -1,9 +1,10 @@
 //! The source picture as planes of tiles, in the layout of the training pass.
 
 use fearless_simd::{Simd, f32x16, prelude::*};
-use rayon::prelude::*;
 
+use super::error::EncodeError;
 use super::options::Tune;
+use super::progress::Observer;
 use super::sensitivity::Sensitivity;
 use super::source::Source;
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -19,6 +20,8 @@ pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
 pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];
 /// The value of a full sample in a [`SamplePlane`].
 pub(crate) const FULL_SCALE: f32 = 65535.0;
+/// Work for a sample.
+const WORK: f64 = 2.0;
 
 /// The samples of a picture, one [`SamplePlane`] per tile and channel: all channels of the
 /// first tile, then all of the second, and so on. Samples of a tile outside the picture are 0.
@@ -31,30 +34,51 @@ pub(crate) struct Raster {
     pub(crate) half_step: f32,
     /// How much errors count by their place and scale; `None` if all count the same.
     pub(crate) sensitivity: Option<Sensitivity>,
+    /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
+    pub(crate) mean: [f32; 4],
     planes: Vec<SamplePlane>,
 }
 
 impl Raster {
-    pub(crate) fn new(source: &Source<'_>, tune: Tune) -> Self {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        tune: Tune,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
         let (width, height) = (source.width() as usize, source.height() as usize);
         let channels = source.color().channels();
         let columns = width.div_ceil(TILE_WIDTH);
         let tiles = columns * height.div_ceil(TILE_HEIGHT);
         let mut planes = vec![[[0; TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
-        planes.par_chunks_exact_mut(columns * channels).enumerate().for_each(|(row, planes)| {
+        let work = WORK * (TILE_HEIGHT * width * channels) as f64;
+        let rows = planes.chunks_exact_mut(columns * channels).enumerate();
+        let sums = observer.map(work, rows, |(row, planes)| {
             let first = row * TILE_HEIGHT;
+            let mut sums = [0_u64; 4];
             for y in first..height.min(first + TILE_HEIGHT) {
                 for x in 0..width {
                     for channel in 0..channels {
+                        let sample = source.wide_sample((y * width + x) * channels + channel);
                         planes[x / TILE_WIDTH * channels + channel][y - first][x % TILE_WIDTH] =
-                            source.wide_sample((y * width + x) * channels + channel);
+                            sample;
+                        sums[channel] += u64::from(sample);
                     }
                 }
             }
+            sums
+        })?;
+        let full = (width * height) as f64 * f64::from(FULL_SCALE);
+        let mean = core::array::from_fn(|channel| {
+            (sums.iter().map(|sums| sums[channel]).sum::<u64>() as f64 / full) as f32
         });
         let half_step = 0.5 / f32::from(source.depth().max_sample());
-        let sensitivity = (tune == Tune::Visual).then(|| Sensitivity::new(source));
-        Self { width, height, channels, half_step, sensitivity, planes }
+        let sensitivity = match tune {
+            Tune::Visual => Some(Sensitivity::new(source, observer)?),
+            Tune::Psnr => None,
+        };
+        Ok(Self { width, height, channels, half_step, sensitivity, mean, planes })
     }
 
     /// All channels of a tile.
@@ -95,17 +119,6 @@ impl Raster {
     pub(crate) fn sensitivity_near(&self, [x, y]: [f32; 2]) -> f32 {
         // Casts saturate.
         self.sensitivity((x as usize).min(self.width - 1), (y as usize).min(self.height - 1))
-    }
-
-    /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
-    pub(crate) fn mean(&self) -> [f32; 4] {
-        let mut sums = [0_u64; 4];
-        for (index, plane) in self.planes.iter().enumerate() {
-            let sum = plane.iter().flatten().map(|&sample| u64::from(sample)).sum::<u64>();
-            sums[index % self.channels] += sum;
-        }
-        let full = self.pixels() as f64 * f64::from(FULL_SCALE);
-        sums.map(|sum| (sum as f64 / full) as f32)
     }
 
     /// The sum of squared errors at a PSNR in dB, where a full sample is 1.

@@ -6,8 +6,8 @@
 //! So a coarse error, which shifts the means of small blocks of pixels, counts more than a fine one,
 //! and both count less in texture than on even ground.
 
-use rayon::prelude::*;
-
+use super::error::EncodeError;
+use super::progress::Observer;
 use super::source::Source;
 
 /// Scales on which errors count: single pixels, and means of luma over 2 x 2 and 4 x 4 pixels.
@@ -32,6 +32,8 @@ const MOST: f64 = 8.0;
 const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 /// Rows of blocks that one task computes.
 const BAND: usize = 16;
+/// Work for a pixel on the finest scale.
+const WORK: f64 = 40.0;
 
 /// The sensitivities of a picture.
 #[derive(Debug)]
@@ -50,7 +52,12 @@ pub(crate) struct Sensitivity {
 }
 
 impl Sensitivity {
-    pub(crate) fn new(source: &Source<'_>) -> Self {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
         let model = source.color();
         let colors = model.channels() - usize::from(model.has_alpha());
         let shares = if colors == 1 { [1.0, 0.0, 0.0] } else { LUMA };
@@ -60,21 +67,23 @@ impl Sensitivity {
         let mut means = [0.0; SCALES];
         for (scale, share) in BY_SCALE.into_iter().enumerate() {
             let mut logarithms = vec![0.0; blocks.len()];
-            let bands = logarithms.par_chunks_mut(columns * BAND).enumerate();
-            bands.for_each(|(band, blocks)| {
+            let work = WORK * (columns * BLOCK * BAND * BLOCK) as f64;
+            let bands = logarithms.chunks_mut(columns * BAND).enumerate();
+            observer.map(work, bands, |(band, blocks)| {
                 let first = band * BAND;
                 let end = first + blocks.len() / columns;
                 let luma = LumaBand::new(source, &shares[..colors], scale, first, end);
                 luma.logarithms(first, blocks);
-            });
+            })?;
             let (values, mean) = normalized(&logarithms);
+            observer.poll()?;
             means[scale] = mean;
             for (block, value) in blocks.iter_mut().zip(values) {
                 block[scale] = (share * value) as f32;
             }
         }
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
-        Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means }
+        Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })
     }
 
     /// A row of blocks.
@@ -199,6 +208,7 @@ impl LumaBand {
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
 
     /// The sensitivities of a block before they are normalized, directly from the definition.
     fn plain(source: &Source<'_>, block: [usize; 2], scale: usize) -> f64 {
@@ -259,7 +269,7 @@ mod tests {
         let samples = noise(width, height);
         let source = Source::new_u8(width as u32, height as u32, ColorModel::Rgb, &samples)
             .expect("the sizes agree");
-        let sensitivity = Sensitivity::new(&source);
+        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
         let rows = height.div_ceil(BLOCK);
         for scale in 0..SCALES {
             let found: Vec<f64> = (0..rows)
@@ -293,7 +303,7 @@ mod tests {
     fn even_ground_is_more_sensitive_than_texture() {
         let samples = noise(64, 64);
         let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("the sizes agree");
-        let sensitivity = Sensitivity::new(&source);
+        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
         let across: Vec<f32> = (4..64).step_by(8).map(|x| sensitivity.at(x, 32)).collect();
         assert!(across.is_sorted_by(|a, b| a > b), "{across:?}");
     }
@@ -305,7 +315,7 @@ mod tests {
                 let samples = vec![200; width as usize * height as usize * model.channels()];
                 let source =
                     Source::new_u8(width, height, model, &samples).expect("the sizes agree");
-                let sensitivity = Sensitivity::new(&source);
+                let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
                 // All of an even picture is equally sensitive.
                 let found = sensitivity.at(width as usize - 1, height as usize - 1);
                 assert!((found - 1.0).abs() < 1e-5, "{model:?}, {width}x{height}: {found}");

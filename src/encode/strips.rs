@@ -5,9 +5,10 @@ use super::progress::Observer;
 use crate::region::Region;
 use crate::render::{Picture, RenderOptions};
 
-/// Most pixels of a strip. It bounds the memory of a rendering to floats, and the time from one
-/// poll of the observer to the next.
-const STRIP_PIXELS: u32 = 1 << 20;
+/// Pixels of a strip for each thread. They bound the time from one poll of the observer to the next.
+const STRIP_PIXELS: u32 = 1 << 17;
+/// Most pixels of a strip. They bound the memory of a rendering to floats.
+const MOST_STRIP_PIXELS: u32 = 1 << 20;
 
 /// Renders the first `prefix` Gaussians of a picture, of which there are no limits, strip by strip from
 /// the top, and shows every strip to `visit`: float samples, plane after plane.
@@ -35,8 +36,10 @@ pub(crate) fn render(
 
 /// The strips of a picture from top to bottom, each of whole rows, of which the number is even except
 /// at the bottom.
-fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
-    let rows = (STRIP_PIXELS / width).max(2) & !1;
+pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
+    let threads = u32::try_from(rayon::current_num_threads()).unwrap_or(u32::MAX);
+    let pixels = STRIP_PIXELS.saturating_mul(threads).min(MOST_STRIP_PIXELS);
+    let rows = (pixels / width).max(2) & !1;
     let region = move |y| Region { x: 0, y, width, height: rows.min(height - y) };
     (0..height).step_by(rows as usize).map(region)
 }

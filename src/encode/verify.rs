@@ -11,6 +11,9 @@ use crate::decode::StreamDecoder;
 use crate::limits::Limits;
 use crate::render::{Picture, Sample};
 
+/// Bytes of a file from one poll of the observer to the next.
+const PIECE: usize = 1 << 12;
+
 /// A file that was decoded for comparison with its source.
 #[derive(Debug)]
 pub(crate) struct Verified<'a> {
@@ -28,11 +31,20 @@ pub(crate) struct FilePsnr {
 }
 
 impl<'a> Verified<'a> {
-    pub(crate) fn new(file: &[u8], source: &'a Source<'a>) -> Self {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new(
+        file: &[u8],
+        source: &'a Source<'a>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
         let mut stream = StreamDecoder::new().with_limits(Limits::none());
-        stream.feed(file).expect("the decoder reads what the encoder writes");
+        for piece in file.chunks(PIECE) {
+            observer.poll()?;
+            stream.feed(piece).expect("the decoder reads what the encoder writes");
+        }
         assert!(stream.is_complete(), "the encoder writes whole files");
-        Self { stream, source }
+        Ok(Self { stream, source })
     }
 
     /// The decoded picture.

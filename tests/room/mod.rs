@@ -8,6 +8,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
+use image::DynamicImage;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -66,6 +67,21 @@ impl Room {
         error
     }
 
+    /// Runs `gip batch`, which must end with this status. Returns what it printed and the errors.
+    #[track_caller]
+    pub(crate) fn batch(&self, status: i32, args: &[&str]) -> (String, String) {
+        let output = self.run(&[&["batch"], args].concat());
+        let (printed, errors) = (text(&output.stdout), text(&output.stderr));
+        assert_eq!(output.status.code(), Some(status), "{args:?}: {printed}{errors}");
+        (printed, errors)
+    }
+
+    /// Saves a picture in the format of its name, and makes the folders that it is in.
+    pub(crate) fn save(&self, name: &str, picture: &DynamicImage) {
+        self.write(name, "");
+        picture.save(self.path(name)).expect("the format takes the colour type");
+    }
+
     /// Writes a file, and the folders that it is in.
     pub(crate) fn write(&self, name: &str, contents: impl AsRef<[u8]>) {
         let path = self.path(name);
@@ -109,4 +125,17 @@ impl Room {
 
 pub(crate) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// The lines of a manifest of `gip batch` by their inputs.
+#[track_caller]
+pub(crate) fn by_input(manifest: &[u8]) -> BTreeMap<String, Value> {
+    let lines = text(manifest);
+    let parse = |line: &str| -> (String, Value) {
+        let value: Value = serde_json::from_str(line).expect("JSON");
+        (value["input"].as_str().expect("a name").into(), value)
+    };
+    let by_input: BTreeMap<_, _> = lines.lines().map(parse).collect();
+    assert_eq!(by_input.len(), lines.lines().count(), "a line per file: {lines}");
+    by_input
 }

@@ -2,7 +2,9 @@
 
     cargo build --release --example native
     pip install image-gip pillow pillow-jxl-plugin
-    python benchmarks/compare.py PICTURE.png --native target/release/examples/native [--wheel FILE]
+    python benchmarks/compare.py --native target/release/examples/native PICTURE.png
+
+What `--wheel FILE` and `--large PICTURE` add is said by `--help`.
 
 What is compared is measured in turns, and all figures are medians: other work on the machine slows
 down both sides alike.
@@ -10,7 +12,9 @@ down both sides alike.
 
 import argparse
 import io
+import math
 import os
+import random
 import signal
 import statistics
 import subprocess
@@ -33,6 +37,12 @@ import image_gip.pillow
 #: Bits per pixel of the files that are compared.
 RATE = 0.5
 THUMBNAIL = (96, 64)
+#: Encodings that are interrupted, at all of their stages.
+INTERRUPTED: tuple[dict[str, Any], ...] = (
+    {"effort": 1, "quality": 75},
+    {"effort": 1, "bpp": 0.5},
+    {"effort": 1, "psnr": 34, "tune": "psnr"},
+)
 #: Formats of Pillow, with the qualities that are tried for the rate, best first.
 OTHERS: dict[str, dict[str, Any]] = {"WEBP": {"method": 6}, "AVIF": {"speed": 6}, "JXL": {}}
 
@@ -131,22 +141,45 @@ def measure_thumbnail(file: bytes) -> None:
     )
 
 
+def interrupt(picture: NDArray[Any], options: dict[str, Any], fraction: float) -> float:
+    """The time in ms that Ctrl-C takes when that fraction of an encoding is done."""
+    sent = math.nan
+    arrived = threading.Event()
+
+    def send() -> None:
+        nonlocal sent
+        arrived.wait()
+        # Not at a call of `progress`, where the encoder was listening just now.
+        time.sleep(random.uniform(0, 0.05))
+        sent = time.perf_counter()
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def look(progress: image_gip.Progress) -> None:
+        if progress.fraction >= fraction:
+            arrived.set()
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        image_gip.encode(picture, progress=look, **options)
+        arrived.set()
+        sender.join()
+        time.sleep(1)
+    except KeyboardInterrupt:
+        return (time.perf_counter() - sent) * 1e3
+    finally:
+        sender.join()
+    return math.nan
+
+
 def measure_interrupt(picture: NDArray[Any]) -> None:
-    delays = []
-    for trial in range(20):
-        sent = 0.0
-
-        def interrupt() -> None:
-            nonlocal sent
-            sent = time.perf_counter()
-            os.kill(os.getpid(), signal.SIGINT)
-
-        threading.Timer(0.1 + 0.09 * trial, interrupt).start()
-        try:
-            image_gip.encode(picture, effort=9)
-        except KeyboardInterrupt:
-            delays.append((time.perf_counter() - sent) * 1e3)
-    print(f"Ctrl-C: {statistics.median(delays):.0f} ms, at most {max(delays):.0f} ms")
+    height, width = picture.shape[:2]
+    for options in INTERRUPTED:
+        delays = [interrupt(picture, options, trial / 20) for trial in range(20)]
+        print(
+            f"Ctrl-C, {width} x {height}, {options}: {statistics.median(delays):.0f} ms, "
+            f"at most {max(delays):.0f} ms"
+        )
 
 
 def encoded(image: Image.Image, form: str, options: dict[str, Any]) -> bytes:
@@ -213,7 +246,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("picture", type=Path)
     parser.add_argument("--native", type=Path, required=True)
-    parser.add_argument("--wheel", type=Path)
+    parser.add_argument("--wheel", type=Path, help="a wheel to tell the size of")
+    parser.add_argument("--large", type=Path, help="a picture to interrupt the encoding of")
     arguments = parser.parse_args()
     if "JXL" not in Image.SAVE:
         try:
@@ -230,7 +264,7 @@ def main() -> None:
     measure_overhead(file, arguments.native)
     measure_threads(file)
     measure_thumbnail(file)
-    measure_interrupt(samples)
+    measure_interrupt(np.asarray(Image.open(arguments.large or arguments.picture).convert("RGB")))
     measure_formats(image)
 
 

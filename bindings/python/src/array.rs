@@ -9,6 +9,9 @@ use pyo3::prelude::*;
 
 use crate::output::Shape;
 
+/// Floats that are converted from one look for signals to the next.
+const PART: usize = 1 << 20;
+
 /// The samples of an array.
 pub(crate) enum Pixels<'py> {
     U8(PyReadonlyArrayDyn<'py, u8>),
@@ -58,6 +61,7 @@ impl<'py> Picture<'py> {
             Pixels::U16(array.try_readonly().map_err(in_use)?)
         } else if let Ok(array) = array.cast::<PyArrayDyn<f32>>() {
             Pixels::Converted(from_floats(
+                array.py(),
                 array.try_readonly().map_err(in_use)?.as_slice()?,
                 untyped.shape(),
             )?)
@@ -82,19 +86,31 @@ impl<'py> Picture<'py> {
     }
 }
 
-/// 16-bit samples from floats, of which 1.0 is a full one.
-fn from_floats(values: &[f32], shape: &[usize]) -> PyResult<Vec<u16>> {
-    if let Some(index) = values.iter().position(|value| !(0.0..=1.0).contains(value)) {
-        let mut place = vec![0; shape.len()];
-        let mut rest = index;
-        for (place, length) in place.iter_mut().zip(shape).rev() {
-            (*place, rest) = (rest % length, rest / length);
+/// 16-bit samples from floats, of which 1.0 is a full one. Signals are attended to meanwhile.
+fn from_floats(py: Python<'_>, values: &[f32], shape: &[usize]) -> PyResult<Vec<u16>> {
+    let mut samples = Vec::with_capacity(values.len());
+    for end in (0..values.len()).step_by(PART).map(|start| values.len().min(start + PART)) {
+        py.check_signals()?;
+        let part = &values[samples.len()..end];
+        let valid = part.iter().take_while(|value| (0.0..=1.0).contains(*value));
+        py.detach(|| samples.extend(valid.map(|value| (value * 65535.0 + 0.5) as u16)));
+        if samples.len() < end {
+            return Err(out_of_range(values[samples.len()], samples.len(), shape));
         }
-        let (value, place) = (values[index], Shape(&place));
-        return Err(PyValueError::new_err(format!(
-            "the float at {place} is {value}; floats must be 0.0 to 1.0: use numpy.clip, or uint8 or \
-             uint16 for whole numbers"
-        )));
     }
-    Ok(values.iter().map(|value| (value * 65535.0 + 0.5) as u16).collect())
+    Ok(samples)
+}
+
+/// The error for a float of an array of this shape.
+fn out_of_range(value: f32, index: usize, shape: &[usize]) -> PyErr {
+    let mut place = vec![0; shape.len()];
+    let mut rest = index;
+    for (place, length) in place.iter_mut().zip(shape).rev() {
+        (*place, rest) = (rest % length, rest / length);
+    }
+    let place = Shape(&place);
+    PyValueError::new_err(format!(
+        "the float at {place} is {value}; floats must be 0.0 to 1.0: use numpy.clip, or uint8 or \
+         uint16 for whole numbers"
+    ))
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use crate::errors::decode_error;
 use crate::input::{Bytes, FileObject};
 use crate::objects::{self, Limits};
-use crate::output::{Output, Wanted};
+use crate::output::Output;
 use crate::request::Request;
 use crate::threads;
 
@@ -57,25 +57,25 @@ pub(crate) fn decode<'py>(
     threads: i64,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let request = Request::new(size, scale, region, mode)?;
-    let threads = threads::checked(threads)?;
+    let request = Request { size, scale, region, mode, dtype, out, prefix: None, threads };
+    let rendering = request.check()?;
     let file = Bytes::of_file(src)?;
     let bytes = file.as_slice()?;
     let limits = Limits::of(limits);
     let failed = |error| decode_error(py, error);
 
     let mut decoder = py.detach(|| Decoder::new_with_limits(bytes, limits)).map_err(failed)?;
-    let options = request.options(decoder.header());
+    let options = rendering.options(decoder.header());
     decoder.set_options(options.clone());
     decoder.output_len().map_err(failed)?;
     let channels = options.output_color(decoder.header()).map_err(failed)?.channels();
-    let mut output = Output::new(py, decoder.header(), &options, &Wanted { dtype, out })?;
+    let mut output = Output::new(py, decoder.header(), &options, &request)?;
     if output.overlaps(bytes) {
         return Err(PyValueError::new_err("out overlaps src"));
     }
     let samples = output.samples()?;
     py.detach(|| {
-        threads::decoding(threads, |threads| {
+        threads::decoding(rendering.threads, |threads| {
             decoder.set_options(options.with_threads(threads));
             samples.decode(&mut decoder, channels)
         })

@@ -18,6 +18,8 @@ use crate::{input, threads};
 
 /// How long the calling thread waits before it looks for signals, such as that of Ctrl-C.
 const INTERVAL: Duration = Duration::from_millis(10);
+/// The fraction of the work after which there is something to report, if no iteration has ended.
+const NEWS: f64 = 0.002;
 
 /// Encodes a picture.
 ///
@@ -198,14 +200,18 @@ impl Watch {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a report of the encoder, and tells it whether to go on. `last` is the iteration of its
-    /// last report.
-    fn report(&self, progress: &Progress, last: &mut Option<u32>) -> ControlFlow<()> {
+    /// Takes a report of the encoder, and tells it whether to go on. `last` is the last one that was
+    /// news.
+    fn report(&self, progress: &Progress, last: &mut Option<Progress>) -> ControlFlow<()> {
         if self.is_cancelled.load(Ordering::Relaxed) {
             return ControlFlow::Break(());
         }
-        // The encoder also calls between iterations, so that it can be cancelled.
-        if last.replace(progress.iteration) != Some(progress.iteration) {
+        // The encoder calls every few milliseconds, so that it can be cancelled.
+        let is_news = last.is_none_or(|last| {
+            progress.iteration != last.iteration || progress.fraction >= last.fraction + NEWS
+        });
+        if is_news {
+            *last = Some(*progress);
             self.state().news = Some(*progress);
             self.changed.notify_one();
         }
@@ -245,9 +251,9 @@ impl Watch {
 /// Calls the callback. Returns whether to go on.
 fn call(py: Python<'_>, callback: &Py<PyAny>, progress: &Progress) -> PyResult<bool> {
     let class = py.import("image_gip._types")?.getattr("Progress")?;
-    let Progress { iteration, iterations, gaussians, psnr, .. } = *progress;
-    let answer =
-        callback.bind(py).call1((class.call1((iteration, iterations, gaussians, psnr))?,))?;
+    let Progress { fraction, iteration, iterations, gaussians, psnr, .. } = *progress;
+    let progress = class.call1((fraction, iteration, iterations, gaussians, psnr))?;
+    let answer = callback.bind(py).call1((progress,))?;
     Ok(answer.is_none() || answer.is_truthy()?)
 }
 

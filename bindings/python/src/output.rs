@@ -10,12 +10,7 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-/// The caller's wishes for an output array.
-#[derive(Debug)]
-pub(crate) struct Wanted<'a, 'py> {
-    pub(crate) dtype: Option<&'a Bound<'py, PyAny>>,
-    pub(crate) out: Option<&'a Bound<'py, PyAny>>,
-}
+use crate::request::Request;
 
 /// An array that is borrowed for writing.
 pub(crate) enum Output<'py> {
@@ -39,7 +34,7 @@ impl<'py> Output<'py> {
         py: Python<'py>,
         header: &Header,
         options: &RenderOptions,
-        wanted: &Wanted<'_, 'py>,
+        request: &Request<'_, 'py>,
     ) -> PyResult<Self> {
         let (width, height) = options.output_size(header);
         let color = options.output_color(header);
@@ -48,18 +43,18 @@ impl<'py> Output<'py> {
         if channels > 1 {
             shape.push(channels);
         }
-        let kind = match (wanted.dtype, wanted.out) {
+        let kind = match (request.dtype, request.out) {
             (Some(kind), _) => PyArrayDescr::new(py, kind)?,
             (None, Some(out)) => as_array(out)?.dtype(),
             (None, None) if header.depth == SampleDepth::Sixteen => dtype::<u16>(py),
             (None, None) => dtype::<u8>(py),
         };
         if kind.is_equiv_to(&dtype::<u8>(py)) {
-            Ok(Self::U8(array(py, shape, wanted.out)?))
+            Ok(Self::U8(array(py, shape, request.out)?))
         } else if kind.is_equiv_to(&dtype::<u16>(py)) {
-            Ok(Self::U16(array(py, shape, wanted.out)?))
+            Ok(Self::U16(array(py, shape, request.out)?))
         } else if kind.is_equiv_to(&dtype::<f32>(py)) {
-            Ok(Self::F32(array(py, shape, wanted.out)?))
+            Ok(Self::F32(array(py, shape, request.out)?))
         } else {
             let message = format!("dtype {kind}; it must be uint8, uint16 or float32");
             Err(PyTypeError::new_err(message))

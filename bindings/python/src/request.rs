@@ -4,6 +4,8 @@ use image_gip::{ColorModel, Header, Region, RenderOptions};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::threads;
+
 /// Names of the colour models, as Pillow has them.
 const MODES: [(&str, ColorModel); 4] = [
     ("L", ColorModel::Gray),
@@ -17,38 +19,49 @@ pub(crate) fn mode_name(color: ColorModel) -> &'static str {
     MODES.iter().find(|mode| mode.1 == color).map_or("unknown", |mode| mode.0)
 }
 
-/// Size, region and mode of an output.
+/// What to render, as the caller asks for it: the keywords that `decode` and `StreamDecoder.image` share.
 #[derive(Debug)]
-pub(crate) struct Request {
-    scale: Option<f64>,
-    options: RenderOptions,
+pub(crate) struct Request<'a, 'py> {
+    pub(crate) size: Option<(i64, i64)>,
+    pub(crate) scale: Option<f64>,
+    pub(crate) region: Option<(i64, i64, i64, i64)>,
+    pub(crate) mode: Option<&'a str>,
+    pub(crate) dtype: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) out: Option<&'a Bound<'py, PyAny>>,
+    /// Render only the first Gaussians of the file.
+    pub(crate) prefix: Option<i64>,
+    pub(crate) threads: i64,
 }
 
-impl Request {
-    pub(crate) fn new(
-        size: Option<(i64, i64)>,
-        scale: Option<f64>,
-        region: Option<(i64, i64, i64, i64)>,
-        mode: Option<&str>,
-    ) -> PyResult<Self> {
+/// A request that was checked.
+#[derive(Debug)]
+pub(crate) struct Rendering {
+    scale: Option<f64>,
+    options: RenderOptions,
+    pub(crate) threads: usize,
+}
+
+impl Request<'_, '_> {
+    /// Refuses numbers and names that are out of range.
+    pub(crate) fn check(&self) -> PyResult<Rendering> {
         let mut options = RenderOptions::new();
-        if let Some((width, height)) = size {
-            if scale.is_some() {
+        if let Some((width, height)) = self.size {
+            if self.scale.is_some() {
                 return Err(PyTypeError::new_err("size and scale exclude each other"));
             }
             options = options.with_size(number("size", width)?, number("size", height)?);
         }
-        if let Some(scale) = scale
+        if let Some(scale) = self.scale
             && !(scale.is_finite() && scale > 0.0)
         {
             return Err(PyValueError::new_err(format!("scale {scale}; it must be over 0")));
         }
-        if let Some((x, y, width, height)) = region {
+        if let Some((x, y, width, height)) = self.region {
             let number = |value| number("region", value);
             let (x, y, width, height) = (number(x)?, number(y)?, number(width)?, number(height)?);
             options = options.with_region(Region { x, y, width, height });
         }
-        if let Some(mode) = mode {
+        if let Some(mode) = self.mode {
             let Some(&(_, color)) = MODES.iter().find(|known| known.0 == mode) else {
                 return Err(PyValueError::new_err(format!(
                     "mode {mode:?}; it must be \"L\", \"LA\", \"RGB\" or \"RGBA\""
@@ -56,17 +69,15 @@ impl Request {
             };
             options = options.with_color(color);
         }
-        Ok(Self { scale, options })
-    }
-
-    /// Renders only the first Gaussians of the file.
-    pub(crate) fn with_prefix(mut self, prefix: Option<i64>) -> PyResult<Self> {
-        if let Some(prefix) = prefix {
-            self.options = self.options.with_prefix(number("prefix", prefix)?);
+        if let Some(prefix) = self.prefix {
+            options = options.with_prefix(number("prefix", prefix)?);
         }
-        Ok(self)
+        let threads = threads::checked(self.threads)?;
+        Ok(Rendering { scale: self.scale, options, threads })
     }
+}
 
+impl Rendering {
     /// The options for a picture.
     pub(crate) fn options(&self, header: &Header) -> RenderOptions {
         let Some(scale) = self.scale else { return self.options.clone() };

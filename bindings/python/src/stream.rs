@@ -10,7 +10,7 @@ use pyo3::sync::MutexExt;
 use crate::errors::decode_error;
 use crate::input;
 use crate::objects::{self, Limits};
-use crate::output::{Output, Wanted};
+use crate::output::Output;
 use crate::request::Request;
 use crate::threads;
 
@@ -106,23 +106,23 @@ impl StreamDecoder {
         prefix: Option<i64>,
         threads: i64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let request = Request::new(size, scale, region, mode)?.with_prefix(prefix)?;
-        let threads = threads::checked(threads)?;
+        let request = Request { size, scale, region, mode, dtype, out, prefix, threads };
+        let rendering = request.check()?;
         let failed = |error| decode_error(py, error);
 
         let (header, options) = {
             let stream = self.lock_attached(py);
             let picture = stream.picture().ok_or_else(no_header)?;
-            let options = request.options(picture.header());
+            let options = rendering.options(picture.header());
             picture.output_len(&options).map_err(failed)?;
             (picture.header().clone(), options)
         };
-        let mut output = Output::new(py, &header, &options, &Wanted { dtype, out })?;
+        let mut output = Output::new(py, &header, &options, &request)?;
         let samples = output.samples()?;
         let rendered = py.detach(|| {
             let stream = self.lock();
             let Some(picture) = stream.picture() else { return Ok(Ok(())) };
-            threads::decoding(threads, |threads| {
+            threads::decoding(rendering.threads, |threads| {
                 samples.render(&picture, &options.with_threads(threads))
             })
         })?;

@@ -166,8 +166,12 @@ def test_progress(photo: Picture) -> None:
     file = image_gip.encode(photo, effort=3, progress=note)
     assert file == image_gip.encode(photo, effort=3)
     iterations = [report.iteration for report in reports]
-    assert iterations == sorted(set(iterations))
-    assert len(iterations) > 3
+    assert iterations == sorted(iterations)
+    assert len(set(iterations)) > 3
+    fractions = [report.fraction for report in reports]
+    assert fractions == sorted(fractions)
+    assert fractions[0] < 0.2
+    assert 0.8 < fractions[-1] <= 1
     assert reports[-1].iterations >= reports[-1].iteration > 0
     assert reports[-1].gaussians > 0
     assert reports[-1].psnr > 20

@@ -14,6 +14,8 @@ use crate::picture::{SampleSlice, StillImage};
 
 /// What stands for an infinite PSNR in JSON, which has no infinity.
 const INFINITE_PSNR: f64 = 999.0;
+/// Steps of the progress bar.
+const BAR_LENGTH: u64 = 1000;
 
 pub(crate) fn run(args: &args::Encode) -> Result<()> {
     let output = Output::new(&args.output)?;
@@ -51,11 +53,13 @@ fn check_name(output: &Output) -> Result<()> {
 /// Encodes with a progress bar, which is visible on a terminal only.
 fn encode_with_bar(encoder: Encoder, picture: &mut StillImage) -> Result<Encoded> {
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}  {eta} left")?;
-    let bar = ProgressBar::new(0).with_style(style);
+    let bar = ProgressBar::new(BAR_LENGTH).with_style(style);
     let encoded = encode(encoder, picture, &mut |progress| {
-        bar.set_length(progress.iterations.into());
-        bar.set_position(progress.iteration.into());
-        bar.set_message(format!("{} Gaussians, {:.2} dB", progress.gaussians, progress.psnr));
+        let position = (progress.fraction * BAR_LENGTH as f64) as u64;
+        if position > bar.position() {
+            bar.set_position(position);
+            bar.set_message(format!("{} Gaussians, {:.2} dB", progress.gaussians, progress.psnr));
+        }
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();

@@ -1,14 +1,19 @@
 //! Gaussians divided into the layers of a file, as `layers::plan` plans them, and coded.
 
-use rayon::prelude::*;
-
 use crate::chunk::FRAMING;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
 use crate::coding::packed::{self, Quantizer};
 use crate::container::Header;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::layers::bounds::LayerBounds;
 use crate::layers::plan;
+
+/// Work to code a Gaussian.
+const WORK: f64 = 800.0;
+/// Work for the bounds of a Gaussian.
+const WORK_OF_BOUNDS: f64 = 100.0;
 
 /// The payloads of the layers of a packed file, from codes in the order of the file.
 pub(super) fn write_packed_layers(
@@ -37,8 +42,12 @@ pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u6
 pub(crate) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
-) -> Vec<EncodedLayer> {
-    divide(coder, codes).into_par_iter().map(|codes| coder.write(codes)).collect()
+    observer: &mut Observer<'_>,
+) -> Result<Vec<EncodedLayer>, EncodeError> {
+    let count = codes.len();
+    let layers = divide(coder, codes, observer)?;
+    let work = WORK * count as f64 / layers.len() as f64;
+    observer.map(work, layers.into_iter(), |codes| coder.write(codes))
 }
 
 /// The payload of `bNDS`: the bounds of every layer (spec, section 5.6). `None` for a file of so
@@ -48,39 +57,47 @@ pub(super) fn bounds_payload(
     codes: &[Code],
     layers: &[EncodedLayer],
     header: &Header,
-) -> Option<Vec<u8>> {
+    observer: &mut Observer<'_>,
+) -> Result<Option<Vec<u8>>, EncodeError> {
     if !plan::has_bounds(layers.len()) {
-        return None;
+        return Ok(None);
     }
     let mut rest = codes;
-    let mut bounds = Vec::new();
-    for layer in layers {
+    let layers_of_codes = layers.iter().map(|layer| {
         let (codes, later) = rest.split_at(layer.levels.len());
         rest = later;
+        codes
+    });
+    let work = WORK_OF_BOUNDS * codes.len() as f64 / layers.len() as f64;
+    let bounds = observer.map(work, layers_of_codes, |codes| {
         let gaussians = codes.iter().map(|code| {
             let shape = coder.lattice.shape(code);
             coder.lattice.gaussian(code, &shape, &coder.grid, header.color)
         });
-        bounds.extend(LayerBounds::of(gaussians, header).to_entry());
-    }
-    Some(bounds)
+        LayerBounds::of(gaussians, header).to_entry()
+    })?;
+    Ok(Some(bounds.concat()))
 }
 
 /// Divides codes into the layers of an entropy-coded file: first the strongest ones, then the
 /// others by position.
-fn divide<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
+fn divide<'a>(
+    coder: &LayerCoder<'_>,
+    codes: &'a mut [Code],
+    observer: &mut Observer<'_>,
+) -> Result<Vec<&'a mut [Code]>, EncodeError> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
-    codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    codes.sort_by_cached_key(|code| core::cmp::Reverse(code.strength()));
     let mut layers = Vec::new();
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {
         let (part, later) = rest.split_at_mut(first);
-        divide_by_position(coder, part, most, &mut layers);
+        divide_by_position(coder, part, most, &mut layers, observer)?;
         rest = later;
     }
-    divide_by_position(coder, rest, most, &mut layers);
-    layers
+    divide_by_position(coder, rest, most, &mut layers, observer)?;
+    Ok(layers)
 }
 
 /// Divides codes by position into layers of `most` codes; the last layer may have fewer.
@@ -89,8 +106,10 @@ fn divide_by_position<'a>(
     mut rest: &'a mut [Code],
     most: usize,
     layers: &mut Vec<&'a mut [Code]>,
-) {
+    observer: &mut Observer<'_>,
+) -> Result<(), EncodeError> {
     while rest.len() > most {
+        observer.poll()?;
         coder.cut(rest, most);
         let (layer, later) = rest.split_at_mut(most);
         layers.push(layer);
@@ -99,6 +118,7 @@ fn divide_by_position<'a>(
     if !rest.is_empty() {
         layers.push(rest);
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -106,6 +126,7 @@ mod tests {
     use super::*;
     use crate::coding::entropy::CenterGrid;
     use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
     use crate::encode::rate_model;
 
     #[test]
@@ -127,7 +148,7 @@ mod tests {
                 ..Code::default()
             };
             let mut codes: Vec<Code> = (0..count).map(|_| code()).collect();
-            let layers = divide(&coder, &mut codes);
+            let layers = unobserved(|observer| divide(&coder, &mut codes, observer));
             let sizes: Vec<usize> = layers.iter().map(|layer| layer.len()).collect();
             assert_eq!(sizes.iter().sum::<usize>(), count);
             assert_eq!(sizes.len(), number, "{sizes:?}");

@@ -4,7 +4,8 @@ mod layers;
 
 pub(crate) use layers::{packed_layers_length, write_entropy_layers};
 
-use super::error::OptionError;
+use super::error::{EncodeError, OptionError};
+use super::progress::Observer;
 use super::source::Source;
 use crate::chunk::ChunkType;
 use crate::coding::entropy::{LatticeCodes, LayerCoder};
@@ -66,7 +67,14 @@ impl<'a> FileLayout<'a> {
     }
 
     /// A file with the entropy coding.
-    pub(crate) fn write_entropy(&self, coded: &LatticeCodes) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn write_entropy(
+        &self,
+        coded: &LatticeCodes,
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<u8>, EncodeError> {
         let header = Header {
             coding: Coding::Entropy,
             parameterization: Parameterization::Cholesky,
@@ -75,10 +83,10 @@ impl<'a> FileLayout<'a> {
         };
         let coder = LayerCoder::new(&coded.lattice, &header);
         let mut codes = coded.codes.clone();
-        let layers = write_entropy_layers(&coder, &mut codes);
-        let bounds = layers::bounds_payload(&coder, &codes, &layers, &header);
+        let layers = write_entropy_layers(&coder, &mut codes, observer)?;
+        let bounds = layers::bounds_payload(&coder, &codes, &layers, &header, observer)?;
         let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
-        self.write(&header, &coded.lattice.to_payload(), bounds, &payloads)
+        Ok(self.write(&header, &coded.lattice.to_payload(), bounds, &payloads))
     }
 
     /// A file of either coding, from the payloads of its chunks.
@@ -150,6 +158,7 @@ mod tests {
     use crate::coding::entropy::{CenterGrid, Code};
     use crate::color::ColorModel;
     use crate::decode::Decoder;
+    use crate::encode::progress::unobserved;
     use crate::encode::rate_model;
     use crate::region::Region;
     use crate::render::RenderOptions;
@@ -181,10 +190,8 @@ mod tests {
             center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
         };
         let codes = (0..count).map(|_| code()).collect();
-        layout.write_entropy(&LatticeCodes {
-            lattice: rate_model::lattice(0.0, ColorModel::Gray),
-            codes,
-        })
+        let lattice = rate_model::lattice(0.0, ColorModel::Gray);
+        unobserved(|observer| layout.write_entropy(&LatticeCodes { lattice, codes }, observer))
     }
 
     /// The samples of a region, and how many Gaussians the decoder keeps. If `all`, it decodes the

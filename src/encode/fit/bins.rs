@@ -1,8 +1,9 @@
 //! Binning: which splats touch which rows and tiles. The bins are rebuilt while the splats move.
 
 use fearless_simd::Level;
-use rayon::prelude::*;
 
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 use crate::encode::raster::TILE_WIDTH;
 use crate::region::Region;
 use crate::render::splat::Splat;
@@ -10,6 +11,8 @@ use crate::render::tile_grid::TileGrid;
 
 /// Splats that one task bins.
 const CHUNK: usize = 256;
+/// Work to bin a splat.
+const WORK: f64 = 100.0;
 
 /// For every row of tiles of a picture, the splats that may touch it, in their order.
 #[derive(Debug)]
@@ -35,34 +38,37 @@ impl RowBins {
 
     /// Bins `splats` on all threads, in the memory of the previous bins. For every span, splat by
     /// splat, `on_span` gets the splat and the index of the span among those of all rows.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn rebuild(
         &mut self,
         splats: &[Splat],
         cutoff: f32,
+        observer: &mut Observer<'_>,
         on_span: impl FnMut(u32, usize),
-    ) {
+    ) -> Result<(), EncodeError> {
         let grid = self.grid;
-        let chunks: Vec<Vec<UnsortedSpan>> = splats
-            .par_chunks(CHUNK)
-            .enumerate()
-            .map(|(chunk, splats)| {
-                let mut spans = Vec::new();
-                let (level, rows) = (Level::new(), 0..grid.rows);
-                grid.columns_of(level, splats, cutoff, rows, |block, row, [first, end]| {
-                    let first_splat = (chunk * CHUNK + block) as u32;
-                    for (splat, (&first, &end)) in (first_splat..).zip(first.iter().zip(end)) {
-                        if first < end {
-                            let span = TileSpan { splat, first, end };
-                            spans.push(UnsortedSpan { row: row as u32, span });
-                        }
+        let chunks = splats.chunks(CHUNK).enumerate();
+        let chunks = observer.map(WORK * CHUNK as f64, chunks, |(chunk, splats)| {
+            let mut spans = Vec::new();
+            let (level, rows) = (Level::new(), 0..grid.rows);
+            grid.columns_of(level, splats, cutoff, rows, |block, row, [first, end]| {
+                let first_splat = (chunk * CHUNK + block) as u32;
+                for (splat, (&first, &end)) in (first_splat..).zip(first.iter().zip(end)) {
+                    if first < end {
+                        let span = TileSpan { splat, first, end };
+                        spans.push(UnsortedSpan { row: row as u32, span });
                     }
-                });
-                // The grid visits a block of splats row by row.
-                spans.sort_by_key(|unsorted| unsorted.span.splat);
-                spans
-            })
-            .collect();
+                }
+            });
+            // The grid visits a block of splats row by row.
+            spans.sort_by_key(|unsorted| unsorted.span.splat);
+            spans
+        })?;
+        observer.poll()?;
         self.sort_by_row(&chunks, on_span);
+        Ok(())
     }
 
     /// Counting sort of the spans by row.

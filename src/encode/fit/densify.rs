@@ -3,13 +3,14 @@
 //! Gaussian Filters").
 
 use glam::Vec3;
-use rayon::prelude::*;
 
 use super::distortion_map;
 use super::parameterization;
 use super::pass::Rendered;
 use super::row::{Row, RowBounds};
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -17,6 +18,10 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
 /// pruned: a 16th of the quantization step of 8 bits.
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
+/// Work for the distortions of a tile.
+const WORK: f64 = 2000.0;
+/// Tiles that get new Gaussians from one poll of the observer to the next, and new Gaussians.
+const PART: usize = 1 << 11;
 
 /// The position of a new Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,13 +49,22 @@ pub(crate) struct Densifier<'a> {
 impl Densifier<'_> {
     /// Up to `count` new Gaussians where the distortion is large. There are fewer where fewer
     /// pixels have any distortion.
-    pub(crate) fn new_gaussians(&self, count: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new_gaussians(
+        &self,
+        count: usize,
+        rng: &mut fastrand::Rng,
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<Row>, EncodeError> {
         let raster = self.pass.raster;
         let positions = match self.options.placement {
-            Placement::Top => top(count, &self.distortion_map()),
+            Placement::Top => top(count, &self.distortion_map(observer)?),
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.pass.distortions());
-                spread(count, raster.width, grid, rng.f64(), sums, |tile| self.distortions(tile))
+                let tiles = |tile| self.distortions(tile);
+                spread(count, raster.width, grid, rng.f64(), sums, tiles, observer)?
             }
         };
         let total = self.count + positions.len();
@@ -58,13 +72,22 @@ impl Densifier<'_> {
             .filter
             .variance(raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        let colors = self.colors(&positions);
-        let new = positions.into_iter().zip(colors);
-        new.map(|(position, color)| self.new_gaussian(&position, color, variance, rng)).collect()
+        let colors = self.colors(&positions, observer)?;
+        let mut rows = Vec::with_capacity(positions.len());
+        for (positions, colors) in positions.chunks(PART).zip(colors.chunks(PART)) {
+            observer.poll()?;
+            let new = positions.iter().zip(colors);
+            rows.extend(new.map(|(at, &color)| self.new_gaussian(at, color, variance, rng)));
+        }
+        Ok(rows)
     }
 
     /// The colours of new Gaussians.
-    fn colors(&self, positions: &[NewPosition]) -> Vec<[f32; 4]> {
+    fn colors(
+        &self,
+        positions: &[NewPosition],
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<[f32; 4]>, EncodeError> {
         let raster = self.pass.raster;
         let at = |position: &NewPosition| {
             let pixel = position.pixel as usize;
@@ -75,8 +98,8 @@ impl Densifier<'_> {
             raster.sample(x, y)
         };
         let share = match self.options.color {
-            NewColor::Zero => return vec![[0.0; 4]; positions.len()],
-            NewColor::Source => return positions.iter().map(of_source).collect(),
+            NewColor::Zero => return Ok(vec![[0.0; 4]; positions.len()]),
+            NewColor::Source => return Ok(positions.iter().map(of_source).collect()),
             NewColor::Residual(share) => share,
         };
         let [columns, _] = self.tile_grid();
@@ -85,9 +108,9 @@ impl Densifier<'_> {
             y / TILE_HEIGHT * columns + x / TILE_WIDTH
         };
         let by_tile: Vec<_> = positions.chunk_by(|a, b| tile_of(a) == tile_of(b)).collect();
-        let colors = by_tile.into_par_iter().flat_map_iter(|positions| {
+        let colors = observer.map(WORK, by_tile.into_iter(), |positions| -> Vec<[f32; 4]> {
             let planes = self.pass.residuals(tile_of(&positions[0]));
-            positions.iter().map(move |position| {
+            let color = |position| {
                 let (x, y) = at(position);
                 let mut color = [0.0; 4];
                 for (value, plane) in color.iter_mut().zip(&planes) {
@@ -95,9 +118,10 @@ impl Densifier<'_> {
                     *value = -share * residual / raster.sensitivity(x, y);
                 }
                 color
-            })
-        });
-        colors.collect()
+            };
+            positions.iter().map(color).collect()
+        })?;
+        Ok(colors.concat())
     }
 
     /// A new Gaussian, where `variance` is the filter's.
@@ -142,12 +166,12 @@ impl Densifier<'_> {
     }
 
     /// The distortion of every pixel, row by row.
-    fn distortion_map(&self) -> Vec<f32> {
+    fn distortion_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
         let raster = self.pass.raster;
         let mut map = vec![0.0; raster.pixels()];
         let [columns, _] = self.tile_grid();
-        let rows = map.par_chunks_mut(raster.width * TILE_HEIGHT).enumerate();
-        rows.for_each(|(row, lines)| {
+        let rows = map.chunks_mut(raster.width * TILE_HEIGHT).enumerate();
+        observer.map(WORK * columns as f64, rows, |(row, lines)| {
             for column in 0..columns {
                 let distortions = self.distortions(row * columns + column);
                 let lines = lines.chunks_exact_mut(raster.width).zip(&distortions);
@@ -157,8 +181,8 @@ impl Densifier<'_> {
                     line[..length].copy_from_slice(&values[..length]);
                 }
             }
-        });
-        map
+        })?;
+        Ok(map)
     }
 }
 
@@ -190,8 +214,9 @@ fn spread(
     [columns, rows]: [usize; 2],
     phase: f64,
     sums: &[f32],
-    distortions: impl Fn(usize) -> TilePlane + Sync,
-) -> Vec<NewPosition> {
+    distortions: impl Fn(usize) -> TilePlane + Send + Sync,
+    observer: &mut Observer<'_>,
+) -> Result<Vec<NewPosition>, EncodeError> {
     let total: f64 = sums.iter().copied().map(f64::from).sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
     // The tiles that contain a step, with the sum of all tiles before, and the first step in them.
@@ -206,7 +231,7 @@ fn spread(
         }
         sum = end;
     });
-    let positions = found.into_par_iter().flat_map_iter(|(tile, mut sum, mut next)| {
+    let positions = observer.map(WORK, found.into_iter(), |(tile, mut sum, mut next)| {
         let variance_share = (mean / f64::from(sums[tile])).sqrt().min(1.0) as f32;
         let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;
         let mut positions = Vec::new();
@@ -223,8 +248,8 @@ fn spread(
             }
         }
         positions
-    });
-    positions.collect()
+    })?;
+    Ok(positions.concat())
 }
 
 /// Visits the points of a rectangle along a Z curve, on which neighbours follow each other closely.
@@ -271,6 +296,7 @@ fn random_shape(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::progress::unobserved;
 
     fn pixels(positions: &[NewPosition]) -> Vec<u32> {
         positions.iter().map(|position| position.pixel).collect()
@@ -285,17 +311,17 @@ mod tests {
         assert_eq!(pixels(&top(10, &map)), [1, 3, 5, 2]);
     }
 
-    /// [`spread`], with the sums that it needs.
+    /// [`super::spread`], with the sums that it needs.
     fn spread(
         count: usize,
         width: usize,
-        [columns, rows]: [usize; 2],
+        grid: [usize; 2],
         phase: f64,
-        tiles: impl Fn(usize) -> TilePlane + Sync,
+        tiles: impl Fn(usize) -> TilePlane + Send + Sync,
     ) -> Vec<NewPosition> {
-        let sums: Vec<f32> =
-            (0..columns * rows).map(|tile| tiles(tile).as_flattened().iter().sum()).collect();
-        super::spread(count, width, [columns, rows], phase, &sums, tiles)
+        let sum_of = |tile| tiles(tile).as_flattened().iter().sum();
+        let sums: Vec<f32> = (0..grid[0] * grid[1]).map(sum_of).collect();
+        unobserved(|observer| super::spread(count, width, grid, phase, &sums, tiles, observer))
     }
 
     /// A tile whose distortions depend on the picture's column alone.
@@ -307,13 +333,14 @@ mod tests {
     fn spread_pixels_follow_the_distortion() {
         // The right half has three times the distortion of the left one.
         let width = 50;
-        let positions = spread(397, width, [4, 5], 0.5, |tile| {
+        let distortions = |tile| {
             tile_of(tile % 4, |x| match x {
                 0..25 => 1.0,
                 25..50 => 3.0,
                 _ => 0.0,
             })
-        });
+        };
+        let positions = spread(397, width, [4, 5], 0.5, distortions);
         let pixels = pixels(&positions);
         assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
@@ -347,10 +374,11 @@ mod tests {
     #[test]
     fn spread_skips_exact_pixels() {
         let exact = [[0.0; TILE_WIDTH]; TILE_HEIGHT];
-        assert!(spread(10, 7, [1, 1], 0.0, |_| exact).is_empty());
+        let spread = |phase: f64, tile: TilePlane| spread(10, 7, [1, 1], phase, |_| tile);
+        assert!(spread(0.0, exact).is_empty());
         let mut map = exact;
         (map[2][3], map[2][4]) = (2.0, 1e-3);
-        let pixels = pixels(&spread(10, 7, [1, 1], 0.9, |_| map));
+        let pixels = pixels(&spread(0.9, map));
         assert!(pixels == [17] || pixels == [17, 18], "{pixels:?}");
     }
 

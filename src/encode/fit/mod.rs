@@ -18,7 +18,6 @@ mod training_tile;
 pub(crate) mod vector_quantizer;
 
 use glam::Vec2;
-use rayon::prelude::*;
 
 use budget::Budget;
 use densify::{Densifier, MIN_COLOR};
@@ -33,9 +32,10 @@ use training_tile::RenderingError;
 
 use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
-use super::progress::{Observer, Progress};
+use super::progress::Observer;
 use super::raster::Raster;
 use super::rate_model::RateTerm;
+use super::workload::Workload;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::render::splat::Splat;
@@ -45,8 +45,8 @@ use crate::render::splat::Splat;
 const FORESEEN: f64 = 0.75;
 /// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
-/// Gaussians that one task turns into splats.
-const CHUNK: usize = 512;
+/// Work to turn a Gaussian into a splat, or to look at it.
+const WORK: f64 = 40.0;
 
 /// What fits have cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -123,8 +123,12 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Trains from nothing.
-    pub(crate) fn run(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    /// Trains from nothing. `workload` is what was expected of it, for the progress that is told.
+    pub(crate) fn run(
+        &mut self,
+        workload: Workload,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
         self.forward(true, observer)?;
@@ -133,6 +137,8 @@ impl<'a> Fit<'a> {
         let mut kept = usize::MAX;
         let total = self.work.iterations + iterations;
         for iteration in 0..*iterations {
+            let grown = 2.0 * f64::from(iteration) / f64::from(*iterations);
+            observer.advance(workload.iteration(grown.min(1.0)))?;
             if iteration == plan.quantized_from {
                 self.start_quantization();
             }
@@ -142,13 +148,13 @@ impl<'a> Fit<'a> {
             let grows = growths_left.is_some();
             self.iterate(factor, total, plan.is_settled(iteration), grows, observer)?;
             if done % densification.prune_interval == 0 {
-                self.prune();
+                self.prune(observer)?;
             }
             if let Some(steps_left) = growths_left {
                 kept = self.wanted(FORESEEN);
                 let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
-                self.cull(replaced);
+                self.cull(replaced, observer)?;
                 self.grow(portion + replaced, observer)?;
             }
             if let Some(culls_left) = plan.culls_left(done) {
@@ -156,7 +162,7 @@ impl<'a> Fit<'a> {
                 kept = kept.max(self.wanted(FORESEEN));
                 // Growth may have ended before the budget, where there is little to correct.
                 let surplus = self.len().saturating_sub(kept);
-                self.cull(surplus / (culls_left as usize + 1));
+                self.cull(surplus / (culls_left as usize + 1), observer)?;
             }
         }
         self.settle(observer)
@@ -175,11 +181,13 @@ impl<'a> Fit<'a> {
             self.binned_for = 0;
         }
         self.forward(true, observer)?;
-        self.cull(self.len().saturating_sub(count));
+        self.cull(self.len().saturating_sub(count), observer)?;
         self.grow(count.saturating_sub(self.len()), observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
+        let workload = Workload::new(self.raster.pixels(), self.len());
         for iteration in 0..iterations {
+            observer.advance(workload.iteration(1.0))?;
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
             self.iterate(factor, total, true, false, observer)?;
         }
@@ -272,14 +280,9 @@ impl<'a> Fit<'a> {
         if settled {
             self.keep_if_best();
         }
-        observer.report(Progress {
-            iteration: self.work.iterations,
-            iterations,
-            gaussians: self.parameters.len() as u32,
-            psnr: self.psnr(),
-        })?;
+        observer.report(self.work.iterations, iterations, self.len(), self.psnr())?;
         self.work.iterations += 1;
-        self.step(factor);
+        self.step(factor, observer)?;
         let memory = self.memory();
         self.work.peak_memory = self.work.peak_memory.max(memory);
         Ok(())
@@ -291,22 +294,15 @@ impl<'a> Fit<'a> {
         let measure = grows.then_some(self.training.densification.distortion);
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         let components = 5 + self.raster.channels;
-        self.splats.clear();
-        self.splats.reserve_exact(self.parameters.len());
-        self.parameters
-            .values
-            .par_iter()
-            .with_min_len(CHUNK)
-            .map(|row| {
-                let row = decoded(quantizers.as_ref(), row);
-                let gaussian = Gaussian::from_components(&row[..components], parameterization);
-                Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
-            })
-            .collect_into_vec(&mut self.splats);
+        self.splats = Vec::new();
+        self.splats = observer.map(WORK, self.parameters.values.iter(), |row| {
+            let row = decoded(quantizers.as_ref(), row);
+            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
+        })?;
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
-            observer.poll()?;
-            self.pass.bin(self.raster, &self.splats, kernel);
+            self.pass.bin(self.raster, &self.splats, kernel, observer)?;
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
@@ -318,14 +314,14 @@ impl<'a> Fit<'a> {
 
     /// The rest of the backward pass, from the gradients by splats to those by trained values and
     /// quantizers, and a step of the optimizer against both.
-    fn step(&mut self, factor: f32) {
+    fn step(&mut self, factor: f32, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let raster = self.raster;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(self.bounds, factor, |index, row, sum| {
+            self.parameters.step(self.bounds, factor, observer, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
                 let by_splat = pass.gradient(index, channels);
                 let (center, shape) =
@@ -345,7 +341,7 @@ impl<'a> Fit<'a> {
                 }
                 let sensitivity = raster.sensitivity_near([decoded[0], decoded[1]]);
                 Slope { gradient, sensitivity }
-            });
+            })?;
         if let Some(quantizers) = &mut self.quantizers {
             // Added in the order of the Gaussians, so that the sum does not depend on the threads.
             let mut total = QuantizerGradients::default();
@@ -353,6 +349,7 @@ impl<'a> Fit<'a> {
             let rate = self.training.quantization.learning_rate * factor;
             quantizers.step(&total, &self.parameters.values, rate);
         }
+        Ok(())
     }
 
     /// Densification: adds up to `count` Gaussians where the distortion is large.
@@ -374,12 +371,11 @@ impl<'a> Fit<'a> {
             bounds: self.bounds,
             count: self.parameters.len(),
         };
-        observer.poll()?;
-        let rows = densifier.new_gaussians(count, &mut self.rng);
+        let rows = densifier.new_gaussians(count, &mut self.rng, observer)?;
         observer.poll()?;
         self.free_bins();
         self.parameters.extend(&rows);
-        self.parameters.sort();
+        self.parameters.sort(observer)?;
         self.invalidate();
         Ok(())
     }
@@ -392,20 +388,18 @@ impl<'a> Fit<'a> {
     }
 
     /// Culling: removes the `count` Gaussians of least importance.
-    fn cull(&mut self, count: usize) {
+    fn cull(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let count = count.min(self.len());
         if count == 0 {
-            return;
+            return Ok(());
         }
         let (parameterization, components) =
             (self.bounds.parameterization, 5 + self.raster.channels);
-        let rows = self.parameters.values.par_iter();
-        let importances: Vec<f32> = rows
-            .map(|row| {
-                let gaussian = Gaussian::from_components(&row[..components], parameterization);
-                gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
-            })
-            .collect();
+        let importances = observer.map(WORK, self.parameters.values.iter(), |row| {
+            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
+        })?;
+        observer.poll()?;
         let mut order: Vec<u32> = (0..importances.len() as u32).collect();
         order.select_nth_unstable_by(count - 1, |a, b| {
             importances[*a as usize].total_cmp(&importances[*b as usize]).then_with(|| a.cmp(b))
@@ -414,12 +408,14 @@ impl<'a> Fit<'a> {
         for &index in &order[..count] {
             keep[index as usize] = false;
         }
+        observer.poll()?;
         self.parameters.retain(|index| keep[index]);
         self.invalidate();
+        observer.poll()
     }
 
     /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
-    fn prune(&mut self) {
+    fn prune(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let values = &self.parameters.values;
         let (parameterization, components) =
             (self.bounds.parameterization, 5 + self.raster.channels);
@@ -431,11 +427,12 @@ impl<'a> Fit<'a> {
             let is_inside = self.pass.touches(index);
             gaussian.is_drawable() && has_color && is_inside
         };
-        let keep: Vec<bool> = (0..values.len()).into_par_iter().map(is_visible).collect();
+        let keep = observer.map(WORK, 0..values.len(), is_visible)?;
         if keep.contains(&false) {
             self.parameters.retain(|index| keep[index]);
             self.invalidate();
         }
+        observer.poll()
     }
 
     /// Starts quantization-aware training (paper, section "Compression Framework").

@@ -6,9 +6,13 @@ use super::row::{Row, RowBounds};
 use super::state::{Slope, States, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
+/// Work to step a Gaussian.
+const WORK: f64 = 200.0;
 
 /// Trained values with their optimizer.
 #[derive(Debug)]
@@ -49,7 +53,10 @@ impl Parameters {
 
     /// Sorts the Gaussians along a Z curve, so that neighbours in the picture are neighbours in
     /// memory.
-    pub(crate) fn sort(&mut self) {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let spread = |value: f32| {
             // The bits of the other coordinate go between those of this one.
             (0..16).fold(0, |sum, bit| sum | (value.max(0.0) as u32 >> bit & 1) << (2 * bit))
@@ -58,29 +65,37 @@ impl Parameters {
             .zip(&self.values)
             .map(|(index, row)| (spread(row[0] / 4.0) | spread(row[1] / 4.0) << 1, index))
             .collect();
+        observer.poll()?;
         order.par_sort_unstable();
+        observer.poll()?;
         self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
+        observer.poll()?;
         self.states.reorder(order.iter().map(|&(_, index)| index as usize));
+        Ok(())
     }
 
     /// Takes one step against the gradients, which `slope` returns for an index and its row.
     /// `factor` scales all learning rates. `slope` may also add to a sum; there is one for every
     /// [`CHUNK`] Gaussians, and all of them are returned in order.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn step<Sum: Default + Send>(
         &mut self,
         bounds: RowBounds,
         factor: f32,
-        slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Sync,
-    ) -> Vec<Sum> {
+        observer: &mut Observer<'_>,
+        slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Send + Sync,
+    ) -> Result<Vec<Sum>, EncodeError> {
         let values = &mut self.values;
         match &mut self.states {
             States::Adam(options, states) => {
-                step_all(values, states, slope, |row, state, slope| {
+                step_all(values, states, observer, slope, |row, state, slope| {
                     adam::step(row, state, slope, options, bounds, factor);
                 })
             }
             States::GaussNewton(options, states) => {
-                step_all(values, states, slope, |row, state, slope| {
+                step_all(values, states, observer, slope, |row, state, slope| {
                     gauss_newton::step(row, state, slope, options, bounds, factor);
                 })
             }
@@ -97,11 +112,12 @@ impl Parameters {
 fn step_all<State: Send, Sum: Default + Send>(
     values: &mut [Row],
     states: &mut [State],
-    slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Sync,
-    step: impl Fn(&mut Row, &mut State, &Slope) + Sync,
-) -> Vec<Sum> {
-    let chunks = values.par_chunks_mut(CHUNK).zip(states.par_chunks_mut(CHUNK)).enumerate();
-    let sums = chunks.map(|(chunk, (values, states))| {
+    observer: &mut Observer<'_>,
+    slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Send + Sync,
+    step: impl Fn(&mut Row, &mut State, &Slope) + Send + Sync,
+) -> Result<Vec<Sum>, EncodeError> {
+    let chunks = values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
+    observer.map(WORK * CHUNK as f64, chunks, |(chunk, (values, states))| {
         let mut sum = Sum::default();
         let rows = values.iter_mut().zip(states);
         for (index, (row, state)) in (chunk * CHUNK..).zip(rows) {
@@ -112,6 +128,5 @@ fn step_all<State: Send, Sum: Default + Send>(
             }
         }
         sum
-    });
-    sums.collect()
+    })
 }

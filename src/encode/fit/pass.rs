@@ -24,9 +24,11 @@ use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
 
 /// Pairs of a tile and a splat from one poll of the observer to the next: a few milliseconds.
-const WORK_PER_POLL: usize = 1 << 18;
+const WORK_PER_POLL: usize = 1 << 16;
 /// The cost of a tile without splats, in such pairs.
-const WORK_PER_TILE: usize = 4;
+const WORK_PER_TILE: usize = 16;
+/// Nanoseconds of work to sort a span by tile.
+const WORK_PER_SPAN: f64 = 50.0;
 
 /// The gradient of the loss, half the distortion, by one splat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,22 +76,30 @@ impl Pass {
 
     /// Bins splats by the tiles that they touch. The bins remain valid for a few passes in which
     /// the splats change little: near the cut-off, the weight of a splat is close to 0.
-    pub(crate) fn bin(&mut self, raster: &Raster, splats: &[Splat], kernel: Kernel) {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn bin(
+        &mut self,
+        raster: &Raster,
+        splats: &[Splat],
+        kernel: Kernel,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         // The slots take most of the memory. They are freed while binning needs memory of its own.
         self.slots = Vec::new();
         self.span_ends.clear();
         self.span_ends.resize(splats.len(), 0);
         self.span_indices.clear();
         let (ends, indices) = (&mut self.span_ends, &mut self.span_indices);
-        self.bins.rebuild(splats, kernel.cutoff(), |splat, span| {
+        self.bins.rebuild(splats, kernel.cutoff(), observer, |splat, span| {
             indices.push(span as u32);
             ends[splat as usize] = indices.len() as u32;
-        });
+        })?;
         let bins = &self.bins;
-        (0..bins.rows())
-            .into_par_iter()
-            .map(|row| bins.row(row))
-            .collect_into_vec(&mut self.tile_rows);
+        self.tile_rows = Vec::new();
+        let work = WORK_PER_SPAN * self.span_indices.len() as f64 / bins.rows() as f64;
+        self.tile_rows = observer.map(work, 0..bins.rows(), |row| bins.row(row))?;
         // A splat outside the picture has no spans: its end is that of the splat before.
         let mut last = 0;
         for end in ends {
@@ -98,6 +108,7 @@ impl Pass {
         }
         self.slots =
             vec![Slot::default(); self.span_indices.len() * slots_per_span(raster.channels)];
+        Ok(())
     }
 
     /// Kernel evaluations of a pass with these bins.

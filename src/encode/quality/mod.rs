@@ -31,14 +31,24 @@ pub(crate) struct Judge {
 }
 
 impl Judge {
-    pub(crate) fn new(source: &Source<'_>) -> Self {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
         let size = [source.width() as usize, source.height() as usize];
         let channels = source.color().channels();
         let mut builder = PyramidBuilder::new(size, source.color());
-        builder.set(0, size[1], |x, y, channel| {
-            f32::from(source.wide_sample((y * size[0] + x) * channels + channel)) / 65535.0
-        });
-        Self { source: builder.finish() }
+        for strip in strips::strips(source.width(), source.height()) {
+            observer.poll()?;
+            let (first, rows) = (strip.y as usize, strip.height as usize);
+            builder.set(first, rows, |x, y, channel| {
+                let at = ((first + y) * size[0] + x) * channels + channel;
+                f32::from(source.wide_sample(at)) / 65535.0
+            });
+        }
+        Ok(Self { source: builder.finish(observer)? })
     }
 
     /// Size in bytes.
@@ -72,8 +82,8 @@ impl Judge {
                 planes[channel * pixels + y * size[0] + x]
             });
         })?;
-        observer.poll()?;
-        Ok(self.source.dissimilarity(&builder.finish()))
+        let rendering = builder.finish(observer)?;
+        self.source.dissimilarity(&rendering, observer)
     }
 }
 
@@ -86,11 +96,11 @@ impl Pyramid {
 
     /// How much another picture of the same size differs: the weighted sum of norms that
     /// SSIMULACRA2 takes.
-    fn dissimilarity(&self, other: &Self) -> f64 {
+    fn dissimilarity(&self, other: &Self, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
         let mut sum = 0.0;
         let planes = self.luma.iter().zip(&other.luma);
         for (scale, (plane, other)) in planes.enumerate() {
-            let found = plane.differences(other);
+            let found = plane.differences(other, observer)?;
             sum += match scale {
                 0 => 7.466_89 * found.structure_l4 + 17.445_83 * found.lost_l4,
                 1 => 6.683_68 * found.structure_l4,
@@ -98,9 +108,9 @@ impl Pyramid {
                 _ => 176.393_18 * found.structure_l1 + 24.433_01 * found.structure_l4,
             };
         }
-        let found = self.blue.differences(&other.blue);
+        let found = self.blue.differences(&other.blue, observer)?;
         sum += 95.108_05 * found.structure_l1 + 171.266_73 * found.artifacts_l4;
-        0.956_238_26 * UNMEASURED * sum
+        Ok(0.956_238_26 * UNMEASURED * sum)
     }
 }
 
@@ -137,6 +147,7 @@ pub(crate) fn count_for(dissimilarity: f64, pixels: usize, means: [f64; SCALES])
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
 
     /// A pyramid of a picture of one colour model from its samples.
     fn pyramid(size: [usize; 2], model: ColorModel, samples: &[f32]) -> Pyramid {
@@ -144,7 +155,11 @@ mod tests {
         builder.set(0, size[1], |x, y, channel| {
             samples[(y * size[0] + x) * model.channels() + channel]
         });
-        builder.finish()
+        unobserved(|observer| builder.finish(observer))
+    }
+
+    fn dissimilarity(a: &Pyramid, b: &Pyramid) -> f64 {
+        unobserved(|observer| a.dissimilarity(b, observer))
     }
 
     #[test]
@@ -163,7 +178,7 @@ mod tests {
                 })
                 .collect();
             let source = pyramid(size, ColorModel::Gray, &source);
-            source.dissimilarity(&pyramid(size, ColorModel::Gray, &samples))
+            dissimilarity(&source, &pyramid(size, ColorModel::Gray, &samples))
         };
         let (even, textured) = (with_noise(true, 0.05), with_noise(false, 0.05));
         assert!(even > 3.0 * textured, "{even}, {textured}");
@@ -180,8 +195,8 @@ mod tests {
                 let samples: Vec<f32> = (0..length).map(|_| rng.f32()).collect();
                 let other: Vec<f32> = samples.iter().map(|sample| 1.3 * sample - 0.2).collect();
                 let source = pyramid(size, model, &samples);
-                assert!(source.dissimilarity(&source) < 0.01, "{model:?} {size:?}");
-                let found = source.dissimilarity(&pyramid(size, model, &other));
+                assert!(dissimilarity(&source, &source) < 0.01, "{model:?} {size:?}");
+                let found = dissimilarity(&source, &pyramid(size, model, &other));
                 assert!(found.is_finite() && found > 0.01, "{model:?} {size:?}: {found}");
             }
         }
@@ -193,12 +208,12 @@ mod tests {
         let sample = |x: usize, y: usize, _: usize| ((x * 7 + y * 3) % 11) as f32 / 11.0;
         let mut builder = PyramidBuilder::new(size, ColorModel::Gray);
         builder.set(0, 21, sample);
-        let whole = builder.finish();
+        let whole = unobserved(|observer| builder.finish(observer));
         let mut builder = PyramidBuilder::new(size, ColorModel::Gray);
         for (first, rows) in [(0, 8), (8, 2), (10, 11)] {
             builder.set(first, rows, |x, y, channel| sample(x, first + y, channel));
         }
-        let strips = builder.finish();
+        let strips = unobserved(|observer| builder.finish(observer));
         for (whole, strips) in whole.luma.iter().zip(&strips.luma) {
             assert_eq!(whole.values, strips.values);
         }

@@ -1,10 +1,14 @@
 //! One channel of a picture, and how much two of them differ in structure.
 
 use fearless_simd::{Level, dispatch};
-use rayon::prelude::*;
+
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 
 /// Rows that one task compares.
 const BAND: usize = 32;
+/// Work for a pixel.
+const WORK: f64 = 15.0;
 /// The Gaussian window of standard deviation 1.5, from its middle.
 const WINDOW: [f32; RADIUS + 1] = [0.266_56, 0.213_44, 0.109_59, 0.036_075, 0.007_615];
 const RADIUS: usize = 4;
@@ -38,16 +42,21 @@ impl Plane {
     }
 
     /// How much another plane of the same size differs.
-    pub(super) fn differences(&self, other: &Self) -> Differences {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(super) fn differences(
+        &self,
+        other: &Self,
+        observer: &mut Observer<'_>,
+    ) -> Result<Differences, EncodeError> {
         let level = Level::new();
-        let bands = (0..self.height().div_ceil(BAND)).into_par_iter();
-        let sums: Vec<[f64; 4]> = bands
-            .map(|band| {
-                let first = band * BAND;
-                let end = self.height().min(first + BAND);
-                dispatch!(level, _ => sums(self, other, first, end))
-            })
-            .collect();
+        let bands = 0..self.height().div_ceil(BAND);
+        let sums = observer.map(WORK * (self.width * BAND) as f64, bands, |band| {
+            let first = band * BAND;
+            let end = self.height().min(first + BAND);
+            dispatch!(level, _ => sums(self, other, first, end))
+        })?;
         // Added band by band, so that the sums do not depend on the threads.
         let mut total = [0.0; 4];
         for sums in sums {
@@ -55,12 +64,12 @@ impl Plane {
         }
         let [structure, structure_4, artifacts_4, lost_4] =
             total.map(|sum| sum / self.values.len() as f64);
-        Differences {
+        Ok(Differences {
             structure_l1: structure,
             structure_l4: structure_4.sqrt().sqrt(),
             artifacts_l4: artifacts_4.sqrt().sqrt(),
             lost_l4: lost_4.sqrt().sqrt(),
-        }
+        })
     }
 }
 
@@ -148,6 +157,7 @@ fn sums(a: &Plane, b: &Plane, first: usize, end: usize) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::progress::unobserved;
 
     /// Differences of two planes in f64, directly from the definition.
     fn plain(a: &Plane, b: &Plane) -> Differences {
@@ -199,12 +209,16 @@ mod tests {
         Plane { width, values: (0..width * height).map(|_| rng.f32()).collect() }
     }
 
+    fn differences(a: &Plane, b: &Plane) -> Differences {
+        unobserved(|observer| a.differences(b, observer))
+    }
+
     #[test]
     fn differences_are_those_of_the_definition() {
         // More rows than a band, and fewer columns than the window.
         for (width, height) in [(23, BAND + 9), (3, 5), (1, 1)] {
             let (a, b) = (plane(width, height, 1), plane(width, height, 2));
-            let (found, expected) = (a.differences(&b), plain(&a, &b));
+            let (found, expected) = (differences(&a, &b), plain(&a, &b));
             let pairs = [
                 (found.structure_l1, expected.structure_l1),
                 (found.structure_l4, expected.structure_l4),
@@ -214,7 +228,7 @@ mod tests {
             for (found, expected) in pairs {
                 assert!((found - expected).abs() < 1e-4 * expected + 1e-6, "{found}, {expected}");
             }
-            let none = a.differences(&a);
+            let none = differences(&a, &a);
             assert!(none.structure_l1 < 1e-5 && none.artifacts_l4 == 0.0 && none.lost_l4 == 0.0);
         }
     }

@@ -4,6 +4,8 @@ use rayon::prelude::*;
 
 use super::plane::Plane;
 use crate::color::ColorModel;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 
 /// Scales with luma: all of the size, a half, a quarter and an eighth of it.
 pub(super) const LUMA_SCALES: usize = 4;
@@ -17,6 +19,8 @@ const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 const SHORT: [f32; 3] = [0.243_423, 0.204_767, 0.551_81];
 /// What stands behind transparent pixels.
 const BACKGROUND: f32 = 0.5;
+/// Work for a pixel of a plane, or of a picture that is halved.
+const WORK: f64 = 12.0;
 
 /// A picture on several scales, each half as wide and high as the one before.
 #[derive(Clone, Debug, Default)]
@@ -94,43 +98,59 @@ impl PyramidBuilder {
         });
     }
 
-    pub(super) fn finish(self) -> Pyramid {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(super) fn finish(self, observer: &mut Observer<'_>) -> Result<Pyramid, EncodeError> {
         let mut pyramid = Pyramid::default();
         let mut picture = self.half;
         for (scale, plane) in pyramid.luma.iter_mut().enumerate() {
             if scale > 1 {
-                picture = picture.halved();
+                picture = picture.halved(observer)?;
             }
             if scale > 0 {
-                *plane = picture.plane(luma);
+                *plane = picture.plane(luma, observer)?;
             }
         }
         pyramid.luma[0] = self.luma;
-        pyramid.blue = picture.halved().plane(|color| response(SHORT, color) - luma(color));
-        pyramid
+        let blue = |color| response(SHORT, color) - luma(color);
+        pyramid.blue = picture.halved(observer)?.plane(blue, observer)?;
+        Ok(pyramid)
     }
 }
 
 impl LinearPicture {
     /// Half as wide and high; the last row and column of an odd number count twice.
-    fn halved(&self) -> Self {
+    fn halved(&self, observer: &mut Observer<'_>) -> Result<Self, EncodeError> {
         let (width, height) = (self.width, self.pixels.len() / self.width);
         let half = width.div_ceil(2);
-        let pixels = (0..half * height.div_ceil(2)).map(|at| {
-            let (x, y) = (at % half * 2, at / half * 2);
-            let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
-            let corners = [[x, y], [right, y], [x, below], [right, below]];
-            let corners = corners.map(|[x, y]| self.pixels[y * width + x]);
-            core::array::from_fn(|channel| {
-                0.25 * corners.iter().map(|corner| corner[channel]).sum::<f32>()
-            })
-        });
-        Self { width: half, pixels: pixels.collect() }
+        let mut pixels = vec![[0.0; 3]; half * height.div_ceil(2)];
+        let rows = pixels.chunks_exact_mut(half).enumerate();
+        observer.map(WORK * half as f64, rows, |(row, pixels)| {
+            for (column, pixel) in pixels.iter_mut().enumerate() {
+                let (x, y) = (2 * column, 2 * row);
+                let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
+                let corners = [[x, y], [right, y], [x, below], [right, below]];
+                let corners = corners.map(|[x, y]| self.pixels[y * width + x]);
+                *pixel = core::array::from_fn(|channel| {
+                    0.25 * corners.iter().map(|corner| corner[channel]).sum::<f32>()
+                });
+            }
+        })?;
+        Ok(Self { width: half, pixels })
     }
 
-    fn plane(&self, value: impl Fn([f32; 3]) -> f32 + Sync) -> Plane {
-        let values = self.pixels.par_iter().map(|&color| value(color)).collect();
-        Plane { width: self.width, values }
+    fn plane(
+        &self,
+        value: impl Fn([f32; 3]) -> f32 + Send + Sync,
+        observer: &mut Observer<'_>,
+    ) -> Result<Plane, EncodeError> {
+        let width = self.width;
+        let mut values = vec![0.0; self.pixels.len()];
+        let rows = values.chunks_exact_mut(width).zip(self.pixels.chunks_exact(width));
+        observer.map(WORK * width as f64, rows, |(values, pixels)| {
+            values.iter_mut().zip(pixels).for_each(|(to, &color)| *to = value(color));
+        })?;
+        Ok(Plane { width, values })
     }
 }
 

@@ -17,8 +17,12 @@ use crate::kernel::QUARTIC_RADIUS;
 /// Side in pixels of the blocks of the picture. Windows overlap only if they have a block in
 /// common.
 const BLOCK: usize = 16;
-/// Gaussians from one poll of the observer to the next.
-const POLL_INTERVAL: usize = 256;
+/// Blocks of windows for each thread from one poll of the observer to the next: a few milliseconds.
+const BLOCKS_PER_POLL: usize = 1 << 11;
+/// Work to find the window of a Gaussian.
+const WORK: f64 = 200.0;
+/// Windows that are put into batches from one poll of the observer to the next.
+const PART: usize = 1 << 14;
 
 /// The trust region of the quadratic model: the largest change of each component of the geometry in
 /// a step to the model's minimum.
@@ -37,6 +41,8 @@ pub(crate) struct CoordinateDescent<'a> {
     pub(crate) tile_bits: f32,
     /// The Lagrange multiplier: squared error per bit.
     pub(crate) lambda: f32,
+    /// The work of the pass, for the progress that is told.
+    pub(crate) work: f64,
 }
 
 /// The context of a code in its file, which determines its rate.
@@ -73,19 +79,23 @@ impl CoordinateDescent<'_> {
     ) -> Result<usize, EncodeError> {
         let mut kept = vec![true; codes.len()];
         let mut changed = 0;
-        observer.poll()?;
-        for batch in self.independent_batches(residuals, codes) {
-            for part in batch.chunks(POLL_INTERVAL) {
-                observer.poll()?;
+        let batches = self.independent_batches(residuals, codes, observer)?;
+        let work = self.work / batches.iter().flatten().map(|&(_, area)| area as f64).sum::<f64>();
+        let most = BLOCKS_PER_POLL * rayon::current_num_threads();
+        for batch in &batches {
+            let mut rest = &batch[..];
+            while !rest.is_empty() {
+                let (part, area) = portion(&mut rest, most);
+                observer.advance(work * area as f64)?;
                 let shared = &*residuals;
                 let chosen: Vec<Option<Code>> = part
                     .par_iter()
-                    .map_init(Window::default, |window, &index| {
+                    .map_init(Window::default, |window, &(index, _)| {
                         self.choose(shared, window, codes[index], contexts[index])
                     })
                     .collect();
                 let mut changes = Vec::new();
-                for (&index, choice) in part.iter().zip(chosen) {
+                for (&(index, _), choice) in part.iter().zip(chosen) {
                     if choice == Some(codes[index]) {
                         continue;
                     }
@@ -112,37 +122,45 @@ impl CoordinateDescent<'_> {
         lattice.gaussian(code, &lattice.shape(code), grid, self.model)
     }
 
-    /// The indices of all codes in batches. Within a batch, no two windows have a block in common.
+    /// The indices of all codes in batches, with the areas of their windows in blocks. Within a batch,
+    /// no two windows have a block in common.
     ///
     /// Large windows, which overlap many others, come first. Neighbours in the order of the codes
     /// are mostly neighbours in the picture; windows of about the same size are therefore taken in
     /// bit-reversed order.
-    fn independent_batches(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
+    fn independent_batches(
+        &self,
+        residuals: &Residuals,
+        codes: &[Code],
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<Vec<(usize, usize)>>, EncodeError> {
         let columns = residuals.width().div_ceil(BLOCK);
-        let mut windows: Vec<_> = (codes.iter().enumerate())
-            .map(|(index, code)| {
-                let blocks = residuals
-                    .window(&self.gaussian(code))
-                    .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
-                // Gaussians outside the picture go into the first batch, and will be removed.
-                let [x, y] = blocks.unwrap_or_default();
-                let area = (x.len() * y.len()) as u32;
-                (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
-            })
-            .collect();
+        let mut windows = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
+            let blocks = residuals
+                .window(&self.gaussian(code))
+                .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
+            // Gaussians outside the picture go into the first batch, and will be removed.
+            let [x, y] = blocks.unwrap_or_default();
+            let area = (x.len() * y.len()) as u32;
+            (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
+        })?;
         windows.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
         let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
-        let mut batches: Vec<Vec<usize>> = Vec::new();
-        for (_, order, x, y) in windows {
+        let mut batches: Vec<Vec<(usize, usize)>> = Vec::new();
+        for (at, (_, order, x, y)) in windows.into_iter().enumerate() {
+            if at.is_multiple_of(PART) {
+                observer.poll()?;
+            }
+            let area = (x.len() * y.len()).max(1);
             let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
             let batch = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
             blocks.for_each(|block| next[block] = batch + 1);
             if batch == batches.len() {
                 batches.push(Vec::new());
             }
-            batches[batch].push(order.reverse_bits() as usize);
+            batches[batch].push((order.reverse_bits() as usize, area));
         }
-        batches
+        Ok(batches)
     }
 
     /// The code of least cost among a code and its candidates; `None` if it costs less to remove
@@ -301,6 +319,20 @@ impl CoordinateDescent<'_> {
             .filter_map(move |(axis, forward)| lattice.moved(&code, axis, forward, &grid));
         shapes.chain(moves)
     }
+}
+
+/// Takes the first of a batch, whose windows have at least `most` blocks together, or all. Returns them
+/// with the number of these blocks.
+fn portion<'a>(batch: &mut &'a [(usize, usize)], most: usize) -> (&'a [(usize, usize)], usize) {
+    let mut blocks = 0;
+    let mut count = 0;
+    while blocks < most && count < batch.len() {
+        blocks += batch[count].1;
+        count += 1;
+    }
+    let (part, rest) = batch.split_at(count);
+    *batch = rest;
+    (part, blocks)
 }
 
 /// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time

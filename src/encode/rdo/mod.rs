@@ -10,9 +10,11 @@ mod coordinate_descent;
 mod kernel_weights;
 mod quadratic_model;
 mod residuals;
+mod search_work;
 mod step_search;
 mod target_search;
 mod window;
 
 pub(crate) use residuals::Residuals;
+pub(crate) use search_work::SearchWork;
 pub(crate) use target_search::TargetSearch;

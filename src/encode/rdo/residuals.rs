@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, Lanes};
 use crate::encode::distortion::differentiate;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH};
 use crate::encode::sensitivity::{BLOCK, Sensitivity};
 use crate::gaussian::Gaussian;
@@ -19,6 +21,8 @@ const BAND: usize = 64;
 /// The margin of a window around its Gaussian, for candidates that are larger or elsewhere: a
 /// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
+/// Work for the mask of a sample, and for the shift of a residual.
+const WORK: (f64, f64) = (2.0, 4.0);
 
 /// The residuals of a picture, rendering minus source, before the rendering is clamped, and how much
 /// their squares count.
@@ -88,28 +92,33 @@ impl ClampMask {
 
 impl Residuals {
     /// Residuals of 0, until [`Residuals::set`] sets them.
-    pub(crate) fn new(raster: &Raster) -> Self {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn new(raster: &Raster, observer: &mut Observer<'_>) -> Result<Self, EncodeError> {
         let (width, height, channels) = (raster.width, raster.height, raster.channels);
         let stride = width + LANES;
         let masks = stride.div_ceil(LANES) + 1;
         let mut ignored = vec![ClampMask::ALL; masks * height * channels];
-        ignored.par_chunks_mut(masks).enumerate().for_each(|(line, ignored)| {
+        let lines = ignored.chunks_exact_mut(masks).enumerate();
+        observer.map(WORK.0 * width as f64, lines, |(line, ignored)| {
             let mut samples = raster.line(line / channels, line % channels);
             for mask in ignored {
                 *mask = ClampMask::new(samples.by_ref().take(LANES));
             }
-        });
+        })?;
         let mut sensitivities = vec![1.0; stride * height.div_ceil(BLOCK)];
         if let Some(sensitivity) = &raster.sensitivity {
-            for (row, line) in sensitivities.chunks_exact_mut(stride).enumerate() {
+            let lines = sensitivities.chunks_exact_mut(stride).enumerate();
+            observer.map(WORK.0 * width as f64, lines, |(row, line)| {
                 for (x, value) in line[..width].iter_mut().enumerate() {
                     *value = sensitivity.at(x, row * BLOCK);
                 }
-            }
+            })?;
         }
         let residuals = vec![0.0; stride * height * channels];
         let level = Level::new();
-        Self { width, height, channels, residuals, ignored, sensitivities, stride, level }
+        Ok(Self { width, height, channels, residuals, ignored, sensitivities, stride, level })
     }
 
     /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
@@ -129,23 +138,34 @@ impl Residuals {
 
     /// Moves every residual such that, times its sensitivity, it is half the gradient of the
     /// distortion.
-    pub(crate) fn shift(&mut self, sensitivity: &Sensitivity) {
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn shift(
+        &mut self,
+        sensitivity: &Sensitivity,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         match self.channels {
-            1 => self.shift_of::<1>(sensitivity),
-            2 => self.shift_of::<2>(sensitivity),
-            3 => self.shift_of::<3>(sensitivity),
-            _ => self.shift_of::<4>(sensitivity),
+            1 => self.shift_of::<1>(sensitivity, observer),
+            2 => self.shift_of::<2>(sensitivity, observer),
+            3 => self.shift_of::<3>(sensitivity, observer),
+            _ => self.shift_of::<4>(sensitivity, observer),
         }
     }
 
-    fn shift_of<const CHANNELS: usize>(&mut self, sensitivity: &Sensitivity) {
+    fn shift_of<const CHANNELS: usize>(
+        &mut self,
+        sensitivity: &Sensitivity,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
         let (level, stride, width) = (self.level, self.stride, self.width);
         let band = TILE_HEIGHT * CHANNELS * stride;
-        let sensitivities = self.sensitivities.par_chunks(TILE_HEIGHT / BLOCK * stride);
+        let sensitivities = self.sensitivities.chunks(TILE_HEIGHT / BLOCK * stride);
         let masks = self.masks();
-        let ignored = self.ignored.par_chunks(TILE_HEIGHT * CHANNELS * masks);
-        let bands = self.residuals.par_chunks_mut(band).zip(ignored);
-        bands.zip(sensitivities).enumerate().for_each(|(row, ((residuals, ignored), by_pixel))| {
+        let ignored = self.ignored.chunks(TILE_HEIGHT * CHANNELS * masks);
+        let bands = self.residuals.chunks_mut(band).zip(ignored).zip(sensitivities).enumerate();
+        observer.map(WORK.1 * band as f64, bands, |(row, ((residuals, ignored), by_pixel))| {
             let rows = residuals.len() / (CHANNELS * stride);
             for x in (0..width).step_by(TILE_WIDTH) {
                 let columns = TILE_WIDTH.min(width - x);
@@ -176,7 +196,8 @@ impl Residuals {
                     }
                 }
             }
-        });
+        })?;
+        Ok(())
     }
 
     /// Size in bytes of the residuals of a source, and of the windows of one batch of Gaussians,
@@ -313,6 +334,7 @@ mod tests {
     use crate::color::ColorModel;
     use crate::encode::distortion::plain_distortion;
     use crate::encode::options::Tune;
+    use crate::encode::progress::unobserved;
     use crate::encode::source::Source;
 
     #[test]
@@ -325,12 +347,12 @@ mod tests {
                 (0..width * height * channels).map(|_| rng.u8(..).saturating_mul(2)).collect();
             let source = Source::new_u8(width as u32, height as u32, model, &samples)
                 .expect("the sizes agree");
-            let raster = Raster::new(&source, Tune::Visual);
+            let raster = unobserved(|observer| Raster::new(&source, Tune::Visual, observer));
             let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
-            let mut residuals = Residuals::new(&raster);
+            let mut residuals = unobserved(|observer| Residuals::new(&raster, observer));
             residuals.set(&raster, 0, &rendering);
             let sensitivity = raster.sensitivity.as_ref().expect("it is tuned");
-            residuals.shift(sensitivity);
+            unobserved(|observer| residuals.shift(sensitivity, observer));
 
             let mut plain: Vec<f64> = (0..samples.len())
                 .map(|at| {

@@ -1,6 +1,7 @@
 //! The search for the codes with which a file meets its target.
 
 use super::code_optimizer::CodeOptimizer;
+use super::search_work::{MOST_PASSES, SearchWork};
 use super::step_search::{Aim, StepSearch};
 use crate::coding::entropy::LatticeCodes;
 use crate::encode::error::EncodeError;
@@ -29,8 +30,6 @@ const SETTLING: f64 = 0.045;
 const LARGEST_DEVIATION: f64 = 10.0;
 /// By how much lambda may change to meet a target, as a base-2 logarithm.
 const MOST_LAMBDA_CHANGE: f64 = 1.0;
-/// Most passes of coordinate descent until a target is met.
-const MOST_PASSES: u32 = 12;
 /// Refinements of the step, one after the other, where the search does not reach the PSNR; base-2
 /// logarithms.
 const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
@@ -48,8 +47,8 @@ pub(crate) struct TargetSearch<'a> {
     raster: &'a Raster,
     judge: &'a Judge,
     layout: &'a FileLayout<'a>,
-    /// Passes of coordinate descent; for a target there may be a few more.
-    passes: u32,
+    /// How many passes there shall be, and what they cost; for a target there may be a few more.
+    work: SearchWork,
     codes: CodeOptimizer<'a>,
 }
 
@@ -59,9 +58,9 @@ impl<'a> TargetSearch<'a> {
         raster: &'a Raster,
         judge: &'a Judge,
         layout: &'a FileLayout<'a>,
-        passes: u32,
+        work: SearchWork,
     ) -> Self {
-        Self { source, raster, judge, layout, passes, codes: CodeOptimizer::new(raster, layout) }
+        Self { source, raster, judge, layout, work, codes: CodeOptimizer::new(raster, layout) }
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
@@ -76,9 +75,10 @@ impl<'a> TargetSearch<'a> {
             Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             _ => rate_model::step_for(distortion, gaussians.len()),
         };
+        observer.expect(self.work.whole());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            let mut coded = self.codes.rounded(gaussians, step);
-            self.codes.descend(&mut coded, 0.0, self.passes, observer)?;
+            let mut coded = self.codes.rounded(gaussians, step, observer)?;
+            self.codes.descend(&mut coded, 0.0, 0..self.work.passes, observer)?;
             return Ok(coded);
         };
         let finest = step + FINEST;
@@ -97,7 +97,8 @@ impl<'a> TargetSearch<'a> {
                 if deviation <= 0.0 || finer < finest {
                     break;
                 }
-                (coded, deviation) = self.passed(gaussians, finer, self.passes, aim, observer)?;
+                (coded, deviation) =
+                    self.passed(gaussians, finer, self.work.passes, aim, observer)?;
             }
         }
         self.trim(coded, deviation, aim, observer)
@@ -113,7 +114,7 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(LatticeCodes, f64, f64), EncodeError> {
-        let passes = self.first_passes();
+        let passes = self.work.first_passes();
         let mut settling = SETTLING / f64::from(passes);
         let mut search = StepSearch::new(step, aim.by_step(), finest);
         let mut first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
@@ -123,19 +124,24 @@ impl<'a> TargetSearch<'a> {
                 break;
             }
             search.tell(expected);
+            observer.expect(self.work.first_try() + self.work.later_tries());
             first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
         }
+        observer.expect(self.work.later_tries());
         let mut search = StepSearch::new(search.at, aim.by_step(), finest);
         let mut first_try = Some(first_try);
         let mut best: Option<(LatticeCodes, f64)> = None;
         for _ in 0..MOST_TRIES {
             let (mut coded, before) = match first_try.take() {
                 Some(first_try) => first_try,
-                None => self.passed(gaussians, search.at, passes, aim, observer)?,
+                None => {
+                    observer.expect(self.work.one_more_try());
+                    self.passed(gaussians, search.at, passes, aim, observer)?
+                }
             };
             // A target that is out of reach gets no more passes than an encoding without target.
             let exhausted = search.is_exhausted(before - settling);
-            let most = if exhausted { self.passes } else { MOST_PASSES };
+            let most = if exhausted { self.work.passes } else { MOST_PASSES };
             let (deviation, lambda) =
                 self.adjust_lambda(&mut coded, before, settling, most, aim, observer)?;
             if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
@@ -167,9 +173,8 @@ impl<'a> TargetSearch<'a> {
             return Ok(search.at);
         }
         for _ in 0..MOST_ROUNDING_TRIES {
-            observer.poll()?;
-            let mut coded = self.codes.rounded(gaussians, search.at);
-            self.codes.written(&mut coded);
+            let mut coded = self.codes.rounded(gaussians, search.at, observer)?;
+            self.codes.written(&mut coded, observer)?;
             let deviation = self.deviation(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
             if search.is_exhausted(deviation) {
                 break;
@@ -182,10 +187,6 @@ impl<'a> TargetSearch<'a> {
         Ok(search.at)
     }
 
-    fn first_passes(&self) -> u32 {
-        self.passes.div_ceil(4)
-    }
-
     /// The codes of a step after some passes, and their deviation from an aim.
     fn passed(
         &self,
@@ -195,8 +196,8 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(LatticeCodes, f64), EncodeError> {
-        let mut coded = self.codes.rounded(gaussians, step);
-        self.codes.descend(&mut coded, 0.0, passes, observer)?;
+        let mut coded = self.codes.rounded(gaussians, step, observer)?;
+        self.codes.descend(&mut coded, 0.0, 0..passes, observer)?;
         let deviation = self.deviation(&coded, aim, observer)?;
         Ok((coded, deviation))
     }
@@ -214,16 +215,16 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(f64, f64), EncodeError> {
-        let first = self.first_passes();
+        let first = self.work.first_passes();
         let mut lambda: f64 = 0.0;
         for pass in first..most {
-            if pass >= self.passes && aim.miss(deviation) == 0.0 {
+            if pass >= self.work.passes && aim.miss(deviation) == 0.0 {
                 break;
             }
             let expected = deviation - settling * f64::from(first) / f64::from(pass);
             lambda -= (expected / aim.by_lambda()).clamp(-0.5, 0.5);
             lambda = lambda.clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
-            self.codes.descend(coded, lambda, 1, observer)?;
+            self.codes.descend(coded, lambda, pass..pass + 1, observer)?;
             deviation = self.deviation(coded, aim, observer)?;
         }
         Ok((deviation, lambda))
@@ -236,21 +237,22 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
-        observer.poll()?;
-        let file = self.layout.write_entropy(coded);
-        Ok(match aim {
+        let file = self.layout.write_entropy(coded, observer)?;
+        let deviation = match aim {
             Aim::Size { most } => (file.len() as f64 / most).log2(),
             Aim::Psnr(psnr) => {
-                let verified = Verified::new(&file, self.source);
+                let verified = Verified::new(&file, self.source, observer)?;
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
                 ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
             Aim::Dissimilarity(dissimilarity) => {
-                let verified = Verified::new(&file, self.source);
+                let verified = Verified::new(&file, self.source, observer)?;
                 let reached = self.judge.dissimilarity(&verified.picture(), observer)?;
                 (reached / dissimilarity).log2().max(-LARGEST_DEVIATION)
             }
-        })
+        };
+        observer.advance(self.work.comparison())?;
+        Ok(deviation)
     }
 
     /// Removes the weakest Gaussians until the file has at most so many bytes.
@@ -261,8 +263,7 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         loop {
-            observer.poll()?;
-            let size = self.layout.write_entropy(coded).len() as u64;
+            let size = self.layout.write_entropy(coded, observer)?.len() as u64;
             let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else {
                 return Ok(());
             };

@@ -1,15 +1,14 @@
 from collections.abc import Callable
 from os import PathLike
-from typing import Any, Literal, Protocol, Self, SupportsIndex, TypeAlias, final
+from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 
 from numpy.typing import DTypeLike, NDArray
 from typing_extensions import Buffer
 
-from image_gip._types import Info, Limits, Progress
+from image_gip._types import Info, Limits, Mode, Progress, Tune
 
 _Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
 _Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
-_Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
 # NumPy declares its arrays as buffers from Python 3.12 on only.
 _Buffer: TypeAlias = Buffer | NDArray[Any]
 
@@ -36,7 +35,7 @@ def decode(
     size: _Size | None = None,
     scale: float | None = None,
     region: _Region | None = None,
-    mode: _Mode | None = None,
+    mode: Mode | None = None,
     dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
     threads: int = 1,
@@ -51,7 +50,7 @@ def encode(
     psnr: float | None = None,
     gaussians: int | None = None,
     effort: int = 5,
-    tune: Literal["visual", "psnr"] = "visual",
+    tune: Tune = "visual",
     threads: int = 1,
     seed: int = 0,
     icc: _Buffer | None = None,
@@ -74,7 +73,7 @@ class StreamDecoder:
         size: _Size | None = None,
         scale: float | None = None,
         region: _Region | None = None,
-        mode: _Mode | None = None,
+        mode: Mode | None = None,
         dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         prefix: int | None = None,

@@ -1,7 +1,12 @@
 """What functions of the module take and return besides arrays."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
+
+#: The channels of a picture, as Pillow names them.
+Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
+#: What an encoding minimizes: the error that a person sees, or the squared error.
+Tune: TypeAlias = Literal["visual", "psnr"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,9 +63,8 @@ class Info:
     width: int
     #: Height in pixels.
     height: int
-    #: The channels, as Pillow names them. Colours are sRGB unless there is an ICC profile; alpha is
-    #: straight.
-    mode: Literal["L", "LA", "RGB", "RGBA"]
+    #: The channels. Colours are sRGB unless there is an ICC profile; alpha is straight.
+    mode: Mode
     #: Bits per sample of the picture that was encoded: 8 or 16.
     depth: int
     #: Number of Gaussians, as the header declares it.
@@ -100,6 +104,8 @@ class Info:
 class Progress:
     """How far an encoding has come."""
 
+    #: The share of the work that is done, from 0 to 1: an estimate, which never falls.
+    fraction: float
     #: Iterations of training done so far.
     iteration: int
     #: Iterations planned in total. The number grows when the target needs more than planned.

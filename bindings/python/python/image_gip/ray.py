@@ -41,6 +41,7 @@ import image_gip
 from image_gip._dataset import folder, shards
 from image_gip._dataset.shards import Pictures, Shard
 from image_gip._dataset.work import SUFFIXES, Container, Job, Operation
+from image_gip._types import Tune
 
 __all__ = ["Summary", "decode_dataset", "encode_dataset", "thumbnail_dataset"]
 
@@ -71,7 +72,7 @@ def encode_dataset(
     psnr: float | None = None,
     gaussians: int | None = None,
     effort: int = 5,
-    tune: Literal["visual", "psnr"] = "visual",
+    tune: Tune = "visual",
     seed: int = 0,
 ) -> Summary:
     """Encodes pictures of the formats that Pillow reads, with 8 bits per sample, to ``.gip``.

@@ -1,7 +1,5 @@
 //! Tests of the pass against formulas in f64, and of its SIMD code.
 
-use core::ops::ControlFlow;
-
 use glam::Vec3;
 
 use super::*;
@@ -9,6 +7,7 @@ use crate::color::ColorModel;
 use crate::encode::distortion::plain_distortion;
 use crate::encode::fit::parameterization;
 use crate::encode::options::Tune;
+use crate::encode::progress::unobserved;
 use crate::encode::source::Source;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::testing::simd_levels;
@@ -27,10 +26,10 @@ fn run(
     kernel: Kernel,
     base: [f32; 4],
 ) -> RenderingError {
-    let mut silent = |_: &_| ControlFlow::Continue(());
-    let mut observer = Observer::new(&mut silent, 0);
-    pass.bin(raster, splats, kernel);
-    pass.run(raster, splats, kernel, base, None, &mut observer).expect("not cancelled")
+    unobserved(|observer| {
+        pass.bin(raster, splats, kernel, observer)?;
+        pass.run(raster, splats, kernel, base, None, observer)
+    })
 }
 
 /// Half the distortion in f64, directly from the formulas of the paper.
@@ -164,7 +163,7 @@ fn every_gradient_equals_its_finite_difference() {
             let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
             let rows = scene(parameterization, channels, &mut rng);
             let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
-            let raster = Raster::new(&source, tune);
+            let raster = unobserved(|observer| Raster::new(&source, tune, observer));
             let found = gradients(&rows, parameterization, kernel, &raster);
             for (index, found) in found.iter().enumerate() {
                 for component in 0..5 + channels {
@@ -219,7 +218,7 @@ fn every_simd_level_gives_the_same_bits() {
             .collect()
     };
     for tune in [Tune::Visual, Tune::Psnr] {
-        let raster = Raster::new(&source, tune);
+        let raster = unobserved(|observer| Raster::new(&source, tune, observer));
         let expected = run(Level::baseline(), &raster);
         assert!(expected.0.squared > 0.0 && expected.0.distortion > 0.0);
         let expected = bits(expected);
@@ -236,7 +235,7 @@ fn every_simd_level_gives_the_same_bits() {
 fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let white = [255; 5 * 3 * 3];
     let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
-    let raster = Raster::new(&source, Tune::Visual);
+    let raster = unobserved(|observer| Raster::new(&source, Tune::Visual, observer));
     let gaussian =
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
@@ -244,4 +243,41 @@ fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
     assert_eq!(error, RenderingError::default());
     assert_eq!(pass.gradient(0, 3), SplatGradient::default());
+}
+
+#[test]
+fn measured_distortions_are_those_of_the_tiles_rendered_again() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+    let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+    let rows = scene(Parameterization::Cholesky, 3, &mut rng);
+    let splats: Vec<_> = rows
+        .iter()
+        .filter_map(|row| {
+            Splat::new(&Gaussian::from_components(&row[..8], Parameterization::Cholesky))
+        })
+        .collect();
+    for tune in [Tune::Visual, Tune::Psnr] {
+        let raster = unobserved(|observer| Raster::new(&source, tune, observer));
+        let kernel = Kernel::Quartic;
+        for measure in [Distortion::L1, Distortion::L3] {
+            let mut pass = Pass::new(&raster);
+            unobserved(|observer| {
+                pass.bin(&raster, &splats, kernel, observer)?;
+                pass.run(&raster, &splats, kernel, BASE, Some(measure), observer)
+            });
+            let columns = raster.width.div_ceil(TILE_WIDTH);
+            let expected = pass.distortions();
+            assert_eq!(expected.len(), columns * raster.height.div_ceil(TILE_HEIGHT));
+            let rendered =
+                Rendered { pass: &pass, raster: &raster, splats: &splats, kernel, base: BASE };
+            for (tile, &expected) in expected.iter().enumerate() {
+                let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
+                let planes = rendered.residuals(tile);
+                let found = distortion_map::of_tile(&raster, corner, &planes, measure);
+                assert!(expected > 0.0);
+                assert_eq!(found.as_flattened().iter().sum::<f32>(), expected);
+            }
+        }
+    }
 }

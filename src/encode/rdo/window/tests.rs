@@ -3,6 +3,7 @@
 use super::*;
 use crate::color::ColorModel;
 use crate::encode::options::Tune;
+use crate::encode::progress::unobserved;
 use crate::encode::raster::Raster;
 use crate::encode::source::Source;
 
@@ -43,7 +44,7 @@ fn scene(model: ColorModel, clamped: bool) -> Scene {
     let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
     let size = [WIDTH, HEIGHT].map(|length| length as u32);
     let of_raster = Source::new_u8(size[0], size[1], model, &source).expect("the sizes agree");
-    let raster = Raster::new(&of_raster, Tune::Visual);
+    let raster = unobserved(|observer| Raster::new(&of_raster, Tune::Visual, observer));
     Scene { model, source, rendering, raster }
 }
 
@@ -98,7 +99,7 @@ fn plain_error(scene: &Scene, gaussian: &Gaussian, factor: f64) -> f64 {
 }
 
 fn residuals(scene: &Scene) -> Residuals {
-    let mut residuals = Residuals::new(&scene.raster);
+    let mut residuals = unobserved(|observer| Residuals::new(&scene.raster, observer));
     residuals.set(&scene.raster, 0, &scene.rendering);
     residuals
 }
