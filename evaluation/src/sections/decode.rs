@@ -11,7 +11,7 @@ use image_gip::{
 };
 
 use super::rate_store::RateStore;
-use super::speed::nearest;
+use super::rate_store::nearest;
 use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
 use crate::bench::{Bench, timing_version};
 use crate::comparison::list_or_none;

@@ -10,7 +10,7 @@ use crate::plot::{Corner, Plot, Scale, Series};
 use crate::table::Table;
 
 /// Sizes in megapixels, and how many Gaussians each megapixel gets.
-const MEGAPIXELS: [f64; 7] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0];
+const MEGAPIXELS: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0];
 const QUICK_MEGAPIXELS: [f64; 3] = [0.1, 0.5, 2.0];
 const DENSITY: f64 = 12_500.0;
 /// Numbers of Gaussians on one megapixel.
@@ -153,7 +153,8 @@ fn growth_table(costs: &[Cost]) -> String {
         "evaluations",
         "ns each",
         "encode s",
-        "memory MiB",
+        "ms per megapixel",
+        "bytes per pixel",
         "decode ms, one thread",
         "all",
         "memory MiB",
@@ -166,7 +167,8 @@ fn growth_table(costs: &[Cost]) -> String {
             format!("{:.1}", cost.evaluations),
             format!("{:.2}", cost.nanoseconds),
             format!("{:.2}", cost.encode),
-            format!("{:.1}", cost.encode_memory / MEBIBYTE),
+            format!("{:.0}", 1000.0 * cost.encode / cost.megapixels),
+            format!("{:.1}", cost.encode_memory / cost.megapixels * 1e-6),
             format!("{:.1}", 1000.0 * cost.decode[0]),
             format!("{:.1}", 1000.0 * cost.decode[1]),
             format!("{:.1}", cost.decode_memory / MEBIBYTE),

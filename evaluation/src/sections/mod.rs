@@ -8,6 +8,7 @@ mod codec_curves;
 pub(crate) mod content;
 mod crops;
 pub(crate) mod decode;
+mod encoding;
 mod f64_renderer;
 mod float_file;
 mod growth;

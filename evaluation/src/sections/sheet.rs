@@ -9,7 +9,7 @@ use image_gip::{Target, Threads};
 
 use super::crops::{Crop, extremes};
 use super::rate_store::RateStore;
-use super::speed::nearest;
+use super::rate_store::nearest;
 use crate::baselines::{BASELINES, Baseline};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use image_gip::{Target, Threads};
 
-use super::growth;
-use super::rate_store::RateStore;
+use super::rate_store::{RateStore, nearest};
+use super::{encoding, growth};
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::{Bench, timing_version};
 use crate::comparison::{Better, NamedFigures, better_than};
@@ -57,6 +57,8 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             text.push_str(&format!("\n![{title}]({name})\n"));
         }
     }
+    let kodak = pictures(bench);
+    text.push_str(&encoding::measure(bench, &kodak, RATE)?);
     text.push_str(&growth::measure(bench)?);
     Ok(text)
 }
@@ -147,23 +149,6 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
         })?);
     }
     Ok(rows)
-}
-
-/// The setting whose rate is nearest to `wanted`, by bisection. `settings` go from small files to
-/// large ones.
-pub(super) fn nearest<'a>(
-    settings: &[&'a str],
-    wanted: f64,
-    mut rate: impl FnMut(&str) -> Result<f64>,
-) -> Result<&'a str> {
-    let (mut low, mut high) = (0, settings.len() - 1);
-    while high - low > 1 {
-        let middle = usize::midpoint(low, high);
-        if rate(settings[middle])? < wanted { low = middle } else { high = middle }
-    }
-    let below = wanted / rate(settings[low])?;
-    let above = rate(settings[high])? / wanted;
-    Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
 }
 
 fn thread_label(threads: Threads) -> &'static str {
@@ -270,23 +255,4 @@ fn plot_scatter(
         legend: Corner::Beside,
     };
     plot.write(&bench.path(name), &series)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_setting_is_found() {
-        let find = |rates: &[f64]| {
-            let names: Vec<String> = rates.iter().map(f64::to_string).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            nearest(&names, 0.5, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
-        };
-        assert_eq!(find(&[0.1, 0.2, 0.45, 0.6, 0.9]), "0.45");
-        assert_eq!(find(&[0.1, 0.2, 0.3, 0.52, 0.9]), "0.52");
-        assert_eq!(find(&[0.1, 0.2]), "0.2");
-        assert_eq!(find(&[0.7, 0.8, 0.9]), "0.7");
-        assert_eq!(find(&[0.4]), "0.4");
-    }
 }
