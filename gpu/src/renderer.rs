@@ -1,0 +1,345 @@
+//! The shader with its pipelines, and what is drawn with it.
+
+use image_gip::Picture;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+use wgpu::{
+    BindGroupDescriptor, BindGroupEntry, BindGroupLayoutEntry, BindingType, BufferBindingType,
+    BufferUsages, ShaderStages, StorageTextureAccess, TextureFormat, TextureUsages,
+    TextureViewDimension,
+};
+
+use crate::device::{check, checked};
+use crate::error::RenderError;
+use crate::picture::GpuPicture;
+use crate::view::{Frame, View};
+use crate::{SHADER, work};
+
+/// Gaussians for each workgroup of `prepare`.
+const PREPARE: u32 = 256;
+/// Invocations of a workgroup.
+const INVOCATIONS: u32 = 256;
+/// Bytes of the memory that a workgroup of `render` shares.
+const SHARED_BYTES: u32 = 11_400;
+/// The default of [`GpuRenderer::with_max_work`].
+const MAX_WORK: u64 = 1 << 34;
+/// The format of the textures.
+const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
+
+/// Renders pictures on a GPU: the compute shader [`SHADER`] and its pipelines on one device.
+///
+/// Cheap calls only submit work; they do not wait for the GPU.
+#[derive(Debug)]
+pub struct GpuRenderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    layout: wgpu::BindGroupLayout,
+    prepare: wgpu::ComputePipeline,
+    render: wgpu::ComputePipeline,
+    max_work: u64,
+}
+
+impl GpuRenderer {
+    /// Compiles the shader for a device. It needs no features, and no limits above
+    /// [`wgpu::Limits::downlevel_defaults`]; pictures may.
+    ///
+    /// # Errors
+    /// [`RenderError::DeviceLimit`] when the device has no compute shaders, or too small ones, and
+    /// [`RenderError::Device`] when it refuses the shader.
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, RenderError> {
+        let limits = device.limits();
+        let invocations =
+            limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x);
+        let needed = [
+            ("invocations of a workgroup", INVOCATIONS, invocations),
+            ("bytes of workgroup memory", SHARED_BYTES, limits.max_compute_workgroup_storage_size),
+            ("storage buffers", 3, limits.max_storage_buffers_per_shader_stage),
+            ("storage textures", 1, limits.max_storage_textures_per_shader_stage),
+        ];
+        for (what, wanted, allowed) in needed {
+            check(what, wanted.into(), allowed.into())?;
+        }
+        let (layout, [prepare, render]) = checked(&device, || {
+            let layout = layout(&device);
+            let pipelines = pipelines(&device, &layout);
+            (layout, pipelines)
+        })?;
+        Ok(Self { device, queue, layout, prepare, render, max_work: MAX_WORK })
+    }
+
+    /// Sets the most kernel evaluations of one rendering: an upper bound, counted in tiles of 16 x
+    /// 16 pixels. A file from an unknown source could otherwise stop the GPU for minutes, until the
+    /// system resets it. Default 2^34.
+    #[must_use]
+    pub fn with_max_work(mut self, evaluations: u64) -> Self {
+        self.max_work = evaluations;
+        self
+    }
+
+    /// Draws a picture to a new texture: [`GpuRenderer::upload`], [`GpuRenderer::create_texture`]
+    /// and [`GpuRenderer::draw`] in one call.
+    ///
+    /// # Errors
+    /// As these.
+    pub fn render(
+        &self,
+        picture: &Picture<'_>,
+        view: &View,
+    ) -> Result<wgpu::Texture, RenderError> {
+        let picture = self.upload(picture)?;
+        let texture = self.create_texture(&picture, view)?;
+        self.draw(&picture, view, &texture)?;
+        Ok(texture)
+    }
+
+    /// Copies a picture to the GPU, so that it can be drawn many times.
+    ///
+    /// # Errors
+    /// [`RenderError::DeviceLimit`] when a buffer would be larger than the device allows: with the
+    /// default limits of devices, from 2.7 million Gaussians on. [`RenderError::Device`] when it has
+    /// no memory left.
+    pub fn upload(&self, picture: &Picture<'_>) -> Result<GpuPicture, RenderError> {
+        let workgroups = picture.gaussians().len().div_ceil(PREPARE as usize) as u64;
+        let most = self.device.limits().max_compute_workgroups_per_dimension;
+        check("workgroups for the Gaussians", workgroups, most.into())?;
+        GpuPicture::new(&self.device, picture)
+    }
+
+    /// A texture for a view of a picture: `Rgba8Unorm`, which can be drawn to, sampled and copied.
+    ///
+    /// # Errors
+    /// [`RenderError::View`] when the view is out of range, [`RenderError::DeviceLimit`] when it is
+    /// larger than a texture can be, and [`RenderError::Device`] when there is no memory for it.
+    pub fn create_texture(
+        &self,
+        picture: &GpuPicture,
+        view: &View,
+    ) -> Result<wgpu::Texture, RenderError> {
+        let region = view.resolve(picture.header(), picture.len())?.region;
+        let most = self.device.limits().max_texture_dimension_2d;
+        check("pixels along a side", region.width.max(region.height).into(), most.into())?;
+        checked(&self.device, || {
+            self.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("gip picture"),
+                size: wgpu::Extent3d {
+                    width: region.width,
+                    height: region.height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: TextureUsages::STORAGE_BINDING
+                    | TextureUsages::TEXTURE_BINDING
+                    | TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        })
+    }
+
+    /// Draws a view of a picture to the upper left corner of a texture, which is at least as large
+    /// as the view. Submits the work, and does not wait for it.
+    ///
+    /// Gray is written as red, green and blue, and a picture without alpha is opaque. Alpha is
+    /// straight. The samples are those of the file, so in general sRGB-encoded.
+    ///
+    /// # Errors
+    /// [`RenderError::View`] when the view is out of range, [`RenderError::Work`] when it takes too
+    /// much work, [`RenderError::Texture`] when the texture is too small, not `Rgba8Unorm`, or no
+    /// storage texture, and [`RenderError::Device`] when the device fails.
+    pub fn draw(
+        &self,
+        picture: &GpuPicture,
+        view: &View,
+        texture: &wgpu::Texture,
+    ) -> Result<(), RenderError> {
+        let frame = view.resolve(picture.header(), picture.len())?;
+        let uniform = picture.uniform(&frame)?;
+        check_texture(texture, &frame)?;
+        let kernel = picture.header().kernel;
+        let wanted = work::evaluations(picture.drawn(&frame), &frame, kernel);
+        if wanted > self.max_work {
+            return Err(RenderError::Work { wanted, allowed: self.max_work });
+        }
+        checked(&self.device, || {
+            let commands = self.record(picture, &frame, &uniform, texture);
+            self.queue.submit([commands]);
+        })
+    }
+
+    /// The commands that draw a frame.
+    fn record(
+        &self,
+        picture: &GpuPicture,
+        frame: &Frame,
+        uniform: &[u8],
+        texture: &wgpu::Texture,
+    ) -> wgpu::CommandBuffer {
+        let view = self.device.create_buffer_init(&BufferInitDescriptor {
+            label: Some("gip view"),
+            contents: uniform,
+            usage: BufferUsages::UNIFORM,
+        });
+        let output = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let buffers =
+            [&view, &picture.gaussian_buffer, &picture.splat_buffer, &picture.bin_buffer];
+        let mut entries: Vec<_> = (0..)
+            .zip(buffers)
+            .map(|(binding, buffer)| BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        entries.push(BindGroupEntry {
+            binding: 4,
+            resource: wgpu::BindingResource::TextureView(&output),
+        });
+        let bindings = self.device.create_bind_group(&BindGroupDescriptor {
+            label: Some("gip bindings"),
+            layout: &self.layout,
+            entries: &entries,
+        });
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("gip drawing"),
+        });
+        encoder.clear_buffer(&picture.bin_buffer, 0, Some(GpuPicture::bin_bytes(frame)));
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_bind_group(0, &bindings, &[]);
+            pass.set_pipeline(&self.prepare);
+            pass.dispatch_workgroups(frame.gaussians.div_ceil(PREPARE), 1, 1);
+            pass.set_pipeline(&self.render);
+            let [columns, rows] = frame.tiles();
+            pass.dispatch_workgroups(columns, rows, 1);
+        }
+        encoder.finish()
+    }
+
+    /// Waits for what was drawn to a texture of [`GpuRenderer::create_texture`], and reads it:
+    /// height x width x 4 interleaved samples, rows from the top, without padding.
+    ///
+    /// # Errors
+    /// [`RenderError::Texture`] when the texture cannot be copied, [`RenderError::DeviceLimit`] when
+    /// a buffer cannot hold it, [`RenderError::Device`] and [`RenderError::Read`] when the device
+    /// fails.
+    pub fn read(&self, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderError> {
+        if texture.format() != FORMAT || !texture.usage().contains(TextureUsages::COPY_SRC) {
+            return Err(RenderError::Texture("not Rgba8Unorm that can be copied"));
+        }
+        let row = texture.width() as usize * 4;
+        // The rows of a copy are aligned.
+        let padded = (texture.width() * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let size = u64::from(padded) * u64::from(texture.height());
+        check("bytes of a buffer for the samples", size, self.device.limits().max_buffer_size)?;
+        let buffer = checked(&self.device, || {
+            let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("gip samples"),
+                size,
+                usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            encoder.copy_texture_to_buffer(
+                texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &buffer,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(padded),
+                        rows_per_image: None,
+                    },
+                },
+                texture.size(),
+            );
+            self.queue.submit([encoder.finish()]);
+            buffer
+        })?;
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver waits for it.
+            let _ = sender.send(result);
+        });
+        let read = |error: &dyn std::error::Error| RenderError::Read(error.to_string());
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| read(&error))?;
+        receiver.recv().map_err(|error| read(&error))?.map_err(|error| read(&error))?;
+        let mapped = buffer.get_mapped_range(..).map_err(|error| read(&error))?;
+        let rows = mapped.chunks_exact(padded as usize);
+        Ok(rows.flat_map(|line| &line[..row]).copied().collect())
+    }
+}
+
+/// Refuses a texture that a frame cannot be drawn to.
+fn check_texture(texture: &wgpu::Texture, frame: &Frame) -> Result<(), RenderError> {
+    let problem = if texture.format() != FORMAT {
+        "not Rgba8Unorm"
+    } else if !texture.usage().contains(TextureUsages::STORAGE_BINDING) {
+        "not a storage texture"
+    } else if texture.dimension() != wgpu::TextureDimension::D2
+        || texture.depth_or_array_layers() != 1
+        || texture.mip_level_count() != 1
+    {
+        "not a single 2D image"
+    } else if texture.width() < frame.region.width || texture.height() < frame.region.height {
+        "smaller than the view"
+    } else {
+        return Ok(());
+    };
+    Err(RenderError::Texture(problem))
+}
+
+/// The bindings of the shader.
+fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| BindGroupLayoutEntry {
+        binding,
+        visibility: ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
+    let buffer = |binding, ty| {
+        entry(
+            binding,
+            BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        )
+    };
+    let output = BindingType::StorageTexture {
+        access: StorageTextureAccess::WriteOnly,
+        format: FORMAT,
+        view_dimension: TextureViewDimension::D2,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("gip bindings"),
+        entries: &[
+            buffer(0, BufferBindingType::Uniform),
+            buffer(1, BufferBindingType::Storage { read_only: true }),
+            buffer(2, BufferBindingType::Storage { read_only: false }),
+            buffer(3, BufferBindingType::Storage { read_only: false }),
+            entry(4, output),
+        ],
+    })
+}
+
+/// The pipelines of `prepare` and `render`.
+fn pipelines(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+) -> [wgpu::ComputePipeline; 2] {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("gip"),
+        source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+    });
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("gip"),
+        bind_group_layouts: &[Some(layout)],
+        ..Default::default()
+    });
+    ["prepare", "render"].map(|name| {
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(name),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some(name),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        })
+    })
+}
