@@ -27,3 +27,18 @@ pub(crate) fn checked<T>(
     }
     first.map_or(Ok(result), |error| Err(error.into()))
 }
+
+/// A buffer, which is not mapped: mapping one fails by a panic where there is no memory left.
+pub(crate) fn buffer(
+    device: &wgpu::Device,
+    label: &str,
+    size: u64,
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage,
+        mapped_at_creation: false,
+    })
+}

@@ -33,6 +33,9 @@ pub enum RenderError {
     /// The picture has a kernel that the shader lacks.
     #[error("the shader lacks the kernel of this picture")]
     Kernel,
+    /// The picture was uploaded by another renderer.
+    #[error("the picture was uploaded by another renderer")]
+    OtherRenderer,
     /// The texture is not one that can be drawn to or read.
     #[error("unsuitable texture: {0}")]
     Texture(&'static str),

@@ -3,6 +3,7 @@
 mod device;
 mod error;
 mod picture;
+mod pipelines;
 mod renderer;
 mod view;
 mod work;

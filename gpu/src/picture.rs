@@ -1,10 +1,11 @@
 //! A picture in the memory of the GPU.
 
+use std::sync::Arc;
+
 use image_gip::{Gaussian, Header, Kernel, Picture};
 use wgpu::BufferUsages;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-use crate::device::{check, checked};
+use crate::device::{buffer, check, checked};
 use crate::error::RenderError;
 use crate::view::{Frame, MAX_BINS};
 
@@ -17,6 +18,8 @@ const SPLAT_BYTES: u64 = 48;
 /// [`GpuRenderer::upload`](crate::GpuRenderer::upload). Each Gaussian takes 116 bytes there.
 #[derive(Debug)]
 pub struct GpuPicture {
+    /// That of the renderer.
+    pub(crate) identity: Arc<()>,
     header: Header,
     /// For the work of a view.
     gaussians: Vec<Gaussian>,
@@ -26,7 +29,11 @@ pub struct GpuPicture {
 }
 
 impl GpuPicture {
-    pub(crate) fn new(device: &wgpu::Device, picture: &Picture<'_>) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
+        identity: &Arc<()>,
+        picture: &Picture<'_>,
+    ) -> Result<Self, RenderError> {
         let gaussians = picture.gaussians();
         let count = gaussians.len() as u64;
         // Buffers must not be empty.
@@ -43,24 +50,18 @@ impl GpuPicture {
             }
         }
         contents.resize(contents.capacity(), 0);
-        let buffer = |label, size, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: BufferUsages::STORAGE | usage,
-                mapped_at_creation: false,
-            })
-        };
-        checked(device, || Self {
-            header: picture.header().clone(),
-            gaussians: gaussians.to_vec(),
-            gaussian_buffer: device.create_buffer_init(&BufferInitDescriptor {
-                label: Some("gip gaussians"),
-                contents: &contents,
-                usage: BufferUsages::STORAGE,
-            }),
-            splat_buffer: buffer("gip splats", splat_bytes, BufferUsages::empty()),
-            bin_buffer: buffer("gip bins", bin_bytes, BufferUsages::COPY_DST),
+        let filled = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        checked(device, || {
+            let gaussian_buffer = buffer(device, "gip gaussians", contents.len() as u64, filled);
+            queue.write_buffer(&gaussian_buffer, 0, &contents);
+            Self {
+                identity: Arc::clone(identity),
+                header: picture.header().clone(),
+                gaussians: gaussians.to_vec(),
+                gaussian_buffer,
+                splat_buffer: buffer(device, "gip splats", splat_bytes, BufferUsages::STORAGE),
+                bin_buffer: buffer(device, "gip bins", bin_bytes, filled),
+            }
         })
     }
 

@@ -1,41 +1,33 @@
 //! The shader with its pipelines, and what is drawn with it.
 
-use image_gip::Picture;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
-use wgpu::{
-    BindGroupDescriptor, BindGroupEntry, BindGroupLayoutEntry, BindingType, BufferBindingType,
-    BufferUsages, ShaderStages, StorageTextureAccess, TextureFormat, TextureUsages,
-    TextureViewDimension,
-};
+use std::sync::Arc;
 
-use crate::device::{check, checked};
+use image_gip::Picture;
+use wgpu::{BindGroupDescriptor, BindGroupEntry, BufferUsages, TextureUsages};
+
+use crate::device::{buffer, check, checked};
 use crate::error::RenderError;
 use crate::picture::GpuPicture;
+use crate::pipelines::{FORMAT, Pipelines};
 use crate::view::{Frame, View};
-use crate::{SHADER, work};
+use crate::work;
 
 /// Gaussians for each workgroup of `prepare`.
 const PREPARE: u32 = 256;
-/// Invocations of a workgroup.
-const INVOCATIONS: u32 = 256;
-/// Bytes of the memory that a workgroup of `render` shares.
-const SHARED_BYTES: u32 = 11_400;
 /// The default of [`GpuRenderer::with_max_work`].
 const MAX_WORK: u64 = 1 << 34;
-/// The format of the textures.
-const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
-/// Renders pictures on a GPU: the compute shader [`SHADER`] and its pipelines on one device.
+/// Renders pictures on a GPU: the compute shader [`SHADER`](crate::SHADER) and its pipelines on one device.
 ///
 /// Cheap calls only submit work; they do not wait for the GPU.
 #[derive(Debug)]
 pub struct GpuRenderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    layout: wgpu::BindGroupLayout,
-    prepare: wgpu::ComputePipeline,
-    render: wgpu::ComputePipeline,
+    pipelines: Pipelines,
     max_work: u64,
+    /// Tells pictures of other renderers apart: devices of different instances compare as equal.
+    identity: Arc<()>,
 }
 
 impl GpuRenderer {
@@ -46,24 +38,8 @@ impl GpuRenderer {
     /// [`RenderError::DeviceLimit`] when the device has no compute shaders, or too small ones, and
     /// [`RenderError::Device`] when it refuses the shader.
     pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, RenderError> {
-        let limits = device.limits();
-        let invocations =
-            limits.max_compute_invocations_per_workgroup.min(limits.max_compute_workgroup_size_x);
-        let needed = [
-            ("invocations of a workgroup", INVOCATIONS, invocations),
-            ("bytes of workgroup memory", SHARED_BYTES, limits.max_compute_workgroup_storage_size),
-            ("storage buffers", 3, limits.max_storage_buffers_per_shader_stage),
-            ("storage textures", 1, limits.max_storage_textures_per_shader_stage),
-        ];
-        for (what, wanted, allowed) in needed {
-            check(what, wanted.into(), allowed.into())?;
-        }
-        let (layout, [prepare, render]) = checked(&device, || {
-            let layout = layout(&device);
-            let pipelines = pipelines(&device, &layout);
-            (layout, pipelines)
-        })?;
-        Ok(Self { device, queue, layout, prepare, render, max_work: MAX_WORK })
+        let pipelines = Pipelines::new(&device)?;
+        Ok(Self { device, queue, pipelines, max_work: MAX_WORK, identity: Arc::new(()) })
     }
 
     /// Sets the most kernel evaluations of one rendering: an upper bound, counted in tiles of 16 x
@@ -80,11 +56,7 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// As these.
-    pub fn render(
-        &self,
-        picture: &Picture<'_>,
-        view: &View,
-    ) -> Result<wgpu::Texture, RenderError> {
+    pub fn render(&self, picture: &Picture<'_>, view: &View) -> Result<wgpu::Texture, RenderError> {
         let picture = self.upload(picture)?;
         let texture = self.create_texture(&picture, view)?;
         self.draw(&picture, view, &texture)?;
@@ -101,7 +73,7 @@ impl GpuRenderer {
         let workgroups = picture.gaussians().len().div_ceil(PREPARE as usize) as u64;
         let most = self.device.limits().max_compute_workgroups_per_dimension;
         check("workgroups for the Gaussians", workgroups, most.into())?;
-        GpuPicture::new(&self.device, picture)
+        GpuPicture::new((&self.device, &self.queue), &self.identity, picture)
     }
 
     /// A texture for a view of a picture: `Rgba8Unorm`, which can be drawn to, sampled and copied.
@@ -140,10 +112,13 @@ impl GpuRenderer {
     /// Draws a view of a picture to the upper left corner of a texture, which is at least as large
     /// as the view. Submits the work, and does not wait for it.
     ///
+    /// The texture must be one of this device: `wgpu` may panic otherwise.
+    ///
     /// Gray is written as red, green and blue, and a picture without alpha is opaque. Alpha is
     /// straight. The samples are those of the file, so in general sRGB-encoded.
     ///
     /// # Errors
+    /// [`RenderError::OtherRenderer`] for a picture that was uploaded by another renderer,
     /// [`RenderError::View`] when the view is out of range, [`RenderError::Work`] when it takes too
     /// much work, [`RenderError::Texture`] when the texture is too small, not `Rgba8Unorm`, or no
     /// storage texture, and [`RenderError::Device`] when the device fails.
@@ -153,6 +128,9 @@ impl GpuRenderer {
         view: &View,
         texture: &wgpu::Texture,
     ) -> Result<(), RenderError> {
+        if !Arc::ptr_eq(&picture.identity, &self.identity) {
+            return Err(RenderError::OtherRenderer);
+        }
         let frame = view.resolve(picture.header(), picture.len())?;
         let uniform = picture.uniform(&frame)?;
         check_texture(texture, &frame)?;
@@ -175,14 +153,11 @@ impl GpuRenderer {
         uniform: &[u8],
         texture: &wgpu::Texture,
     ) -> wgpu::CommandBuffer {
-        let view = self.device.create_buffer_init(&BufferInitDescriptor {
-            label: Some("gip view"),
-            contents: uniform,
-            usage: BufferUsages::UNIFORM,
-        });
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let view = buffer(&self.device, "gip view", uniform.len() as u64, usage);
+        self.queue.write_buffer(&view, 0, uniform);
         let output = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let buffers =
-            [&view, &picture.gaussian_buffer, &picture.splat_buffer, &picture.bin_buffer];
+        let buffers = [&view, &picture.gaussian_buffer, &picture.splat_buffer, &picture.bin_buffer];
         let mut entries: Vec<_> = (0..)
             .zip(buffers)
             .map(|(binding, buffer)| BindGroupEntry {
@@ -196,19 +171,19 @@ impl GpuRenderer {
         });
         let bindings = self.device.create_bind_group(&BindGroupDescriptor {
             label: Some("gip bindings"),
-            layout: &self.layout,
+            layout: &self.pipelines.layout,
             entries: &entries,
         });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("gip drawing"),
-        });
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gip drawing") });
         encoder.clear_buffer(&picture.bin_buffer, 0, Some(GpuPicture::bin_bytes(frame)));
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_bind_group(0, &bindings, &[]);
-            pass.set_pipeline(&self.prepare);
+            pass.set_pipeline(&self.pipelines.prepare);
             pass.dispatch_workgroups(frame.gaussians.div_ceil(PREPARE), 1, 1);
-            pass.set_pipeline(&self.render);
+            pass.set_pipeline(&self.pipelines.render);
             let [columns, rows] = frame.tiles();
             pass.dispatch_workgroups(columns, rows, 1);
         }
@@ -232,12 +207,8 @@ impl GpuRenderer {
         let size = u64::from(padded) * u64::from(texture.height());
         check("bytes of a buffer for the samples", size, self.device.limits().max_buffer_size)?;
         let buffer = checked(&self.device, || {
-            let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("gip samples"),
-                size,
-                usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            });
+            let usage = BufferUsages::COPY_DST | BufferUsages::MAP_READ;
+            let buffer = buffer(&self.device, "gip samples", size, usage);
             let mut encoder = self.device.create_command_encoder(&Default::default());
             encoder.copy_texture_to_buffer(
                 texture.as_image_copy(),
@@ -285,61 +256,4 @@ fn check_texture(texture: &wgpu::Texture, frame: &Frame) -> Result<(), RenderErr
         return Ok(());
     };
     Err(RenderError::Texture(problem))
-}
-
-/// The bindings of the shader.
-fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| BindGroupLayoutEntry {
-        binding,
-        visibility: ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    };
-    let buffer = |binding, ty| {
-        entry(
-            binding,
-            BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-        )
-    };
-    let output = BindingType::StorageTexture {
-        access: StorageTextureAccess::WriteOnly,
-        format: FORMAT,
-        view_dimension: TextureViewDimension::D2,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("gip bindings"),
-        entries: &[
-            buffer(0, BufferBindingType::Uniform),
-            buffer(1, BufferBindingType::Storage { read_only: true }),
-            buffer(2, BufferBindingType::Storage { read_only: false }),
-            buffer(3, BufferBindingType::Storage { read_only: false }),
-            entry(4, output),
-        ],
-    })
-}
-
-/// The pipelines of `prepare` and `render`.
-fn pipelines(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-) -> [wgpu::ComputePipeline; 2] {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("gip"),
-        source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("gip"),
-        bind_group_layouts: &[Some(layout)],
-        ..Default::default()
-    });
-    ["prepare", "render"].map(|name| {
-        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(name),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: Some(name),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        })
-    })
 }
