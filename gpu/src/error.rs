@@ -42,7 +42,10 @@ pub enum RenderError {
     /// The device failed: it has no memory left, for example, or was lost.
     #[error("the GPU failed: {0}")]
     Device(#[from] wgpu::Error),
-    /// The result could not be read.
+    /// The device did not finish its work.
+    #[error("waiting for the GPU failed: {0}")]
+    Wait(#[from] wgpu::PollError),
+    /// The samples could not be read.
     #[error("reading from the GPU failed: {0}")]
-    Read(String),
+    Read(#[source] Box<dyn std::error::Error + Send + Sync>),
 }

@@ -190,13 +190,22 @@ impl GpuRenderer {
         encoder.finish()
     }
 
+    /// Waits until all that was submitted to the device is done.
+    ///
+    /// # Errors
+    /// [`RenderError::Wait`] when the device fails.
+    pub fn wait(&self) -> Result<(), RenderError> {
+        self.device.poll(wgpu::PollType::wait_indefinitely())?;
+        Ok(())
+    }
+
     /// Waits for what was drawn to a texture of [`GpuRenderer::create_texture`], and reads it:
     /// height x width x 4 interleaved samples, rows from the top, without padding.
     ///
     /// # Errors
     /// [`RenderError::Texture`] when the texture cannot be copied, [`RenderError::DeviceLimit`] when
-    /// a buffer cannot hold it, [`RenderError::Device`] and [`RenderError::Read`] when the device
-    /// fails.
+    /// a buffer cannot hold it, [`RenderError::Device`], [`RenderError::Wait`] and [`RenderError::Read`]
+    /// when the device fails.
     pub fn read(&self, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderError> {
         if texture.format() != FORMAT || !texture.usage().contains(TextureUsages::COPY_SRC) {
             return Err(RenderError::Texture("not Rgba8Unorm that can be copied"));
@@ -230,10 +239,11 @@ impl GpuRenderer {
             // The receiver waits for it.
             let _ = sender.send(result);
         });
-        let read = |error: &dyn std::error::Error| RenderError::Read(error.to_string());
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| read(&error))?;
-        receiver.recv().map_err(|error| read(&error))?.map_err(|error| read(&error))?;
-        let mapped = buffer.get_mapped_range(..).map_err(|error| read(&error))?;
+        self.wait()?;
+        let result = receiver.recv().map_err(|_| wgpu::BufferAsyncError);
+        result.and_then(|result| result).map_err(|error| RenderError::Read(Box::new(error)))?;
+        let mapped =
+            buffer.get_mapped_range(..).map_err(|error| RenderError::Read(Box::new(error)))?;
         let rows = mapped.chunks_exact(padded as usize);
         Ok(rows.flat_map(|line| &line[..row]).copied().collect())
     }
