@@ -1,4 +1,4 @@
-//! Renders `.gip` pictures on the GPU.
+#![doc = include_str!("../README.md")]
 
 mod device;
 mod error;
