@@ -246,8 +246,16 @@ impl Training {
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
         let steps = (iterations / 15).clamp(10, 160);
-        // A long run gains more from iterations after growth.
-        let (end, culled) = if iterations > 1_200 { (0.4, 0.5) } else { (0.5, 0.6) };
+        // The longer a run, the more it gains from iterations after growth.
+        let (end, culled) = match iterations {
+            ..50 => (0.7, 0.8),
+            50..200 => (0.6, 0.7),
+            200..=1_200 => (0.5, 0.6),
+            _ => (0.4, 0.5),
+        };
+        // In a short run there is no time to be careful, and little to correct.
+        let hurry = 1.0 / iterations as f32;
+        let replaced = (4.0 / steps as f32).clamp(0.05, 0.2);
         Self {
             iterations,
             kernel: Kernel::Quartic,
@@ -259,7 +267,7 @@ impl Training {
                 portion: Portion::Even,
                 surplus: 0.3,
                 culled,
-                replaced: (4.0 / steps as f32).clamp(0.05, 0.2),
+                replaced: replaced.min(iterations as f32 / 300.0),
                 distortion: Distortion::L3,
                 placement: Placement::Spread,
                 color: NewColor::Residual(0.3),
@@ -268,10 +276,10 @@ impl Training {
             },
             filter: GaussianFilter::PAPER,
             optimizer: Optimizer::GaussNewton(GaussNewton {
-                rate: 1.0,
+                rate: 1.0 + 12.0 * hurry.min(0.1),
                 momentum: 0.7,
                 damping: 0.02,
-                trust_region: 0.2,
+                trust_region: 0.2 + 3.0 * hurry.min(0.1),
             }),
             schedule: LearningRateSchedule::Linear(0.7),
             quantization: Quantization {
