@@ -109,8 +109,9 @@ impl<'a> Observer<'a> {
         mut items: impl ExactSizeIterator<Item = T>,
         task: impl Fn(T) -> R + Send + Sync,
     ) -> Result<Vec<R>, EncodeError> {
+        let threads = rayon::current_num_threads();
         // The cast saturates.
-        let portion = ((WORK_PER_POLL / work) as usize).max(1) * rayon::current_num_threads();
+        let portion = ((WORK_PER_POLL * threads as f64 / work) as usize).max(threads);
         let mut results = Vec::with_capacity(items.len());
         while items.len() > 0 {
             self.poll()?;
