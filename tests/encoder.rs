@@ -632,21 +632,21 @@ fn progress_is_told_and_may_cancel() {
 
 #[test]
 fn every_stage_polls_often_and_can_be_cancelled() {
-    // Half a megapixel, so that every stage takes several polls.
-    let (width, height) = (1024, 512);
+    // Large enough for every stage to take several polls.
+    let (width, height) = (1024, 256);
     let samples = scene(width, height, 3);
     let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
     for (target, tune, precision) in [
-        (Target::Quality(40.0), Tune::Visual, Precision::Entropy),
-        (Target::BitsPerPixel(0.2), Tune::Psnr, Precision::Entropy),
-        (Target::Gaussians(3_000), Tune::Visual, Precision::Packed),
+        (Target::Gaussians(500), Tune::Visual, Precision::Entropy),
+        (Target::BitsPerPixel(0.05), Tune::Psnr, Precision::Entropy),
+        (Target::Gaussians(500), Tune::Visual, Precision::Packed),
     ] {
         let encoder = Encoder::new()
             .with_effort(1)
             .with_target(target)
             .with_tune(tune)
             .with_precision(precision)
-            .with_training(Training::fast(4))
+            .with_training(Training::fast(2))
             .with_threads(Threads::One);
         // Polls before training, in each iteration, and in the last one with all that follows.
         let mut polls: Vec<u32> = Vec::new();
@@ -672,7 +672,7 @@ fn every_stage_polls_often_and_can_be_cancelled() {
             };
             assert!(f64::from(polls) >= least * megapixels, "stage {stage} of {case}");
         }
-        for stop in (1..=6).map(|part| calls * part / 6) {
+        for stop in (1..=4).map(|part| calls * part / 4) {
             let mut calls = 0;
             let result = encoder.encode_with(&source, &mut |_| {
                 calls += 1;
