@@ -4,11 +4,10 @@ mod common;
 mod pictures;
 mod room;
 
-use std::collections::BTreeMap;
 use std::fs;
 
 use common::layered;
-use image::{ColorType, DynamicImage, ImageEncoder, ImageReader};
+use image::{ColorType, ImageEncoder, ImageReader};
 use image_gip::{Encoder, GipEncoder, Target};
 use room::{Room, by_input};
 use serde_json::Value;
@@ -28,7 +27,7 @@ fn room_with_pictures() -> Room {
         ("in/2024/c.tiff", ColorType::Rgb16),
         ("in/2024/may/d.e.png", ColorType::La8),
     ] {
-        room.save(name, &pictures::picture(SIZE, color));
+        room.save_picture(name, &pictures::picture(SIZE, color));
     }
     room
 }

@@ -25,7 +25,7 @@ fn room_with_pictures() -> (Room, Files) {
     let room = Room::new();
     for number in 0..PICTURES {
         let name = format!("in/{}/{number}.png", number % 2);
-        room.save(&name, &pictures::picture((40 + number as u32, 32), ColorType::Rgb8));
+        room.save_picture(&name, &pictures::picture((40 + number as u32, 32), ColorType::Rgb8));
     }
     batch(&room, 0, &["--out", "undisturbed", "--manifest", "undisturbed.jsonl"]);
     let files = room.files("undisturbed");
@@ -346,7 +346,7 @@ mod killed {
     #[test]
     fn a_signal_stops_an_encoding_at_once() {
         let room = Room::new();
-        room.save("in/large.png", &pictures::picture((400, 300), ColorType::Rgb8));
+        room.save_picture("in/large.png", &pictures::picture((400, 300), ColorType::Rgb8));
         for signal in [SIGINT, SIGTERM] {
             let mut gip = room.spawn(&["batch", "in", "--out", "out", "--effort", "9"]);
             wait(&mut gip, || room.path("out").exists());

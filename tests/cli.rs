@@ -24,7 +24,7 @@ impl Room {
     /// Saves a test picture as `name`.
     fn save(&self, name: &str, color: ColorType) -> DynamicImage {
         let picture = picture(color);
-        picture.save(self.path(name)).expect("the format takes the colour type");
+        self.save_picture(name, &picture);
         picture
     }
 

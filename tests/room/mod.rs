@@ -77,7 +77,7 @@ impl Room {
     }
 
     /// Saves a picture in the format of its name, and makes the folders that it is in.
-    pub(crate) fn save(&self, name: &str, picture: &DynamicImage) {
+    pub(crate) fn save_picture(&self, name: &str, picture: &DynamicImage) {
         self.write(name, "");
         picture.save(self.path(name)).expect("the format takes the colour type");
     }
