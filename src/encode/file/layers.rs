@@ -34,7 +34,7 @@ pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u6
 
 /// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds
 /// their centres to their position intervals, as the decoder reads them.
-pub(crate) fn write_entropy_layers(
+pub(super) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
 ) -> Vec<EncodedLayer> {

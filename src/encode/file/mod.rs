@@ -2,16 +2,25 @@
 
 mod layers;
 
-pub(crate) use layers::{packed_layers_length, write_entropy_layers};
+pub(crate) use layers::packed_layers_length;
 
 use super::error::OptionError;
 use super::source::Source;
 use crate::chunk::ChunkType;
-use crate::coding::entropy::{LatticeCodes, LayerCoder};
+use crate::coding::entropy::{Code, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::kernel::Kernel;
+
+/// Codes in the order of their file, with centres as the decoder reads them, and the layers that they
+/// make.
+#[derive(Debug)]
+pub(crate) struct CodedLayers {
+    pub(crate) lattice: Lattice,
+    pub(crate) codes: Vec<Code>,
+    pub(crate) layers: Vec<EncodedLayer>,
+}
 
 /// The header and the metadata of a file, which its codes complete.
 #[derive(Debug)]
@@ -62,32 +71,38 @@ impl<'a> FileLayout<'a> {
         let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
         let layers = layers::write_packed_layers(&codes, &quantizers);
         let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
-        self.write(&header, &quantization, None, &layers)
+        self.write(&header, &quantization, None, layers.iter().map(Vec::as_slice))
+    }
+
+    /// The layers that codes make in a file.
+    pub(crate) fn coded(&self, LatticeCodes { lattice, mut codes }: LatticeCodes) -> CodedLayers {
+        let coder = LayerCoder::new(&lattice, &self.header);
+        let layers = layers::write_entropy_layers(&coder, &mut codes);
+        CodedLayers { lattice, codes, layers }
     }
 
     /// A file with the entropy coding.
-    pub(crate) fn write_entropy(&self, coded: &LatticeCodes) -> Vec<u8> {
+    pub(crate) fn write_entropy(&self, coded: &CodedLayers) -> Vec<u8> {
+        let CodedLayers { lattice, codes, layers } = coded;
         let header = Header {
             coding: Coding::Entropy,
             parameterization: Parameterization::Cholesky,
-            gaussians: coded.codes.len() as u32,
+            gaussians: codes.len() as u32,
             ..self.header.clone()
         };
-        let coder = LayerCoder::new(&coded.lattice, &header);
-        let mut codes = coded.codes.clone();
-        let layers = write_entropy_layers(&coder, &mut codes);
-        let bounds = layers::bounds_payload(&coder, &codes, &layers, &header);
-        let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
-        self.write(&header, &coded.lattice.to_payload(), bounds, &payloads)
+        let bounds =
+            layers::bounds_payload(&LayerCoder::new(lattice, &header), codes, layers, &header);
+        let payloads = layers.iter().map(|layer| &layer.payload[..]);
+        self.write(&header, &lattice.to_payload(), bounds, payloads)
     }
 
     /// A file of either coding, from the payloads of its chunks.
-    fn write(
+    fn write<'b>(
         &self,
         header: &Header,
         quantization: &[u8],
         bounds: Option<Vec<u8>>,
-        layers: &[Vec<u8>],
+        layers: impl ExactSizeIterator<Item = &'b [u8]>,
     ) -> Vec<u8> {
         let header = Header { layers: layers.len() as u16, ..header.clone() };
         let mut file = ChunkWriter::new();
@@ -181,10 +196,8 @@ mod tests {
             center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
         };
         let codes = (0..count).map(|_| code()).collect();
-        layout.write_entropy(&LatticeCodes {
-            lattice: rate_model::lattice(0.0, ColorModel::Gray),
-            codes,
-        })
+        let lattice = rate_model::lattice(0.0, ColorModel::Gray);
+        layout.write_entropy(&layout.coded(LatticeCodes { lattice, codes }))
     }
 
     /// The samples of a region, and how many Gaussians the decoder keeps. If `all`, it decodes the

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use super::coordinate_descent::{CodeContext, CoordinateDescent, touched_tiles};
 use super::residuals::Residuals;
-use crate::coding::entropy::{CenterGrid, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
+use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, LatticeCodes, LayerCoder};
 use crate::color::ColorModel;
 use crate::encode::error::EncodeError;
-use crate::encode::file::{FileLayout, write_entropy_layers};
+use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::progress::Observer;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
@@ -27,6 +27,15 @@ fn contexts_of(layer: &EncodedLayer) -> impl Iterator<Item = CodeContext<'_>> {
     layer.levels.iter().map(|&level| CodeContext { level, costs: &layer.costs })
 }
 
+/// Codes as they are in a file, and in the order of their use.
+#[derive(Debug)]
+pub(super) struct Optimized {
+    pub(super) coded: CodedLayers,
+    /// The codes before their centres were rounded for the file. The less a Gaussian lowers the error
+    /// by each of its bits, the later it comes.
+    pub(super) by_use: Vec<Code>,
+}
+
 /// Rounds Gaussians to a lattice and optimizes their codes, for the file of one picture.
 #[derive(Debug)]
 pub(super) struct CodeOptimizer<'a> {
@@ -34,17 +43,19 @@ pub(super) struct CodeOptimizer<'a> {
     layout: &'a FileLayout<'a>,
     grid: CenterGrid,
     model: ColorModel,
+    /// Those of the codes that are optimized at present.
+    residuals: Residuals,
 }
 
 impl<'a> CodeOptimizer<'a> {
     pub(super) fn new(raster: &'a Raster, layout: &'a FileLayout<'a>) -> Self {
         let header = layout.header();
         let grid = CenterGrid::new(header.width, header.height);
-        Self { raster, layout, grid, model: header.color }
+        Self { raster, layout, grid, model: header.color, residuals: Residuals::new(raster) }
     }
 
     /// Rounds `gaussians` to the lattice for a step of colour, given by its base-2 logarithm.
-    pub(super) fn rounded(&self, gaussians: &[Gaussian], step: f64) -> LatticeCodes {
+    pub(super) fn rounded(&self, gaussians: &[Gaussian], step: f64) -> CodedLayers {
         let lattice = rate_model::lattice(step, self.model);
         let codes = gaussians.par_iter().map(|gaussian| {
             let sensitivity = self.raster.sensitivity_near(gaussian.center);
@@ -52,81 +63,61 @@ impl<'a> CodeOptimizer<'a> {
             lattice.code(gaussian, class, &self.grid, self.model)
         });
         let codes = codes.collect();
-        LatticeCodes { lattice, codes }
+        self.layout.coded(LatticeCodes { lattice, codes })
     }
 
-    /// Runs up to `passes` passes of coordinate descent over the codes, and ends early when a pass
-    /// changes none. The Lagrange multiplier is 2^`lambda` times that of the rate model. The codes
-    /// are then in the order of the file.
+    /// Runs a pass of coordinate descent over the codes. The Lagrange multiplier is 2^`lambda` times
+    /// that of the rate model.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn descend(
-        &self,
-        coded: &mut LatticeCodes,
+        &mut self,
+        coded: CodedLayers,
         lambda: f64,
-        passes: u32,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
-        let lambda = rate_model::lambda(&coded.lattice) * lambda.exp2() as f32;
-        let mut residuals = Residuals::new(self.raster);
-        for _ in 0..passes {
-            observer.poll()?;
-            let layers = self.written(coded);
-            let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
-            self.render(coded, &mut residuals, observer)?;
-            let coder = self.coder(&coded.lattice);
-            let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
-            let (mut attribute_bits, mut tiles) = (0.0, 0.0);
-            for (code, context) in coded.codes.iter().zip(&contexts) {
-                let shape = coder.lattice.shape(code);
-                attribute_bits += coder.cost(*code, &shape, context.level, context.costs);
-                tiles += touched_tiles(shape.cholesky);
-            }
-            let tree_bits = 8.0 * bytes as f32 - attribute_bits;
-            let tree_bits = (tree_bits / coded.codes.len().max(1) as f32).max(0.0);
-            let tile_bits = DECODING_TIME_BITS * coded.codes.len() as f32 / tiles.max(1.0);
-            let descent =
-                CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda };
-            if descent.pass(&mut residuals, &mut coded.codes, &contexts, observer)? == 0 {
-                break;
-            }
-        }
-        // Sorts the codes and rounds their centres as in the file.
+    ) -> Result<Optimized, EncodeError> {
         observer.poll()?;
-        self.written(coded);
-        Ok(())
+        self.render(&coded, observer)?;
+        let CodedLayers { lattice, codes, layers } = coded;
+        let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
+        let coder = LayerCoder::new(&lattice, self.layout.header());
+        let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
+        let (mut attribute_bits, mut tiles) = (0.0, 0.0);
+        for (code, context) in codes.iter().zip(&contexts) {
+            let shape = lattice.shape(code);
+            attribute_bits += coder.cost(*code, &shape, context.level, context.costs);
+            tiles += touched_tiles(shape.cholesky);
+        }
+        let tree_bits = 8.0 * bytes as f32 - attribute_bits;
+        let tree_bits = (tree_bits / codes.len().max(1) as f32).max(0.0);
+        let tile_bits = DECODING_TIME_BITS * codes.len() as f32 / tiles.max(1.0);
+        let lambda = rate_model::lambda(&lattice) * lambda.exp2() as f32;
+        let descent = CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda };
+        let by_use = descent.pass(&mut self.residuals, &codes, &contexts, observer)?;
+        observer.poll()?;
+        let coded = self.layout.coded(LatticeCodes { lattice, codes: by_use.clone() });
+        Ok(Optimized { coded, by_use })
     }
 
-    fn coder<'b>(&self, lattice: &'b Lattice) -> LayerCoder<'b> {
-        LayerCoder::new(lattice, self.layout.header())
-    }
-
-    /// Writes the layers of the codes, which sorts the codes into the order of the file and rounds
-    /// their centres as the decoder reads them.
-    pub(super) fn written(&self, coded: &mut LatticeCodes) -> Vec<EncodedLayer> {
-        write_entropy_layers(&self.coder(&coded.lattice), &mut coded.codes)
-    }
-
-    /// Sets `residuals` to those of the codes as the decoder renders them.
+    /// Sets the residuals to those of the codes as the decoder renders them.
     fn render(
-        &self,
-        coded: &LatticeCodes,
-        residuals: &mut Residuals,
+        &mut self,
+        coded: &CodedLayers,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        let LatticeCodes { lattice, codes } = coded;
+        let CodedLayers { lattice, codes, .. } = coded;
         let gaussian = |code| lattice.gaussian(code, &lattice.shape(code), &self.grid, self.model);
-        let gaussians: Vec<Gaussian> = codes.iter().map(gaussian).collect();
+        let gaussians: Vec<Gaussian> = codes.par_iter().map(gaussian).collect();
         let header = self.layout.header();
         let limits = Limits::none();
         let rendering = Picture::new(header, &gaussians, &limits, 0);
         strips::render(&rendering, u32::MAX, observer, |region, planes| {
-            residuals.set(self.raster, region.y as usize, planes);
+            self.residuals.set(self.raster, region.y as usize, planes);
         })?;
         if let Some(sensitivity) = &self.raster.sensitivity {
             observer.poll()?;
-            residuals.shift(sensitivity);
+            self.residuals.shift(sensitivity);
         }
         observer.poll()
     }

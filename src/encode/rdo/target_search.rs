@@ -1,10 +1,10 @@
 //! The search for the codes with which a file meets its target.
 
-use super::code_optimizer::CodeOptimizer;
+use super::code_optimizer::{CodeOptimizer, Optimized};
 use super::step_search::{Aim, StepSearch};
 use crate::coding::entropy::LatticeCodes;
 use crate::encode::error::EncodeError;
-use crate::encode::file::FileLayout;
+use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
@@ -66,28 +66,25 @@ impl<'a> TargetSearch<'a> {
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
     pub(crate) fn run(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         distortion: f64,
         target: Target,
         observer: &mut Observer<'_>,
-    ) -> Result<LatticeCodes, EncodeError> {
+    ) -> Result<CodedLayers, EncodeError> {
         let step = match target {
             Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             _ => rate_model::step_for(distortion, gaussians.len()),
         };
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            let mut coded = self.codes.rounded(gaussians, step);
-            self.codes.descend(&mut coded, 0.0, self.passes, observer)?;
-            return Ok(coded);
+            return Ok(self.descended(gaussians, step, self.passes, observer)?.coded);
         };
         let finest = step + FINEST;
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            self.shorten(&mut coded, bytes, observer)?;
-            return Ok(coded);
+            return self.shortened(coded, bytes, observer);
         }
         if aim.miss(deviation) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
@@ -100,19 +97,19 @@ impl<'a> TargetSearch<'a> {
                 (coded, deviation) = self.passed(gaussians, finer, self.passes, aim, observer)?;
             }
         }
-        self.trim(coded, deviation, aim, observer)
+        self.trimmed(coded, deviation, aim, observer)
     }
 
     /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
     /// next; `step` is the first.
     fn aimed(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         step: f64,
         finest: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(LatticeCodes, f64, f64), EncodeError> {
+    ) -> Result<(Optimized, f64, f64), EncodeError> {
         let passes = self.first_passes();
         let mut settling = SETTLING / f64::from(passes);
         let mut search = StepSearch::new(step, aim.by_step(), finest);
@@ -127,17 +124,17 @@ impl<'a> TargetSearch<'a> {
         }
         let mut search = StepSearch::new(search.at, aim.by_step(), finest);
         let mut first_try = Some(first_try);
-        let mut best: Option<(LatticeCodes, f64)> = None;
+        let mut best: Option<(Optimized, f64)> = None;
         for _ in 0..MOST_TRIES {
-            let (mut coded, before) = match first_try.take() {
+            let (coded, before) = match first_try.take() {
                 Some(first_try) => first_try,
                 None => self.passed(gaussians, search.at, passes, aim, observer)?,
             };
             // A target that is out of reach gets no more passes than an encoding without target.
             let exhausted = search.is_exhausted(before - settling);
             let most = if exhausted { self.passes } else { MOST_PASSES };
-            let (deviation, lambda) =
-                self.adjust_lambda(&mut coded, before, settling, most, aim, observer)?;
+            let (coded, deviation, lambda) =
+                self.adjust_lambda(coded, before, settling, most, aim, observer)?;
             if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
                 best = Some((coded, deviation));
             }
@@ -168,8 +165,7 @@ impl<'a> TargetSearch<'a> {
         }
         for _ in 0..MOST_ROUNDING_TRIES {
             observer.poll()?;
-            let mut coded = self.codes.rounded(gaussians, search.at);
-            self.codes.written(&mut coded);
+            let coded = self.codes.rounded(gaussians, search.at);
             let deviation = self.deviation(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
             if search.is_exhausted(deviation) {
                 break;
@@ -186,19 +182,34 @@ impl<'a> TargetSearch<'a> {
         self.passes.div_ceil(4)
     }
 
+    /// The codes of a step after some passes.
+    fn descended(
+        &mut self,
+        gaussians: &[Gaussian],
+        step: f64,
+        passes: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Optimized, EncodeError> {
+        let rounded = self.codes.rounded(gaussians, step);
+        let mut optimized = self.codes.descend(rounded, 0.0, observer)?;
+        for _ in 1..passes {
+            optimized = self.codes.descend(optimized.coded, 0.0, observer)?;
+        }
+        Ok(optimized)
+    }
+
     /// The codes of a step after some passes, and their deviation from an aim.
     fn passed(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         step: f64,
         passes: u32,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(LatticeCodes, f64), EncodeError> {
-        let mut coded = self.codes.rounded(gaussians, step);
-        self.codes.descend(&mut coded, 0.0, passes, observer)?;
-        let deviation = self.deviation(&coded, aim, observer)?;
-        Ok((coded, deviation))
+    ) -> Result<(Optimized, f64), EncodeError> {
+        let optimized = self.descended(gaussians, step, passes, observer)?;
+        let deviation = self.deviation(&optimized.coded, aim, observer)?;
+        Ok((optimized, deviation))
     }
 
     /// Adjusts lambda from pass to pass, in `most` passes, so that codes after their first passes, which
@@ -206,14 +217,14 @@ impl<'a> TargetSearch<'a> {
     /// lower the deviation by `settling`. Returns the deviation then, and the base-2 logarithm of what
     /// lambda was multiplied by.
     fn adjust_lambda(
-        &self,
-        coded: &mut LatticeCodes,
+        &mut self,
+        mut optimized: Optimized,
         mut deviation: f64,
         settling: f64,
         most: u32,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(f64, f64), EncodeError> {
+    ) -> Result<(Optimized, f64, f64), EncodeError> {
         let first = self.first_passes();
         let mut lambda: f64 = 0.0;
         for pass in first..most {
@@ -223,16 +234,16 @@ impl<'a> TargetSearch<'a> {
             let expected = deviation - settling * f64::from(first) / f64::from(pass);
             lambda -= (expected / aim.by_lambda()).clamp(-0.5, 0.5);
             lambda = lambda.clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
-            self.codes.descend(coded, lambda, 1, observer)?;
-            deviation = self.deviation(coded, aim, observer)?;
+            optimized = self.codes.descend(optimized.coded, lambda, observer)?;
+            deviation = self.deviation(&optimized.coded, aim, observer)?;
         }
-        Ok((deviation, lambda))
+        Ok((optimized, deviation, lambda))
     }
 
     /// The deviation from an aim.
     fn deviation(
         &self,
-        coded: &LatticeCodes,
+        coded: &CodedLayers,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
@@ -253,47 +264,51 @@ impl<'a> TargetSearch<'a> {
         })
     }
 
-    /// Removes the weakest Gaussians until the file has at most so many bytes.
-    fn shorten(
+    /// The codes without the least useful ones, such that the file has at most so many bytes.
+    fn shortened(
         &self,
-        coded: &mut LatticeCodes,
+        optimized: Optimized,
         bytes: u64,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<CodedLayers, EncodeError> {
+        let Optimized { mut coded, mut by_use } = optimized;
         loop {
             observer.poll()?;
-            let size = self.layout.write_entropy(coded).len() as u64;
+            let size = self.layout.write_entropy(&coded).len() as u64;
             let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else {
-                return Ok(());
+                return Ok(coded);
             };
             // Four bytes a Gaussian, and at least one.
-            let count = excess.div_ceil(4).min(coded.codes.len() as u64) as usize;
-            coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
-            coded.codes.truncate(coded.codes.len() - count);
+            let count = excess.div_ceil(4).min(by_use.len() as u64) as usize;
+            by_use.truncate(by_use.len() - count);
+            let codes = by_use.clone();
+            coded = self.layout.coded(LatticeCodes { lattice: coded.lattice, codes });
         }
     }
 
-    /// Removes the weakest Gaussians of a picture that is too good, as many as can be spared.
-    fn trim(
+    /// The codes of a picture that is too good without the least useful ones, as many as can be spared.
+    fn trimmed(
         &self,
-        mut coded: LatticeCodes,
+        optimized: Optimized,
         mut deviation: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<LatticeCodes, EncodeError> {
+    ) -> Result<CodedLayers, EncodeError> {
+        let Optimized { mut coded, mut by_use } = optimized;
         if deviation > 0.0 || aim.miss(deviation) == 0.0 {
             return Ok(coded);
         }
-        coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
         // Those from `end` on cannot be spared, and likely not many more at a time.
-        let mut end = coded.codes.len();
+        let mut end = by_use.len();
         let mut portion = end.div_ceil(2);
         for _ in 0..MOST_TRIMMINGS {
-            let mut fewer = coded.clone();
             let start = end.saturating_sub(portion);
-            fewer.codes.drain(start..end);
+            let codes = [&by_use[..start], &by_use[end..]].concat();
+            let lattice = coded.lattice.clone();
+            let fewer = self.layout.coded(LatticeCodes { lattice, codes });
             let deviation_with_fewer = self.deviation(&fewer, aim, observer)?;
             if deviation_with_fewer <= 0.0 {
+                by_use.drain(start..end);
                 (coded, deviation, end) = (fewer, deviation_with_fewer, start);
             } else if portion > 1 {
                 portion /= 2;
