@@ -71,7 +71,7 @@ pub(super) fn bounds_payload(
 fn divide<'a>(coder: &LayerCoder<'_>, codes: &'a mut [Code]) -> Vec<&'a mut [Code]> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
-    codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    codes.par_sort_by_key(|code| core::cmp::Reverse(code.strength()));
     let mut layers = Vec::new();
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {

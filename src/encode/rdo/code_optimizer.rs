@@ -22,6 +22,9 @@ use crate::render::Picture;
 /// PSNR.
 const DECODING_TIME_BITS: f32 = 4.0;
 
+/// Codes whose bits one task adds up.
+const PART: usize = 4096;
+
 /// The contexts of a layer's codes, which determine their rate.
 fn contexts_of(layer: &EncodedLayer) -> impl Iterator<Item = CodeContext<'_>> {
     layer.levels.iter().map(|&level| CodeContext { level, costs: &layer.costs })
@@ -66,6 +69,13 @@ impl<'a> CodeOptimizer<'a> {
         self.layout.coded(LatticeCodes { lattice, codes })
     }
 
+    /// The Gaussians of codes.
+    pub(super) fn gaussians(&self, coded: &CodedLayers) -> Vec<Gaussian> {
+        let CodedLayers { lattice, codes, .. } = coded;
+        let gaussian = |code| lattice.gaussian(code, &lattice.shape(code), &self.grid, self.model);
+        codes.par_iter().map(gaussian).collect()
+    }
+
     /// Runs a pass of coordinate descent over the codes. The Lagrange multiplier is 2^`lambda` times
     /// that of the rate model.
     ///
@@ -83,11 +93,21 @@ impl<'a> CodeOptimizer<'a> {
         let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
         let coder = LayerCoder::new(&lattice, self.layout.header());
         let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
+        let parts =
+            codes.par_chunks(PART).zip(contexts.par_chunks(PART)).map(|(codes, contexts)| {
+                let (mut bits, mut tiles) = (0.0, 0.0);
+                for (code, context) in codes.iter().zip(contexts) {
+                    let shape = lattice.shape(code);
+                    bits += coder.cost(*code, &shape, context.level, context.costs);
+                    tiles += touched_tiles(shape.cholesky);
+                }
+                [bits, tiles]
+            });
+        // Added part by part, so that the sums do not depend on the threads.
         let (mut attribute_bits, mut tiles) = (0.0, 0.0);
-        for (code, context) in codes.iter().zip(&contexts) {
-            let shape = lattice.shape(code);
-            attribute_bits += coder.cost(*code, &shape, context.level, context.costs);
-            tiles += touched_tiles(shape.cholesky);
+        for [bits_of_part, tiles_of_part] in parts.collect::<Vec<_>>() {
+            attribute_bits += bits_of_part;
+            tiles += tiles_of_part;
         }
         let tree_bits = 8.0 * bytes as f32 - attribute_bits;
         let tree_bits = (tree_bits / codes.len().max(1) as f32).max(0.0);
@@ -106,9 +126,7 @@ impl<'a> CodeOptimizer<'a> {
         coded: &CodedLayers,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        let CodedLayers { lattice, codes, .. } = coded;
-        let gaussian = |code| lattice.gaussian(code, &lattice.shape(code), &self.grid, self.model);
-        let gaussians: Vec<Gaussian> = codes.par_iter().map(gaussian).collect();
+        let gaussians = self.gaussians(coded);
         let header = self.layout.header();
         let limits = Limits::none();
         let rendering = Picture::new(header, &gaussians, &limits, 0);

@@ -126,7 +126,7 @@ impl CoordinateDescent<'_> {
     /// bit-reversed order.
     fn independent_batches(&self, residuals: &Residuals, codes: &[Code]) -> Vec<Vec<usize>> {
         let columns = residuals.width().div_ceil(BLOCK);
-        let mut windows: Vec<_> = (codes.iter().enumerate())
+        let mut windows: Vec<_> = (codes.par_iter().enumerate())
             .map(|(index, code)| {
                 let blocks = residuals
                     .window(&self.gaussian(code))
@@ -137,7 +137,7 @@ impl CoordinateDescent<'_> {
                 (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
             })
             .collect();
-        windows.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
+        windows.par_sort_unstable_by_key(|(area, order, ..)| (*area, *order));
         let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
         let mut batches: Vec<Vec<usize>> = Vec::new();
         for (_, order, x, y) in windows {
