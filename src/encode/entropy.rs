@@ -38,7 +38,7 @@ pub(crate) fn count_for_size(
 ) -> Result<usize, EncodeError> {
     let lattice = rate_model::lattice(0.0, layout.header().color);
     let empty = LatticeCodes { lattice, codes: Vec::new() };
-    let least = layout.write_entropy(&empty, observer)?.len() as u64;
+    let least = layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64;
     layout.check_size(bytes, least)?;
     Ok((((bytes - least) * 8) as f64 / rate_model::bits_per_gaussian(tune)).min(most as f64)
         as usize)
@@ -62,14 +62,14 @@ pub(crate) fn finish(
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
-    let codes = gaussians.len() * (size_of::<Gaussian>() + 2 * size_of::<Code>());
+    let codes = gaussians.len() * (size_of::<Gaussian>() + 3 * size_of::<Code>());
     let memory = raster.memory() + Residuals::memory(raster) + codes;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
-    let search = TargetSearch::new(job.source, raster, judge, layout, search_work);
+    let mut search = TargetSearch::new(job.source, raster, judge, layout, search_work, observer)?;
     let coded = search.run(&gaussians, distortion, job.target, observer)?;
     Ok((layout.write_entropy(&coded, observer)?, work))
 }

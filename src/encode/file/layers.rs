@@ -1,5 +1,7 @@
 //! Gaussians divided into the layers of a file, as `layers::plan` plans them, and coded.
 
+use rayon::prelude::*;
+
 use crate::chunk::FRAMING;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
 use crate::coding::packed::{self, Quantizer};
@@ -39,7 +41,7 @@ pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u6
 
 /// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds
 /// their centres to their position intervals, as the decoder reads them.
-pub(crate) fn write_entropy_layers(
+pub(super) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
     observer: &mut Observer<'_>,
@@ -88,7 +90,9 @@ fn divide<'a>(
 ) -> Result<Vec<&'a mut [Code]>, EncodeError> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
-    codes.sort_by_cached_key(|code| core::cmp::Reverse(code.strength()));
+    observer.poll()?;
+    codes.par_sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    observer.poll()?;
     let mut layers = Vec::new();
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {

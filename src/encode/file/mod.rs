@@ -2,17 +2,26 @@
 
 mod layers;
 
-pub(crate) use layers::{packed_layers_length, write_entropy_layers};
+pub(crate) use layers::packed_layers_length;
 
 use super::error::{EncodeError, OptionError};
 use super::progress::Observer;
 use super::source::Source;
 use crate::chunk::ChunkType;
-use crate::coding::entropy::{LatticeCodes, LayerCoder};
+use crate::coding::entropy::{Code, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::kernel::Kernel;
+
+/// Codes in the order of their file, with centres as the decoder reads them, and the layers that they
+/// make.
+#[derive(Debug)]
+pub(crate) struct CodedLayers {
+    pub(crate) lattice: Lattice,
+    pub(crate) codes: Vec<Code>,
+    pub(crate) layers: Vec<EncodedLayer>,
+}
 
 /// The header and the metadata of a file, which its codes complete.
 #[derive(Debug)]
@@ -63,7 +72,21 @@ impl<'a> FileLayout<'a> {
         let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
         let layers = layers::write_packed_layers(&codes, &quantizers);
         let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
-        self.write(&header, &quantization, None, &layers)
+        self.write(&header, &quantization, None, layers.iter().map(Vec::as_slice))
+    }
+
+    /// The layers that codes make in a file.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn coded(
+        &self,
+        LatticeCodes { lattice, mut codes }: LatticeCodes,
+        observer: &mut Observer<'_>,
+    ) -> Result<CodedLayers, EncodeError> {
+        let coder = LayerCoder::new(&lattice, &self.header);
+        let layers = layers::write_entropy_layers(&coder, &mut codes, observer)?;
+        Ok(CodedLayers { lattice, codes, layers })
     }
 
     /// A file with the entropy coding.
@@ -72,30 +95,29 @@ impl<'a> FileLayout<'a> {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn write_entropy(
         &self,
-        coded: &LatticeCodes,
+        coded: &CodedLayers,
         observer: &mut Observer<'_>,
     ) -> Result<Vec<u8>, EncodeError> {
+        let CodedLayers { lattice, codes, layers } = coded;
         let header = Header {
             coding: Coding::Entropy,
             parameterization: Parameterization::Cholesky,
-            gaussians: coded.codes.len() as u32,
+            gaussians: codes.len() as u32,
             ..self.header.clone()
         };
-        let coder = LayerCoder::new(&coded.lattice, &header);
-        let mut codes = coded.codes.clone();
-        let layers = write_entropy_layers(&coder, &mut codes, observer)?;
-        let bounds = layers::bounds_payload(&coder, &codes, &layers, &header, observer)?;
-        let payloads: Vec<_> = layers.into_iter().map(|layer| layer.payload).collect();
-        Ok(self.write(&header, &coded.lattice.to_payload(), bounds, &payloads))
+        let coder = LayerCoder::new(lattice, &header);
+        let bounds = layers::bounds_payload(&coder, codes, layers, &header, observer)?;
+        let payloads = layers.iter().map(|layer| &layer.payload[..]);
+        Ok(self.write(&header, &lattice.to_payload(), bounds, payloads))
     }
 
     /// A file of either coding, from the payloads of its chunks.
-    fn write(
+    fn write<'b>(
         &self,
         header: &Header,
         quantization: &[u8],
         bounds: Option<Vec<u8>>,
-        layers: &[Vec<u8>],
+        layers: impl ExactSizeIterator<Item = &'b [u8]>,
     ) -> Vec<u8> {
         let header = Header { layers: layers.len() as u16, ..header.clone() };
         let mut file = ChunkWriter::new();
@@ -191,7 +213,10 @@ mod tests {
         };
         let codes = (0..count).map(|_| code()).collect();
         let lattice = rate_model::lattice(0.0, ColorModel::Gray);
-        unobserved(|observer| layout.write_entropy(&LatticeCodes { lattice, codes }, observer))
+        unobserved(|observer| {
+            let coded = layout.coded(LatticeCodes { lattice, codes }, observer)?;
+            layout.write_entropy(&coded, observer)
+        })
     }
 
     /// The samples of a region, and how many Gaussians the decoder keeps. If `all`, it decodes the

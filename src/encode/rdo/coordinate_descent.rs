@@ -54,16 +54,27 @@ pub(crate) struct CodeContext<'a> {
     pub(crate) costs: &'a SymbolCosts,
 }
 
-/// A code for a Gaussian with its Lagrangian cost, relative to that of removing the Gaussian.
+/// A code for a Gaussian, compared with removing the Gaussian.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     code: Code,
-    cost: f32,
+    /// The change of the error.
+    error: f32,
+    /// The rate, with the penalty for the tiles that the Gaussian touches.
+    bits: f32,
+}
+
+impl Candidate {
+    /// By how much the Gaussian lowers the error for each of its bits.
+    fn use_of_bits(&self) -> f32 {
+        -self.error / self.bits
+    }
 }
 
 impl CoordinateDescent<'_> {
-    /// One pass: improves or removes every Gaussian, and returns how many changed. `contexts` are
-    /// those of the codes, and `residuals` those of their rendering, which are updated.
+    /// One pass: improves or removes every Gaussian. `contexts` are those of the codes, and
+    /// `residuals` those of their rendering, which are updated. Returns the codes; the less one lowers
+    /// the error for each of its bits, the later it comes.
     ///
     /// Gaussians whose windows do not overlap are processed in parallel; the result is that of one
     /// after the other.
@@ -73,12 +84,11 @@ impl CoordinateDescent<'_> {
     pub(crate) fn pass(
         &self,
         residuals: &mut Residuals,
-        codes: &mut Vec<Code>,
+        codes: &[Code],
         contexts: &[CodeContext<'_>],
         observer: &mut Observer<'_>,
-    ) -> Result<usize, EncodeError> {
-        let mut kept = vec![true; codes.len()];
-        let mut changed = 0;
+    ) -> Result<Vec<Code>, EncodeError> {
+        let mut passed = Vec::with_capacity(codes.len());
         let batches = self.independent_batches(residuals, codes, observer)?;
         let work = self.work / batches.iter().flatten().map(|&(_, area)| area as f64).sum::<f64>();
         let most = BLOCKS_PER_POLL * rayon::current_num_threads();
@@ -88,7 +98,7 @@ impl CoordinateDescent<'_> {
                 let (part, area) = portion(&mut rest, most);
                 observer.advance(work * area as f64)?;
                 let shared = &*residuals;
-                let chosen: Vec<Option<Code>> = part
+                let chosen: Vec<Option<Candidate>> = part
                     .par_iter()
                     .map_init(Window::default, |window, &(index, _)| {
                         self.choose(shared, window, codes[index], contexts[index])
@@ -96,25 +106,23 @@ impl CoordinateDescent<'_> {
                     .collect();
                 let mut changes = Vec::new();
                 for (&(index, _), choice) in part.iter().zip(chosen) {
-                    if choice == Some(codes[index]) {
-                        continue;
+                    let code = choice.map(|choice| choice.code);
+                    if code != Some(codes[index]) {
+                        changes.push((self.gaussian(&codes[index]), -1.0));
+                        changes.extend(code.map(|code| (self.gaussian(&code), 1.0)));
                     }
-                    changed += 1;
-                    changes.push((self.gaussian(&codes[index]), -1.0));
-                    match choice {
-                        Some(code) => {
-                            changes.push((self.gaussian(&code), 1.0));
-                            codes[index] = code;
-                        }
-                        None => kept[index] = false,
-                    }
+                    passed.extend(
+                        choice.map(|choice| (choice.use_of_bits(), index as u32, choice.code)),
+                    );
                 }
                 residuals.add(&changes);
             }
         }
-        let mut kept = kept.into_iter();
-        codes.retain(|_| kept.next().expect("one for each"));
-        Ok(changed)
+        observer.poll()?;
+        passed.par_sort_unstable_by(|(use_of_a, a, _), (use_of_b, b, _)| {
+            use_of_b.total_cmp(use_of_a).then(a.cmp(b))
+        });
+        Ok(passed.into_iter().map(|(.., code)| code).collect())
     }
 
     fn gaussian(&self, code: &Code) -> Gaussian {
@@ -144,7 +152,7 @@ impl CoordinateDescent<'_> {
             let area = (x.len() * y.len()) as u32;
             (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
         })?;
-        windows.sort_unstable_by_key(|(area, order, ..)| (*area, *order));
+        windows.par_sort_unstable_by_key(|(area, order, ..)| (*area, *order));
         let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
         let mut batches: Vec<Vec<(usize, usize)>> = Vec::new();
         for (at, (_, order, x, y)) in windows.into_iter().enumerate() {
@@ -171,25 +179,33 @@ impl CoordinateDescent<'_> {
         window: &mut Window,
         code: Code,
         context: CodeContext<'_>,
-    ) -> Option<Code> {
+    ) -> Option<Candidate> {
         let gaussian = self.gaussian(&code);
         window.load(residuals, &gaussian).then_some(())?;
         let gradient = window.gradient(&gaussian, self.model);
-        let present_cost = gradient.change.error + self.lambda * self.bits(code, context);
-        let candidates = self.candidates(&gradient, code, &gaussian, context, present_cost);
-        if candidates.is_empty() && present_cost < 0.0 {
-            return Some(code);
+        let present =
+            Candidate { code, error: gradient.change.error, bits: self.bits(code, context) };
+        let candidates = self.candidates(&gradient, code, &gaussian, context, self.cost(&present));
+        if candidates.is_empty() && self.cost(&present) < 0.0 {
+            return Some(present);
         }
         window.remove(&gaussian);
-        let mut best = self.evaluate(window, code, context);
+        // Where nothing is clamped, the gradient tells the exact error.
+        let mut best =
+            if window.is_clamped() { self.evaluate(window, code, context) } else { present };
         for candidate in candidates {
             if let Some(other) = self.evaluate_recolored(window, candidate, context)
-                && other.cost < best.cost
+                && self.cost(&other) < self.cost(&best)
             {
                 best = other;
             }
         }
-        (best.cost < 0.0).then_some(best.code)
+        (self.cost(&best) < 0.0).then_some(best)
+    }
+
+    /// The Lagrangian cost of a code, relative to that of removing the Gaussian.
+    fn cost(&self, candidate: &Candidate) -> f32 {
+        candidate.error + self.lambda * candidate.bits
     }
 
     /// Codes that cost less than the present one by the quadratic model of the error, cheapest
@@ -239,7 +255,7 @@ impl CoordinateDescent<'_> {
     /// A code with its exact cost. The Gaussian is not part of the window's rendering.
     fn evaluate(&self, window: &Window, code: Code, context: CodeContext<'_>) -> Candidate {
         let change = window.change(&self.gaussian(&code), self.model);
-        Candidate { code, cost: change.error + self.lambda * self.bits(code, context) }
+        Candidate { code, error: change.error, bits: self.bits(code, context) }
     }
 
     /// A code, with the best colours for its geometry, and its exact cost. `None` if the Gaussian
@@ -259,7 +275,7 @@ impl CoordinateDescent<'_> {
             return Some(self.evaluate(window, code, context));
         }
         let error = change.with_color(code.color, self.coder.lattice.color_units(&code));
-        Some(Candidate { code, cost: error + self.lambda * self.bits(code, context) })
+        Some(Candidate { code, error, bits: self.bits(code, context) })
     }
 
     /// A code with the colours of least cost for its geometry, chosen for one colour axis after the
@@ -321,6 +337,14 @@ impl CoordinateDescent<'_> {
     }
 }
 
+/// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time
+/// that a decoder takes, whose work the spec counts in such tiles (section 10).
+pub(super) fn touched_tiles([l11, l21, l22]: [f32; 3]) -> f32 {
+    const SIDE: f32 = 8.0;
+    let along = |sigma: f32| 2.0 * QUARTIC_RADIUS * sigma / SIDE + 1.0;
+    along(l11) * along((l21 * l21 + l22 * l22).sqrt())
+}
+
 /// Takes the first of a batch, whose windows have at least `most` blocks together, or all. Returns them
 /// with the number of these blocks.
 fn portion<'a>(batch: &mut &'a [(usize, usize)], most: usize) -> (&'a [(usize, usize)], usize) {
@@ -333,12 +357,4 @@ fn portion<'a>(batch: &mut &'a [(usize, usize)], most: usize) -> (&'a [(usize, u
     let (part, rest) = batch.split_at(count);
     *batch = rest;
     (part, blocks)
-}
-
-/// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time
-/// that a decoder takes, whose work the spec counts in such tiles (section 10).
-pub(super) fn touched_tiles([l11, l21, l22]: [f32; 3]) -> f32 {
-    const SIDE: f32 = 8.0;
-    let along = |sigma: f32| 2.0 * QUARTIC_RADIUS * sigma / SIDE + 1.0;
-    along(l11) * along((l21 * l21 + l22 * l22).sqrt())
 }

@@ -1,11 +1,11 @@
 //! The search for the codes with which a file meets its target.
 
-use super::code_optimizer::CodeOptimizer;
-use super::search_work::{MOST_PASSES, SearchWork};
+use super::code_optimizer::{CodeOptimizer, Optimized};
+use super::search_work::SearchWork;
 use super::step_search::{Aim, StepSearch};
 use crate::coding::entropy::LatticeCodes;
 use crate::encode::error::EncodeError;
-use crate::encode::file::FileLayout;
+use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
@@ -15,21 +15,29 @@ use crate::encode::source::Source;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
 
-/// Most steps that are tried: by rounding alone, after the first passes of coordinate descent, and after
-/// all passes.
+/// Most steps that are tried: by rounding alone, and with passes of coordinate descent.
 const MOST_ROUNDING_TRIES: u32 = 8;
-const MOST_FIRST_TRIES: u32 = 4;
 const MOST_TRIES: u32 = 4;
-/// With at most this deviation, a base-2 logarithm, a step is worth more passes.
-const CLOSE: f64 = 0.02;
-/// By how much the size falls between rounding and the last pass, and size and error between the first
-/// pass and the last, as base-2 logarithms.
-const SETTLING_OF_ROUNDED: f64 = 0.12;
-const SETTLING: f64 = 0.045;
+/// With at most this deviation of rounded codes, the step that follows from it is good.
+const CLOSE_OF_ROUNDED: f64 = 0.06;
+/// By how much the size falls in the first pass, as a base-2 logarithm: by the first number without weak
+/// Gaussians, by the second more if all are weak, but at most by the third.
+const SETTLING_OF_ROUNDED: (f64, f64, f64) = (0.02, 1.9, 0.11);
+/// Gaussians of at most this strength are weak: most of them are not worth their bits.
+const WEAK: i64 = 2;
+/// By how much size and error fall from the first pass on until they change no more, as base-2
+/// logarithms. After n passes, an nth of it is left.
+const SETTLING: f64 = 0.03;
+/// By how much more they fall in a pass after the step was changed.
+const SETTLING_AGAIN: f64 = 0.012;
 /// The deviation of a file that decodes to an exact copy, which has no finite PSNR.
 const LARGEST_DEVIATION: f64 = 10.0;
 /// By how much lambda may change to meet a target, as a base-2 logarithm.
 const MOST_LAMBDA_CHANGE: f64 = 1.0;
+/// Most passes of coordinate descent until a target is met.
+const MOST_PASSES: u32 = 12;
+/// Up to this pass, the step may change.
+const MOST_ROUNDED_PASSES: u32 = 4;
 /// Refinements of the step, one after the other, where the search does not reach the PSNR; base-2
 /// logarithms.
 const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
@@ -37,8 +45,15 @@ const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
 /// error. There, rounding adds a 256th of the error that it adds with that step: a finer one would only
 /// make the file larger.
 const FINEST: f64 = -4.0;
+/// Bytes that one of the least useful Gaussians takes, about.
+const BYTES_OF_LEAST_USEFUL: f64 = 2.3;
 /// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
+
+/// By how much size and error will still fall after so many passes.
+fn settling(passes: u32) -> f64 {
+    SETTLING / f64::from(passes)
+}
 
 /// Rate-distortion optimisation of a fit's codes for a target.
 #[derive(Debug)]
@@ -53,41 +68,42 @@ pub(crate) struct TargetSearch<'a> {
 }
 
 impl<'a> TargetSearch<'a> {
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         source: &'a Source<'a>,
         raster: &'a Raster,
         judge: &'a Judge,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
-    ) -> Self {
-        Self { source, raster, judge, layout, work, codes: CodeOptimizer::new(raster, layout) }
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
+        let codes = CodeOptimizer::new(raster, layout, observer)?;
+        Ok(Self { source, raster, judge, layout, work, codes })
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
     pub(crate) fn run(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         distortion: f64,
         target: Target,
         observer: &mut Observer<'_>,
-    ) -> Result<LatticeCodes, EncodeError> {
+    ) -> Result<CodedLayers, EncodeError> {
         let step = match target {
             Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             _ => rate_model::step_for(distortion, gaussians.len()),
         };
         observer.expect(self.work.whole());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            let mut coded = self.codes.rounded(gaussians, step, observer)?;
-            self.codes.descend(&mut coded, 0.0, 0..self.work.passes, observer)?;
-            return Ok(coded);
+            return Ok(self.descended(gaussians, step, self.work.passes, observer)?.coded);
         };
         let finest = step + FINEST;
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            self.shorten(&mut coded, bytes, observer)?;
-            return Ok(coded);
+            return self.shortened(coded, bytes, observer);
         }
         if aim.miss(deviation) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
@@ -101,62 +117,86 @@ impl<'a> TargetSearch<'a> {
                     self.passed(gaussians, finer, self.work.passes, aim, observer)?;
             }
         }
-        self.trim(coded, deviation, aim, observer)
+        self.trimmed(coded, deviation, aim, observer)
     }
 
     /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
     /// next; `step` is the first.
     fn aimed(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         step: f64,
         finest: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(LatticeCodes, f64, f64), EncodeError> {
-        let passes = self.work.first_passes();
-        let mut settling = SETTLING / f64::from(passes);
+    ) -> Result<(Optimized, f64, f64), EncodeError> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
-        let mut first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
-        for _ in 1..MOST_FIRST_TRIES {
-            let expected = first_try.1 - settling;
-            if expected.abs() < CLOSE || search.is_exhausted(expected) {
+        let mut best: Option<(Optimized, f64)> = None;
+        for _ in 0..MOST_TRIES {
+            let (optimized, deviation, expected) = self.tried(gaussians, &search, aim, observer)?;
+            if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
+                best = Some((optimized, deviation));
+            }
+            if aim.miss(deviation) == 0.0 || search.is_exhausted(expected) {
                 break;
             }
             search.tell(expected);
-            observer.expect(self.work.first_try() + self.work.later_tries());
-            first_try = self.passed(gaussians, search.at, passes, aim, observer)?;
+            observer.expect(self.work.one_more_try());
         }
-        observer.expect(self.work.later_tries());
-        let mut search = StepSearch::new(search.at, aim.by_step(), finest);
-        let mut first_try = Some(first_try);
-        let mut best: Option<(LatticeCodes, f64)> = None;
-        for _ in 0..MOST_TRIES {
-            let (mut coded, before) = match first_try.take() {
-                Some(first_try) => first_try,
-                None => {
-                    observer.expect(self.work.one_more_try());
-                    self.passed(gaussians, search.at, passes, aim, observer)?
-                }
-            };
-            // A target that is out of reach gets no more passes than an encoding without target.
-            let exhausted = search.is_exhausted(before - settling);
-            let most = if exhausted { self.work.passes } else { MOST_PASSES };
-            let (deviation, lambda) =
-                self.adjust_lambda(&mut coded, before, settling, most, aim, observer)?;
-            if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
-                best = Some((coded, deviation));
+        let (optimized, deviation) = best.expect("at least one was tried");
+        Ok((optimized, deviation, search.at))
+    }
+
+    /// The codes that come nearest to an aim from the step that is to be tried next, their deviation
+    /// from it, and what the deviation would be with that step and the usual lambda.
+    fn tried(
+        &mut self,
+        gaussians: &[Gaussian],
+        search: &StepSearch,
+        aim: Aim,
+        observer: &mut Observer<'_>,
+    ) -> Result<(Optimized, f64, f64), EncodeError> {
+        let first = self.work.first_passes();
+        let mut optimized = self.descended(gaussians, search.at, first, observer)?;
+        let (mut pass, mut step, mut lambda): (u32, f64, f64) = (first, search.at, 0.0);
+        loop {
+            let deviation = self.deviation(&optimized.coded, aim, observer)?;
+            let expected = deviation - settling(pass) + settling(self.work.passes.max(pass + 1));
+            let is_within_lambda = aim.is_within_lambda(expected);
+            // The squared error of codes that are rounded twice is too large.
+            let can_be_rounded = matches!(aim, Aim::Size { .. }) && pass < MOST_ROUNDED_PASSES;
+            let can_change = is_within_lambda || can_be_rounded;
+            let is_enough = pass >= self.work.passes
+                && (aim.miss(deviation) == 0.0
+                    || pass >= MOST_PASSES
+                    || lambda.abs() == MOST_LAMBDA_CHANGE
+                    // A target that is out of reach gets no more passes than an encoding without
+                    // target.
+                    || search.is_exhausted(expected));
+            if is_enough || !can_change {
+                let by_step = aim.by_step() * (step - search.at);
+                return Ok((
+                    optimized,
+                    deviation,
+                    expected - aim.change_by_lambda(lambda) - by_step,
+                ));
             }
-            if aim.miss(deviation) == 0.0 || exhausted {
-                break;
+            let mut coded = optimized.coded;
+            if is_within_lambda {
+                let change = aim.lambda_against(aim.beyond(expected));
+                lambda = (lambda + change.clamp(-0.7, 0.7))
+                    .clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
+            } else {
+                // Codes on a new lattice, which a pass improves as it improves those of the fit.
+                let too_much = expected - SETTLING_AGAIN - aim.middle();
+                step = (step - too_much / aim.by_step()).max(search.finest());
+                lambda = 0.0;
+                let gaussians = self.codes.gaussians(&coded, observer)?;
+                coded = self.codes.rounded(&gaussians, step, observer)?;
             }
-            // Now it is known by how much the deviation falls after the first passes.
-            let with_usual_lambda = deviation - lambda * aim.by_lambda();
-            settling = before - with_usual_lambda;
-            search.tell(with_usual_lambda);
+            optimized = self.codes.descend(coded, lambda, self.work.pass(pass), observer)?;
+            pass += 1;
         }
-        let (coded, deviation) = best.expect("at least one was tried");
-        Ok((coded, deviation, search.at))
     }
 
     /// The first step to try. Rounding alone nearly tells the size of a file.
@@ -173,67 +213,59 @@ impl<'a> TargetSearch<'a> {
             return Ok(search.at);
         }
         for _ in 0..MOST_ROUNDING_TRIES {
-            let mut coded = self.codes.rounded(gaussians, search.at, observer)?;
-            self.codes.written(&mut coded, observer)?;
-            let deviation = self.deviation(&coded, aim, observer)? - SETTLING_OF_ROUNDED;
+            let coded = self.codes.rounded(gaussians, search.at, observer)?;
+            let weak = coded.codes.iter().filter(|code| code.strength() <= WEAK).count();
+            let (usual, by_share, most) = SETTLING_OF_ROUNDED;
+            let share = weak as f64 / coded.codes.len().max(1) as f64;
+            let fall = (usual + by_share * share).min(most);
+            let fall = fall + settling(1) - settling(self.work.passes);
+            let deviation = self.deviation(&coded, aim, observer)? - fall - aim.middle();
+            if deviation.abs() < CLOSE_OF_ROUNDED {
+                return Ok((search.at - deviation / aim.by_step()).max(finest));
+            }
             if search.is_exhausted(deviation) {
                 break;
             }
             search.tell(deviation);
-            if deviation.abs() < CLOSE {
-                break;
-            }
         }
         Ok(search.at)
     }
 
+    /// The codes of a step after some passes.
+    fn descended(
+        &mut self,
+        gaussians: &[Gaussian],
+        step: f64,
+        passes: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Optimized, EncodeError> {
+        let rounded = self.codes.rounded(gaussians, step, observer)?;
+        let mut optimized = self.codes.descend(rounded, 0.0, self.work.pass(0), observer)?;
+        for pass in 1..passes {
+            let work = self.work.pass(pass);
+            optimized = self.codes.descend(optimized.coded, 0.0, work, observer)?;
+        }
+        Ok(optimized)
+    }
+
     /// The codes of a step after some passes, and their deviation from an aim.
     fn passed(
-        &self,
+        &mut self,
         gaussians: &[Gaussian],
         step: f64,
         passes: u32,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(LatticeCodes, f64), EncodeError> {
-        let mut coded = self.codes.rounded(gaussians, step, observer)?;
-        self.codes.descend(&mut coded, 0.0, 0..passes, observer)?;
-        let deviation = self.deviation(&coded, aim, observer)?;
-        Ok((coded, deviation))
-    }
-
-    /// Adjusts lambda from pass to pass, in `most` passes, so that codes after their first passes, which
-    /// deviate by `deviation`, come as near to an aim as lambda can bring them; without that, passes
-    /// lower the deviation by `settling`. Returns the deviation then, and the base-2 logarithm of what
-    /// lambda was multiplied by.
-    fn adjust_lambda(
-        &self,
-        coded: &mut LatticeCodes,
-        mut deviation: f64,
-        settling: f64,
-        most: u32,
-        aim: Aim,
-        observer: &mut Observer<'_>,
-    ) -> Result<(f64, f64), EncodeError> {
-        let first = self.work.first_passes();
-        let mut lambda: f64 = 0.0;
-        for pass in first..most {
-            if pass >= self.work.passes && aim.miss(deviation) == 0.0 {
-                break;
-            }
-            let expected = deviation - settling * f64::from(first) / f64::from(pass);
-            lambda -= (expected / aim.by_lambda()).clamp(-0.5, 0.5);
-            lambda = lambda.clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
-            self.codes.descend(coded, lambda, pass..pass + 1, observer)?;
-            deviation = self.deviation(coded, aim, observer)?;
-        }
-        Ok((deviation, lambda))
+    ) -> Result<(Optimized, f64), EncodeError> {
+        let optimized = self.descended(gaussians, step, passes, observer)?;
+        let deviation = self.deviation(&optimized.coded, aim, observer)?;
+        Ok((optimized, deviation))
     }
 
     /// The deviation from an aim.
     fn deviation(
         &self,
-        coded: &LatticeCodes,
+        coded: &CodedLayers,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
@@ -255,46 +287,57 @@ impl<'a> TargetSearch<'a> {
         Ok(deviation)
     }
 
-    /// Removes the weakest Gaussians until the file has at most so many bytes.
-    fn shorten(
+    /// The codes without the least useful ones, such that the file has at most so many bytes.
+    fn shortened(
         &self,
-        coded: &mut LatticeCodes,
+        optimized: Optimized,
         bytes: u64,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
-        loop {
-            let size = self.layout.write_entropy(coded, observer)?.len() as u64;
-            let Some(excess) = size.checked_sub(bytes).filter(|&excess| excess > 0) else {
-                return Ok(());
+    ) -> Result<CodedLayers, EncodeError> {
+        let Optimized { mut coded, mut by_use } = optimized;
+        let all = by_use.len();
+        let mut size = self.layout.write_entropy(&coded, observer)?.len() as u64;
+        let largest = size;
+        while size > bytes && !by_use.is_empty() {
+            let removed = all - by_use.len();
+            // As many bytes a Gaussian as before, and a Gaussian at least.
+            let bytes_each = match removed {
+                0 => BYTES_OF_LEAST_USEFUL,
+                _ => (largest.saturating_sub(size) as f64 / removed as f64).max(1.0),
             };
-            // Four bytes a Gaussian, and at least one.
-            let count = excess.div_ceil(4).min(coded.codes.len() as u64) as usize;
-            coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
-            coded.codes.truncate(coded.codes.len() - count);
+            let count = ((size - bytes) as f64 / bytes_each).ceil() as usize;
+            by_use.truncate(by_use.len().saturating_sub(count));
+            let codes = by_use.clone();
+            let codes = LatticeCodes { lattice: coded.lattice, codes };
+            coded = self.layout.coded(codes, observer)?;
+            size = self.layout.write_entropy(&coded, observer)?.len() as u64;
         }
+        Ok(coded)
     }
 
-    /// Removes the weakest Gaussians of a picture that is too good, as many as can be spared.
-    fn trim(
+    /// The codes of a picture that is too good without the least useful ones, as many as can be spared.
+    fn trimmed(
         &self,
-        mut coded: LatticeCodes,
+        optimized: Optimized,
         mut deviation: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<LatticeCodes, EncodeError> {
+    ) -> Result<CodedLayers, EncodeError> {
+        let Optimized { mut coded, mut by_use } = optimized;
         if deviation > 0.0 || aim.miss(deviation) == 0.0 {
             return Ok(coded);
         }
-        coded.codes.sort_by_key(|code| core::cmp::Reverse(code.strength()));
         // Those from `end` on cannot be spared, and likely not many more at a time.
-        let mut end = coded.codes.len();
-        let mut portion = end.div_ceil(2);
+        let mut end = by_use.len();
+        let mut portion = end.div_ceil(16);
         for _ in 0..MOST_TRIMMINGS {
-            let mut fewer = coded.clone();
             let start = end.saturating_sub(portion);
-            fewer.codes.drain(start..end);
+            let codes = [&by_use[..start], &by_use[end..]].concat();
+            let lattice = coded.lattice.clone();
+            let fewer = self.layout.coded(LatticeCodes { lattice, codes }, observer)?;
             let deviation_with_fewer = self.deviation(&fewer, aim, observer)?;
             if deviation_with_fewer <= 0.0 {
+                by_use.drain(start..end);
                 (coded, deviation, end) = (fewer, deviation_with_fewer, start);
             } else if portion > 1 {
                 portion /= 2;
