@@ -20,10 +20,10 @@ use crate::threads::Threads;
 /// the codes of an entropy-coded file. In a short run, time is better spent on iterations; in a
 /// long one, more iterations gain little without more passes.
 const EFFORTS: [(u32, u32); 9] = [
+    (30, 2),
     (60, 2),
-    (90, 2),
-    (140, 3),
-    (200, 4),
+    (110, 3),
+    (200, 5),
     (320, 8),
     (640, 12),
     (1_280, 16),

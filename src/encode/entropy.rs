@@ -49,7 +49,7 @@ pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
     raster: &Raster,
-    judge: &Judge,
+    judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
@@ -105,7 +105,7 @@ fn correct(
     fit: &mut Fit<'_>,
     dissimilarity: f64,
     job: &Job<'_>,
-    judge: &Judge,
+    judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(), EncodeError> {

@@ -76,7 +76,7 @@ fn encode_for_target(
     let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
     let budget = budget(job, &raster, &layout, observer)?;
-    let judge = Judge::new(source, observer)?;
+    let judge = Judge::new(source);
     let expected = match budget {
         Budget::Count(count) => count,
         _ => job.pixels() / USUAL_PIXELS,
@@ -93,6 +93,7 @@ fn encode_for_target(
         Precision::Packed | Precision::Float => packed::finish(fit, job, budget, &layout, observer),
     }?;
 
+    let with_judge = work.peak_memory + judge.memory();
     // The decoder needs memory, too.
     drop(raster);
     let verified = Verified::new(&file, source, observer)?;
@@ -102,7 +103,7 @@ fn encode_for_target(
     let distortion = verified.distortion(gaussians, observer)?;
     observer.advance(workload.error())?;
     let dissimilarity = judge.dissimilarity(&verified.picture(), observer)?;
-    let peaks = [work.peak_memory + judge.memory(), judge.memory_at_work(), peak_before];
+    let peaks = [with_judge, judge.memory_at_work(), peak_before];
     work.peak_memory = peaks.into_iter().max().unwrap_or(0);
     let quality = quality::quality(dissimilarity).max(0.0);
     let reached = Reached { bytes: file.len(), psnr: distortion.psnr, quality, gaussians };

@@ -8,6 +8,8 @@
 mod plane;
 mod pyramid;
 
+use std::sync::OnceLock;
+
 use super::error::EncodeError;
 use super::progress::Observer;
 use super::sensitivity::SCALES;
@@ -24,19 +26,23 @@ pub(crate) const MOST_QUALITY: f64 = 97.0;
 /// Most Gaussians per pixel that are tried first.
 const MOST_DENSITY: f64 = 0.25;
 
-/// The source of renderings whose quality is estimated.
+/// The source of renderings whose quality is estimated. Its pyramid is made when it is needed first.
 #[derive(Debug)]
-pub(crate) struct Judge {
-    source: Pyramid,
+pub(crate) struct Judge<'a> {
+    source: &'a Source<'a>,
+    pyramid: OnceLock<Pyramid>,
 }
 
-impl Judge {
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn new(
-        source: &Source<'_>,
-        observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+impl<'a> Judge<'a> {
+    pub(crate) fn new(source: &'a Source<'a>) -> Self {
+        Self { source, pyramid: OnceLock::new() }
+    }
+
+    fn pyramid(&self, observer: &mut Observer<'_>) -> Result<&Pyramid, EncodeError> {
+        if let Some(pyramid) = self.pyramid.get() {
+            return Ok(pyramid);
+        }
+        let source = self.source;
         let size = [source.width() as usize, source.height() as usize];
         let channels = source.color().channels();
         let mut builder = PyramidBuilder::new(size, source.color());
@@ -48,19 +54,20 @@ impl Judge {
                 f32::from(source.wide_sample(at)) / 65535.0
             });
         }
-        Ok(Self { source: builder.finish(observer)? })
+        let pyramid = builder.finish(observer)?;
+        Ok(self.pyramid.get_or_init(|| pyramid))
     }
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        self.source.memory()
+        self.pyramid.get().map_or(0, Pyramid::memory)
     }
 
     /// Size in bytes with what a judgement needs: a pyramid of the rendering too, and linear light at
     /// half of the size.
     pub(crate) fn memory_at_work(&self) -> usize {
-        let linear = self.source.luma[1].values.len() * size_of::<[f32; 3]>();
-        2 * self.memory() + linear
+        let half = self.pyramid.get().map_or(0, |pyramid| pyramid.luma[1].values.len());
+        2 * self.memory() + half * size_of::<[f32; 3]>()
     }
 
     /// How much a picture that is rendered at the source's size differs from the source to the eye,
@@ -73,6 +80,7 @@ impl Judge {
         picture: &Picture<'_>,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
+        let source = self.pyramid(observer)?;
         let header = picture.header();
         let size = [header.width as usize, header.height as usize];
         let mut builder = PyramidBuilder::new(size, header.color);
@@ -83,7 +91,7 @@ impl Judge {
             });
         })?;
         let rendering = builder.finish(observer)?;
-        self.source.dissimilarity(&rendering, observer)
+        source.dissimilarity(&rendering, observer)
     }
 }
 

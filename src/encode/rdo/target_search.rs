@@ -60,7 +60,7 @@ fn settling(passes: u32) -> f64 {
 pub(crate) struct TargetSearch<'a> {
     source: &'a Source<'a>,
     raster: &'a Raster,
-    judge: &'a Judge,
+    judge: &'a Judge<'a>,
     layout: &'a FileLayout<'a>,
     /// How many passes there shall be, and what they cost; for a target there may be a few more.
     work: SearchWork,
@@ -73,7 +73,7 @@ impl<'a> TargetSearch<'a> {
     pub(crate) fn new(
         source: &'a Source<'a>,
         raster: &'a Raster,
-        judge: &'a Judge,
+        judge: &'a Judge<'a>,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
         observer: &mut Observer<'_>,
