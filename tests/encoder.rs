@@ -99,7 +99,7 @@ fn reported_figures_are_those_of_the_file() {
             // Rounding to 8 bits alone leaves 58.9 dB, and may cost 0.3 dB of 47.
             let rounded = -10.0 * (10_f64.powf(-report.psnr_float / 10.0) + 1.28e-6).log10();
             assert!((report.psnr - rounded).abs() < 0.3, "{report:?}");
-            assert_eq!(report.iterations, 60);
+            assert_eq!(report.iterations, 30);
             let bits: u32 = stream.quantizers().iter().map(|q| u32::from(q.bits())).sum();
             let channels = color.channels() as u32;
             match precision {
@@ -374,11 +374,11 @@ fn many_gaussians_in_a_small_part_of_a_picture_come_to_rest() {
         samples[first..][..row.len()].copy_from_slice(row);
     }
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
-    for effort in [1, 2] {
+    for (effort, least) in [(1, 33.0), (2, 41.0), (3, 45.0)] {
         let encoder = quick(Target::Gaussians(1000)).with_effort(effort);
         let encoded = encoder.encode(&source).expect("it is encoded");
         let psnr = psnr_u8(&pixels_u8(&decode(&encoded.bytes)), &samples);
-        assert!(psnr > 45.0, "{psnr} dB at effort {effort}");
+        assert!(psnr > least, "{psnr} dB at effort {effort}");
     }
 }
 
@@ -567,19 +567,20 @@ fn what_a_target_does_not_reach_is_told() {
     let small = encoded(&flat, Target::Bytes(5000));
     let bytes = small.bytes.len();
     assert_eq!(small.report.shortfall, Some(Shortfall::SizeBelow { bytes, gaussians: 0 }));
-    // So it is with more than the model can use. A smaller file was tried as well, in two runs of 60
+    // So it is with more than the model can use. A smaller file was tried as well, in two runs of 30
     // iterations, and it is not nearly as good.
     let large = encoded(&noise, Target::BitsPerPixel(1000.0));
     let report = &large.report;
     let as_large = Shortfall::SizeBelow { bytes: large.bytes.len(), gaussians: report.gaussians };
     assert_eq!(report.shortfall, Some(as_large));
-    assert_eq!(report.iterations, 120);
+    assert_eq!(report.iterations, 60);
     // Where Gaussians bring nothing, a large file is not written.
     let wave =
         |i: i32| 128.0 + 20.0 * ((i % 64) as f32 / 9.0).sin() + 15.0 * (i as f32 / 448.0).cos();
     let waves: Vec<u8> = (0..64 * 64).map(|i| wave(i) as u8).collect();
     let source = Source::new_u8(64, 64, ColorModel::Gray, &waves).expect("sizes agree");
-    let useless = quick(Target::BitsPerPixel(40.0)).encode(&source).expect("it encodes");
+    let encoder = quick(Target::BitsPerPixel(40.0)).with_effort(2);
+    let useless = encoder.encode(&source).expect("it encodes");
     let report = &useless.report;
     let too_large =
         Shortfall::SizeUseless { bytes: useless.bytes.len(), gaussians: report.gaussians };

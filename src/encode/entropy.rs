@@ -13,6 +13,7 @@ use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, SearchWork, TargetSearch};
+use super::strips;
 use crate::coding::entropy::{Code, LatticeCodes};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
@@ -62,8 +63,11 @@ pub(crate) fn finish(
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
-    let codes = gaussians.len() * (size_of::<Gaussian>() + 3 * size_of::<Code>());
-    let memory = raster.memory() + Residuals::memory(raster) + codes;
+    // Gaussians and their rendering; codes in three orders, with what they are chosen by.
+    let by_gaussian = 2 * size_of::<Gaussian>() + 4 * size_of::<Code>() + size_of::<[u64; 4]>();
+    let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
+    let memory =
+        raster.memory() + Residuals::memory(raster) + strip + gaussians.len() * by_gaussian;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);

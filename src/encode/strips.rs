@@ -34,6 +34,12 @@ pub(crate) fn render(
     Ok(())
 }
 
+/// Size in bytes of a strip that is rendered to floats.
+pub(crate) fn memory(width: u32, height: u32, channels: usize) -> usize {
+    let largest = strips(width, height).next().map_or(0, |region| region.pixels());
+    largest as usize * channels * size_of::<f32>()
+}
+
 /// The strips of a picture from top to bottom, each of whole rows, of which the number is even except
 /// at the bottom.
 pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {

@@ -1,7 +1,6 @@
 //! A step of Adam (paper, appendix, section "Implementation Details").
 
-use super::row::{Row, RowBounds};
-use super::state::Slope;
+use super::row::{Row, RowBounds, Slope};
 use super::training::Adam;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 

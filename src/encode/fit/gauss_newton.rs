@@ -8,8 +8,7 @@
 use glam::{Vec2, Vec3};
 
 use super::parameterization::OwnFrame;
-use super::row::{Row, RowBounds, shape_of};
-use super::state::Slope;
+use super::row::{Row, RowBounds, Slope, shape_of};
 use super::training::GaussNewton;
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;

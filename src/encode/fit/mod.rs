@@ -24,9 +24,8 @@ use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use parameters::Parameters;
 use pass::{Pass, Rendered};
-use row::{Row, RowBounds, shape_of};
+use row::{Row, RowBounds, Slope, shape_of};
 use schedule::TrainingSchedule;
-use state::Slope;
 use training::{Portion, Training};
 use training_tile::RenderingError;
 

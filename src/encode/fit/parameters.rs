@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::row::{Row, RowBounds};
-use super::state::{Slope, States, retain};
+use super::row::{Row, RowBounds, Slope};
+use super::state::{States, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;

@@ -19,6 +19,14 @@ pub(crate) fn shape_of(row: &Row) -> Vec3 {
     Vec3::from_slice(&row[2..5])
 }
 
+/// What the step of a Gaussian depends on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slope {
+    pub(crate) gradient: Row,
+    /// How much a squared error counts there.
+    pub(crate) sensitivity: f32,
+}
+
 /// The layout of the rows of a picture, and the bounds of their values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowBounds {

@@ -1,6 +1,5 @@
-//! What the optimizers take and keep for the Gaussians.
+//! What the optimizers keep for the Gaussians.
 
-use super::row::Row;
 use super::training::{Adam, GaussNewton, Optimizer};
 use super::{adam, gauss_newton};
 
@@ -69,12 +68,4 @@ fn extend<T: Copy>(states: &mut Vec<T>, count: usize, new: T) {
 pub(super) fn retain<T>(items: &mut Vec<T>, keep: impl Fn(usize) -> bool) {
     let mut index = 0..;
     items.retain(|_| keep(index.next().expect("endless")));
-}
-
-/// What the step of a Gaussian depends on.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Slope {
-    pub(crate) gradient: Row,
-    /// How much a squared error counts there.
-    pub(crate) sensitivity: f32,
 }

@@ -249,8 +249,8 @@ impl Training {
         // The longer a run, the more it gains from iterations after growth.
         let (end, culled) = match iterations {
             ..50 => (0.7, 0.8),
-            50..200 => (0.6, 0.7),
-            200..=1_200 => (0.5, 0.6),
+            50..150 => (0.6, 0.7),
+            150..=1_200 => (0.5, 0.6),
             _ => (0.4, 0.5),
         };
         // In a short run there is no time to be careful, and little to correct.

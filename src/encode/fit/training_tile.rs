@@ -302,7 +302,6 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
 
     /// Sets `planes` to the residuals of a rendering; returns the sum of squared errors.
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
     fn residual<S: Simd>(
         &self,
         simd: S,

@@ -63,11 +63,13 @@ impl<'a> Judge<'a> {
         self.pyramid.get().map_or(0, Pyramid::memory)
     }
 
-    /// Size in bytes with what a judgement needs: a pyramid of the rendering too, and linear light at
-    /// half of the size.
+    /// Size in bytes with what a judgement needs: a pyramid of the rendering too, linear light at half
+    /// of the size, and a strip of the rendering.
     pub(crate) fn memory_at_work(&self) -> usize {
         let half = self.pyramid.get().map_or(0, |pyramid| pyramid.luma[1].values.len());
-        2 * self.memory() + half * size_of::<[f32; 3]>()
+        let source = self.source;
+        let strip = strips::memory(source.width(), source.height(), source.color().channels());
+        2 * self.memory() + half * size_of::<[f32; 3]>() + strip
     }
 
     /// How much a picture that is rendered at the source's size differs from the source to the eye,

@@ -200,11 +200,10 @@ impl Residuals {
         Ok(())
     }
 
-    /// Size in bytes of the residuals of a source, and of the windows of one batch of Gaussians,
-    /// which do not overlap.
+    /// Size in bytes of the residuals of a source.
     pub(crate) fn memory(raster: &Raster) -> usize {
         let samples = (raster.width + LANES) * raster.height * raster.channels;
-        samples * 2 * size_of::<f32>()
+        samples * size_of::<f32>()
             + samples.div_ceil(LANES) * size_of::<ClampMask>()
             + (raster.width + LANES) * raster.height.div_ceil(BLOCK) * size_of::<f32>()
     }
