@@ -1,0 +1,50 @@
+// Builds the package into `dist/`: `npm run build`.
+//
+// It needs a Rust toolchain with the target wasm32-unknown-unknown, and the npm packages of
+// `npm ci`. The command line tool of wasm-bindgen comes from crates.io, in exactly the version that
+// Cargo.lock has.
+
+import { execFileSync } from 'node:child_process';
+import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { dirname, join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const root = dirname(fileURLToPath(import.meta.url));
+const target = join(root, 'target');
+const dist = join(root, 'dist');
+const run = (program, ...args) => execFileSync(program, args, { cwd: root, stdio: 'inherit' });
+
+/** The command line tool of wasm-bindgen. It is installed if it is not there. */
+function wasmBindgen() {
+  const [, version] = readFileSync(join(root, 'Cargo.lock'), 'utf8').match(
+    /name = "wasm-bindgen"\nversion = "(.*)"/,
+  );
+  const folder = join(target, `wasm-bindgen-${version}`);
+  const program = join(folder, 'bin', 'wasm-bindgen');
+  if (!existsSync(program)) {
+    const place = ['--root', folder, '--target-dir', join(target, 'tools')];
+    run('cargo', 'install', 'wasm-bindgen-cli', '--version', `=${version}`, '--bin', 'wasm-bindgen', ...place);
+  }
+  return program;
+}
+
+const bindgen = wasmBindgen();
+run('cargo', 'build', '--release', '--locked', '--target', 'wasm32-unknown-unknown', '--target-dir', target);
+rmSync(dist, { recursive: true, force: true });
+mkdirSync(dist);
+const module = join(target, 'wasm32-unknown-unknown', 'release', 'image_gip.wasm');
+run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', dist, module);
+const wasm = join(dist, 'image_gip_bg.wasm');
+const features = ['bulk-memory', 'multivalue', 'mutable-globals', 'nontrapping-float-to-int', 'reference-types', 'sign-ext', 'simd'];
+run(
+  join(root, 'node_modules', '.bin', 'wasm-opt'),
+  '-O3',
+  ...features.map((feature) => `--enable-${feature}`),
+  '--strip-debug',
+  '--strip-producers',
+  '--strip-target-features',
+  wasm,
+  '--output',
+  wasm,
+);
+for (const file of readdirSync(join(root, 'js'))) cpSync(join(root, 'js', file), join(dist, file));

@@ -1,0 +1,165 @@
+// Decoders in workers, or on this thread where there can be none.
+
+import { GipError, unpack } from './errors.js';
+
+/** Most workers; each takes a few megabytes. */
+const mostWorkers = Math.max(1, Math.min(4, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1));
+
+/** A worker with a decoder. */
+class WorkerThread {
+  decoders = 0;
+  #worker;
+  #calls = new Map();
+  #last = 0;
+
+  constructor(worker) {
+    this.#worker = worker;
+    worker.onmessage = ({ data: { call, result, error } }) => {
+      const { resolve, reject } = this.#calls.get(call);
+      this.#calls.delete(call);
+      if (error) reject(unpack(error));
+      else resolve(result);
+    };
+    worker.onerror = () => {
+      threads.delete(this);
+      for (const { reject } of this.#calls.values()) reject(new GipError('the worker has ended'));
+      this.#calls.clear();
+    };
+  }
+
+  call(id, method, argument) {
+    const call = ++this.#last;
+    return new Promise((resolve, reject) => {
+      this.#calls.set(call, { resolve, reject });
+      this.#worker.postMessage({ call, id, method, argument });
+    });
+  }
+}
+
+/** This thread. Each call is a task of its own, so that the page can do other things in between. */
+class OwnThread {
+  decoders = 0;
+  #host = import('./host.js').then(async ({ Host }) => {
+    const host = new Host();
+    await host.load();
+    return host;
+  });
+
+  async call(id, method, argument) {
+    const host = await this.#host;
+    await new Promise((resolve) => setTimeout(resolve));
+    return host.call(id, method, argument)[0];
+  }
+}
+
+/** Waits until a worker has loaded its decoder. */
+function ready(worker) {
+  return new Promise((resolve, reject) => {
+    worker.onmessage = ({ data }) => {
+      if (data === 'ready') resolve(worker);
+      else reject(new GipError('a worker cannot load the decoder'));
+    };
+    worker.onerror = (event) => {
+      event.preventDefault();
+      reject(new GipError('there can be no worker'));
+    };
+  });
+}
+
+/** The ways to start a worker: a script of another origin needs one of this origin that imports it. */
+const starts = [
+  () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'image-gip' }),
+  () => {
+    const script = `import ${JSON.stringify(new URL('./worker.js', import.meta.url).href)};`;
+    const url = URL.createObjectURL(new Blob([script], { type: 'text/javascript' }));
+    const worker = new Worker(url, { type: 'module', name: 'image-gip' });
+    setTimeout(() => URL.revokeObjectURL(url), 60_000);
+    return worker;
+  },
+];
+
+const threads = new Set();
+let starting = 0;
+let canStart = typeof Worker === 'function';
+let own = null;
+
+async function startWorker() {
+  for (const start of starts) {
+    let worker;
+    try {
+      worker = start();
+      return new WorkerThread(await ready(worker));
+    } catch {
+      worker?.terminate();
+    }
+  }
+  return null;
+}
+
+/** The thread for the next decoder: the one with the fewest. */
+async function nextThread() {
+  const idle = [...threads].reduce((a, b) => (a && a.decoders <= b.decoders ? a : b), null);
+  const mayStart = canStart && threads.size + starting < mostWorkers;
+  if (idle && (idle.decoders === 0 || !mayStart)) return idle;
+  if (mayStart) {
+    starting += 1;
+    const thread = await startWorker();
+    starting -= 1;
+    if (thread) {
+      threads.add(thread);
+      return thread;
+    }
+    canStart = threads.size > 0;
+    return nextThread();
+  }
+  if (starting > 0) {
+    // Others are waiting for the first workers.
+    await new Promise((resolve) => setTimeout(resolve, 5));
+    return nextThread();
+  }
+  own ??= new OwnThread();
+  return own;
+}
+
+let lastId = 0;
+
+/** Frees decoders whose owners were forgotten without `close`. */
+const forgotten = new FinalizationRegistry((close) => close());
+
+/** A decoder on one of the threads. All calls give promises, and are answered in their order. */
+export class RemoteDecoder {
+  #thread;
+  #id = ++lastId;
+  #close;
+
+  constructor(options) {
+    const id = this.#id;
+    const thread = nextThread().then(async (thread) => {
+      thread.decoders += 1;
+      await thread.call(id, 'create', options);
+      return thread;
+    });
+    thread.catch(() => {});
+    let open = true;
+    const close = () => {
+      if (!open) return;
+      open = false;
+      thread.then((thread) => {
+        thread.decoders -= 1;
+        return thread.call(id, 'close');
+      }).catch(() => {});
+    };
+    this.#thread = thread;
+    this.#close = close;
+    forgotten.register(this, close, this);
+  }
+
+  async call(method, argument) {
+    return (await this.#thread).call(this.#id, method, argument);
+  }
+
+  close() {
+    forgotten.unregister(this);
+    this.#close();
+  }
+}

@@ -1,0 +1,54 @@
+// The server of the browser tests: the package, the test vectors, and routes of the test's own.
+
+import { readFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
+import { extname, join, normalize } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+const root = fileURLToPath(new URL('..', import.meta.url));
+const vectors = fileURLToPath(new URL('../../../spec/vectors', import.meta.url));
+
+const types = {
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript; charset=utf-8',
+  '.wasm': 'application/wasm',
+  '.tsv': 'text/plain; charset=utf-8',
+  '.gip': 'application/octet-stream',
+};
+
+/** Starts a server on a free port. `routes` maps paths to `(request, response) => ...`. */
+export async function serve(routes = {}) {
+  const server = createServer(async (request, response) => {
+    const path = new URL(request.url, 'http://localhost').pathname;
+    if (routes[path]) {
+      await routes[path](request, response);
+      return;
+    }
+    const safe = normalize(path);
+    const file = safe.startsWith('/vectors/') ? join(vectors, safe.slice(9)) : join(root, safe);
+    try {
+      const content = await readFile(file);
+      response.writeHead(200, { 'Content-Type': types[extname(file)] ?? 'text/plain' });
+      response.end(content);
+    } catch {
+      response.writeHead(404).end();
+    }
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  return {
+    routes,
+    origin: `http://127.0.0.1:${server.address().port}`,
+    close() {
+      server.closeAllConnections();
+      return new Promise((resolve) => server.close(resolve));
+    },
+  };
+}
+
+/** A route that answers with an HTML page. */
+export function page(body, headers = {}) {
+  return (_, response) => {
+    response.writeHead(200, { 'Content-Type': types['.html'], ...headers });
+    response.end(`<!doctype html><html lang="en"><title>test</title>${body}`);
+  };
+}
