@@ -1,0 +1,191 @@
+// The page: joins the stage with its controls, and opens files.
+
+import { Comparison } from './comparison.js';
+import { element } from './dom.js';
+import { listenForFiles } from './drop.js';
+import { decode, fromBlob, fromUrl, isGip } from './file.js';
+import { integer, zoom } from './format.js';
+import { PointerInput } from './input.js';
+import { KEYS, listenToKeys } from './keyboard.js';
+import { showPanel } from './panel.js';
+import { Pool } from './pool.js';
+import { Scrubber } from './scrubber.js';
+import { Stage } from './stage.js';
+
+const SAMPLE = 'sample/sumac.gip';
+const find = (selector) => document.querySelector(selector);
+
+const [stageElement, panel, message] = [find('#stage'), find('#panel'), find('#message')];
+const fail = (error) => tell(error.message);
+const pool = new Pool(fail);
+const comparison = new Comparison(stageElement);
+const stage = new Stage(stageElement, pool, comparison, fail);
+const scrubber = new Scrubber(pool, (gaussians) => stage.showGaussians(gaussians));
+let opening = new AbortController();
+
+/** Shows a message until it is dismissed or another file is opened. */
+function tell(text) {
+  message.querySelector('p').textContent = text;
+  message.hidden = false;
+}
+
+/** For screen readers. */
+function announce(text) {
+  find('#status').textContent = text;
+}
+
+/** Opens the .gip file that a promise gives: { name, stream }. */
+async function open(find) {
+  opening.abort();
+  opening = new AbortController();
+  const { signal } = opening;
+  message.hidden = true;
+  try {
+    const file = await find(signal);
+    signal.throwIfAborted();
+    close();
+    document.body.classList.add('loading');
+    const result = await decode(file, pool, { signal, onProgress: (progress) => show(file, progress) });
+    show(file, result);
+    await finish(file, result);
+  } catch (error) {
+    if (!signal.aborted) fail(error);
+  } finally {
+    if (!signal.aborted) document.body.classList.remove('loading');
+  }
+}
+
+/** Back to the page without a picture. */
+function close() {
+  stage.reset();
+  scrubber.setFile(null);
+  comparison.setOriginal(null);
+  drawToggles();
+  panel.replaceChildren();
+  document.body.classList.add('empty');
+  document.title = 'gip viewer';
+  find('#name').textContent = 'gip viewer';
+  stageElement.setAttribute('aria-label', 'No picture');
+}
+
+/** Shows what has arrived of a file. */
+function show({ name }, { header, gaussians }) {
+  if (!header) return;
+  if (!stage.hasPicture) {
+    // The stage has its size only when the page without a picture has gone.
+    document.body.classList.remove('empty');
+    stage.setPicture(header);
+    document.title = `${name} - gip viewer`;
+    find('#name').textContent = name;
+    stageElement.setAttribute('aria-label', `${name}, ${header.width} by ${header.height} pixels`);
+    stageElement.focus({ preventScroll: true });
+  }
+  stage.showGaussians(gaussians);
+}
+
+/** What needs the whole file, or what there is of it. */
+async function finish({ name }, { size, header, gaussians, error }) {
+  if (error) {
+    const kept = header ? ` What is shown came before that: ${integer(gaussians)} of ${integer(header.gaussians)} Gaussians.` : '';
+    tell(`${name}: ${error.message}.${kept}`);
+  }
+  if (!header) return;
+  const about = await pool.ask('about');
+  showPanel(panel, { name, size, header, about, arrived: gaussians, renderer: stage.renderer });
+  scrubber.setFile({ size, gaussians, layers: about.statistics.layers });
+  announce(`${name} is open.`);
+}
+
+/** Files that a person gave: a .gip to open, and a picture of another kind to compare with. */
+async function openFiles(files) {
+  const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, 8).arrayBuffer())));
+  const gip = files.find((_, index) => isGip(heads[index]));
+  const other = files.find((_, index) => !isGip(heads[index]));
+  if (gip) await open(() => fromBlob(gip));
+  if (other) await openOriginal(other);
+}
+
+async function openOriginal(file) {
+  const bitmap = await createImageBitmap(file).catch(() => null);
+  if (!bitmap) {
+    tell(`${file.name} is neither a .gip file nor a picture that this browser can show.`);
+  } else if (!stage.hasPicture) {
+    bitmap.close();
+    tell(`${file.name} is not a .gip file. Open a .gip first; its original can then be dropped to compare both.`);
+  } else {
+    message.hidden = true;
+    comparison.setOriginal(bitmap);
+    setComparing(true);
+  }
+}
+
+function setComparing(isOn) {
+  comparison.toggle(isOn);
+  stage.draw();
+  drawToggles();
+  announce(comparison.isOn ? 'The original is on the left of the divider.' : 'The comparison is off.');
+}
+
+function setPanel(shown) {
+  panel.hidden = !shown;
+  document.body.classList.toggle('with-panel', shown);
+  drawToggles();
+}
+
+function drawToggles() {
+  const states = { outlines: stage.outlines, compare: comparison.isOn, panel: !panel.hidden };
+  for (const [action, isOn] of Object.entries(states)) {
+    find(`[data-action="${action}"]`).setAttribute('aria-pressed', isOn);
+  }
+  find('#legend').hidden = !stage.outlines;
+}
+
+const whenOpen = (action) => () => {
+  if (stage.hasPicture) action();
+};
+
+const actions = {
+  open: () => find('#picker').click(),
+  sample: () => open((signal) => fromUrl(SAMPLE, signal)),
+  zoomIn: whenOpen(() => stage.glide((view) => view.zoomTo(view.scale * 1.5))),
+  zoomOut: whenOpen(() => stage.glide((view) => view.zoomTo(view.scale / 1.5))),
+  fit: whenOpen(() => stage.glide((view) => view.fit(), 220)),
+  actualSize: whenOpen(() => stage.glide((view) => view.zoomTo(1), 220)),
+  outlines: whenOpen(() => {
+    stage.outlines = !stage.outlines;
+    drawToggles();
+    announce(stage.outlines ? 'Outlines are shown.' : 'Outlines are hidden.');
+  }),
+  compare: whenOpen(() => {
+    if (comparison.hasOriginal) setComparing(!comparison.isOn);
+    else tell('Drop the original of this picture on the page, or choose it with Open, to compare both.');
+  }),
+  panel: whenOpen(() => setPanel(panel.hidden)),
+  play: () => scrubber.togglePlay(),
+  layerBack: () => scrubber.stepLayers(-1),
+  layerForward: () => scrubber.stepLayers(1),
+  help: () => find('#help').showModal(),
+};
+
+comparison.onArrival = () => stage.draw();
+stage.onFrame = ({ scale }) => {
+  find('#zoom').textContent = zoom(scale);
+};
+
+document.addEventListener('click', ({ target }) => {
+  const action = target.closest('[data-action]')?.dataset.action;
+  if (action) actions[action]();
+});
+message.querySelector('button').addEventListener('click', () => {
+  message.hidden = true;
+});
+for (const { label, does } of KEYS) {
+  find('#keys').append(element('dt', {}, element('kbd', {}, label)), element('dd', {}, does));
+}
+listenForFiles({ target: find('#drop-target'), picker: find('#picker'), onFiles: openFiles });
+listenToKeys(stage, actions);
+new PointerInput(stageElement, stage);
+setPanel(matchMedia('(min-width: 70rem)').matches);
+
+const parameters = new URLSearchParams(location.search);
+if (parameters.has('src')) open((signal) => fromUrl(parameters.get('src'), signal));
