@@ -1,0 +1,351 @@
+// Renders the Gaussians of a .gip picture (spec, section 9) on a GPU. Native programs run it through
+// the crate image-gip-gpu, browsers load this file as it is. It is for viewing: the GPU may fuse and
+// reassociate operations, so samples can differ from the decoder's in the last step.
+//
+// For each picture that is drawn:
+//   1. clear the buffer `bins` to zero,
+//   2. dispatch `prepare` with ceil(gaussians / 256) workgroups,
+//   3. dispatch `render` with ceil(size.x / 16) x ceil(size.y / 16) workgroups.
+// All three go into one command encoder, and the two dispatches may share a compute pass. Nothing is
+// sorted: `prepare` marks each Gaussian in the bins that it may touch, one bit for each, and `render`
+// goes through these bits in the order of the file.
+//
+// Bindings, all in group 0, with the buffers' sizes in bytes for N Gaussians:
+//
+//   0  view       uniform, 64        what to draw; see `View`
+//   1  gaussians  storage, 36 N      see below
+//   2  splats     storage, 48 N      filled by `prepare`
+//   3  bins       storage, 4 ceil(N / 32) x number of bins; at most 1024 ceil(N / 32)
+//   4  output     storage texture, rgba8unorm, of at least `size` pixels
+//
+// `prepare` uses 0 to 3, `render` 0, 2, 3 and 4. Both accept a bind group with all five.
+
+struct View {
+    // Pixels of the output for one stored pixel, along x and y. (offset 0)
+    scale: vec2<f32>,
+    // Column and row of the texture's first pixel in the output. They may be fractions, so that a
+    // picture can be moved smoothly. (offset 8)
+    origin: vec2<f32>,
+    // Width and height in pixels of what is drawn; the texture has at least this size. (offset 16)
+    size: vec2<u32>,
+    // How many Gaussians to draw: the first ones of the file. (offset 24)
+    gaussians: u32,
+    // Width and height of a bin in tiles: b = ceil(max(ceil(size.x / 16), ceil(size.y / 16)) / 16).
+    // There are ceil(ceil(size.x / 16) / b) x ceil(ceil(size.y / 16) / b) bins, at most 256.
+    // (offset 28)
+    bin_tiles: u32,
+    // The base colour of each channel of the file, where 1 is a full sample. (offset 32)
+    base: vec4<f32>,
+    // The number of channels: 1 gray, 2 gray and alpha, 3 RGB, 4 RGB and alpha. (offset 48)
+    channels: u32,
+    // 0 exponential, 1 quartic. (offset 52)
+    kernel: u32,
+    // The cut-off of the kernel, which is 4 for the quartic one. (offset 56; size 64)
+    cutoff: f32,
+}
+
+// A Gaussian in output pixels (spec, section 9.2).
+struct Splat {
+    // x, y: the centre. i11, w: see `point`.
+    place: vec4<f32>,
+    // i22, and half of the width and of the height of the part with a weight.
+    shape: vec4<f32>,
+    // The amplitudes in red, green, blue and alpha.
+    color: vec4<f32>,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+// Nine binary32 for each Gaussian, in the order of the file: x, y, l11, l21, l22 in stored pixels
+// (spec, section 8.1), and the amplitudes in up to four channels; those that the picture lacks are 0.
+// They are read as integers, because WGSL does not say what comparisons with NaN give.
+@group(0) @binding(1) var<storage, read> gaussians: array<u32>;
+@group(0) @binding(2) var<storage, read_write> splats: array<Splat>;
+// For each bin, row by row, a bit for each Gaussian: the lowest bit of the first word is the first.
+@group(0) @binding(3) var<storage, read_write> bins: array<atomic<u32>>;
+@group(0) @binding(4) var output: texture_storage_2d<rgba8unorm, write>;
+
+// Width and height of a tile in pixels.
+const TILE: u32 = 16u;
+// Pixels of a tile, and invocations of a workgroup.
+const BATCH: u32 = 256u;
+// Words of 32 bits for a batch.
+const BATCH_WORDS: u32 = 8u;
+const COMPONENTS: u32 = 9u;
+const QUARTIC: u32 = 1u;
+
+fn tiles() -> vec2<u32> {
+    return (view.size + TILE - 1u) / TILE;
+}
+
+fn bin_columns() -> u32 {
+    return (tiles().x + view.bin_tiles - 1u) / view.bin_tiles;
+}
+
+// Words of each bin.
+fn bin_words() -> u32 {
+    return (view.gaussians + 31u) / 32u;
+}
+
+// The squared distance at which the weight ends, in the distances of `point`. Those of the quartic
+// kernel are halved, so that it ends at 1.
+fn end() -> f32 {
+    return select(view.cutoff, 1.0, view.kernel == QUARTIC);
+}
+
+// How far rounding may move the outline of a splat along each axis, in pixels.
+fn margin(splat: Splat) -> vec2<f32> {
+    return 0.01 + (abs(splat.place.xy) + splat.shape.yz) * 4e-6;
+}
+
+// ---- prepare: Gaussians to splats and bins ----
+
+// Whether the magnitude of a component is at most `most`. Integers order NaN above all numbers.
+fn is_within(bits: u32, most: f32) -> bool {
+    return (bits & 0x7fffffffu) <= bitcast<u32>(most);
+}
+
+// Whether a diagonal entry is from 2^-12 to 2^24. Negative numbers are larger integers.
+fn is_diagonal(bits: u32) -> bool {
+    return bits >= bitcast<u32>(0.000244140625) && bits <= bitcast<u32>(16777216.0);
+}
+
+// Whether a Gaussian is drawn (spec, section 8.5).
+fn is_drawn(first: u32) -> bool {
+    var drawn = is_diagonal(gaussians[first + 2u]) && is_diagonal(gaussians[first + 4u]);
+    drawn = drawn && is_within(gaussians[first], 16777216.0);
+    drawn = drawn && is_within(gaussians[first + 1u], 16777216.0);
+    drawn = drawn && is_within(gaussians[first + 3u], 16777216.0);
+    for (var channel = 5u; channel < COMPONENTS; channel++) {
+        drawn = drawn && is_within(gaussians[first + channel], 65536.0);
+    }
+    return drawn;
+}
+
+fn component(index: u32) -> f32 {
+    return bitcast<f32>(gaussians[index]);
+}
+
+// Values of the file's channels as red, green, blue and alpha (spec, section 9.6).
+fn to_rgba(values: vec4<f32>, opaque: f32) -> vec4<f32> {
+    switch view.channels {
+        case 1u: { return vec4(values.xxx, opaque); }
+        case 2u: { return values.xxxy; }
+        case 3u: { return vec4(values.xyz, opaque); }
+        default: { return values; }
+    }
+}
+
+// The splat of a Gaussian that is drawn (spec, section 9.2).
+fn to_splat(first: u32) -> Splat {
+    let center = vec2(component(first), component(first + 1u)) * view.scale;
+    var l11 = component(first + 2u) * view.scale.x;
+    var l21 = component(first + 3u) * view.scale.y;
+    var l22 = component(first + 4u) * view.scale.y;
+    var color = vec4(
+        component(first + 5u),
+        component(first + 6u),
+        component(first + 7u),
+        component(first + 8u),
+    );
+
+    // Along an axis that is made smaller, the splat is widened by what pixels have grown.
+    let divisor = select(12.0, 6.0, view.kernel == QUARTIC);
+    let wider = max(1.0 - view.scale * view.scale, vec2(0.0)) / divisor;
+    if (any(wider > vec2(0.0))) {
+        let m11 = sqrt(l11 * l11 + wider.x);
+        let r = l21 / m11;
+        let m22 = sqrt((l22 * l22 + wider.y) + (r * r) * wider.x);
+        color *= (l11 / m11) * (l22 / m22);
+        l21 = (l11 * l21) / m11;
+        l11 = m11;
+        l22 = m22;
+    }
+
+    let halving = select(1.0, 0.5, view.kernel == QUARTIC);
+    let i11 = 1.0 / l11;
+    let i22 = 1.0 / l22;
+    let w = -((l21 * i11) * i22);
+    let radius = sqrt(view.cutoff);
+    let reach = radius * vec2(l11, sqrt(l21 * l21 + l22 * l22));
+    return Splat(
+        vec4(center, i11 * halving, w * halving),
+        vec4(i22 * halving, reach, 0.0),
+        to_rgba(color, 0.0),
+    );
+}
+
+@compute @workgroup_size(256)
+fn prepare(@builtin(global_invocation_id) invocation: vec3<u32>) {
+    let index = invocation.x;
+    if (index >= view.gaussians || !is_drawn(index * COMPONENTS)) {
+        return;
+    }
+    let splat = to_splat(index * COMPONENTS);
+    let reach = splat.shape.yz + margin(splat);
+    let low = splat.place.xy - reach - view.origin;
+    let high = splat.place.xy + reach - view.origin;
+    let size = vec2<f32>(view.size);
+    if (any(high < vec2(0.0)) || any(low >= size)) {
+        return;
+    }
+    splats[index] = splat;
+    let bin_size = view.bin_tiles * TILE;
+    let first = vec2<u32>(max(low, vec2(0.0))) / bin_size;
+    let last = vec2<u32>(min(high, size - 1.0)) / bin_size;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            let bin = y * bin_columns() + x;
+            atomicOr(&bins[bin * bin_words() + index / 32u], 1u << (index % 32u));
+        }
+    }
+}
+
+// ---- render: splats to pixels, a tile for each workgroup ----
+
+// Of each invocation, the number of bits in its word; and sums of sixteen of them.
+var<workgroup> counts: array<u32, 256>;
+var<workgroup> sums: array<u32, 16>;
+var<workgroup> candidates_left: u32;
+// Splats of the tile's bin, in order.
+var<workgroup> candidates: array<u32, 256>;
+// Which of the candidates touch the tile, a bit for each; and these splats, in order.
+var<workgroup> touching: array<atomic<u32>, 8>;
+var<workgroup> places: array<vec4<f32>, 256>;
+var<workgroup> i22s: array<f32, 256>;
+var<workgroup> colors: array<vec4<f32>, 256>;
+
+// The point (u, v) of the kernel for a distance from the centre (spec, section 9.3).
+fn point(place: vec4<f32>, i22: f32, d: vec2<f32>) -> vec2<f32> {
+    return vec2(place.z * d.x, place.w * d.x + i22 * d.y);
+}
+
+// The least squared distance that rounding may give at a distance from the centre.
+fn least(splat: Splat, d: vec2<f32>) -> f32 {
+    let u = splat.place.z * d.x;
+    let left = splat.place.w * d.x;
+    let right = splat.shape.x * d.y;
+    let v = max(abs(left + right) - (abs(left) + abs(right)) * 1e-6, 0.0);
+    return u * u * 0.999999 + v * v;
+}
+
+// Whether a splat has a weight at a pixel of the tile whose first pixel has the centre `first`.
+fn touches(splat: Splat, first: vec2<f32>) -> bool {
+    let low = first - splat.place.xy - margin(splat);
+    let high = first + f32(TILE - 1u) - splat.place.xy + margin(splat);
+    // The nearest point of a rectangle is on one of the two sides that face the centre. A side that
+    // passes the centre gives other points of the rectangle, which do no harm.
+    let near = clamp(vec2(0.0), low, high);
+    let i11 = splat.place.z;
+    let w = splat.place.w;
+    let i22 = splat.shape.x;
+    let y = clamp(-w * near.x / i22, low.y, high.y);
+    let x = clamp(-w * i22 * near.y / (i11 * i11 + w * w), low.x, high.x);
+    return min(least(splat, vec2(near.x, y)), least(splat, vec2(x, near.y))) <= end();
+}
+
+fn weight(uv: vec2<f32>) -> f32 {
+    if (view.kernel == QUARTIC) {
+        let t = max((1.0 - uv.x * uv.x) - uv.y * uv.y, 0.0);
+        return t * t;
+    }
+    let q = uv.x * uv.x + uv.y * uv.y;
+    return select(0.0, exp(q * -0.5), q <= view.cutoff);
+}
+
+// The sum of `count` over the invocations before this one; `candidates_left` gets that over all.
+fn sum_before(invocation: u32, count: u32) -> u32 {
+    counts[invocation] = count;
+    workgroupBarrier();
+    let row = invocation / 16u;
+    var before = 0u;
+    for (var i = row * 16u; i < invocation; i++) {
+        before += counts[i];
+    }
+    if (invocation % 16u == 15u) {
+        sums[row] = before + count;
+    }
+    workgroupBarrier();
+    for (var i = 0u; i < row; i++) {
+        before += sums[i];
+    }
+    if (invocation == BATCH - 1u) {
+        candidates_left = before + count;
+    }
+    return before;
+}
+
+@compute @workgroup_size(16, 16)
+fn render(
+    @builtin(workgroup_id) tile: vec3<u32>,
+    @builtin(local_invocation_id) within: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    let pixel = tile.xy * TILE + within.xy;
+    let corner = view.origin + vec2<f32>(tile.xy * TILE) + 0.5;
+    let center = view.origin + vec2<f32>(pixel) + 0.5;
+    let bin = (tile.y / view.bin_tiles) * bin_columns() + tile.x / view.bin_tiles;
+    let words = bin_words();
+    var sum = to_rgba(view.base, 1.0);
+    for (var first = 0u; first < words; first += BATCH) {
+        // Each invocation has a word of the bin, and puts its splats among the candidates.
+        let word = first + invocation;
+        var bits = 0u;
+        if (word < words) {
+            bits = atomicLoad(&bins[bin * words + word]);
+        }
+        var position = sum_before(invocation, countOneBits(bits));
+        let total = workgroupUniformLoad(&candidates_left);
+        for (var start = 0u; start < total; start += BATCH) {
+            while (bits != 0u && position < start + BATCH) {
+                candidates[position - start] = word * 32u + firstTrailingBit(bits);
+                bits &= bits - 1u;
+                position++;
+            }
+            if (invocation < BATCH_WORDS) {
+                atomicStore(&touching[invocation], 0u);
+            }
+            workgroupBarrier();
+
+            // Each invocation tests a candidate.
+            var splat: Splat;
+            var is_touching = false;
+            if (invocation < total - start) {
+                splat = splats[candidates[invocation]];
+                is_touching = touches(splat, corner);
+            }
+            let bit = 1u << (invocation % 32u);
+            if (is_touching) {
+                atomicOr(&touching[invocation / 32u], bit);
+            }
+            workgroupBarrier();
+            var place = 0u;
+            var count = 0u;
+            for (var i = 0u; i < BATCH_WORDS; i++) {
+                let ones = atomicLoad(&touching[i]);
+                if (i == invocation / 32u) {
+                    place = count + countOneBits(ones & (bit - 1u));
+                }
+                count += countOneBits(ones);
+            }
+            if (is_touching) {
+                places[place] = splat.place;
+                i22s[place] = splat.shape.x;
+                colors[place] = splat.color;
+            }
+            workgroupBarrier();
+
+            // Each invocation adds those that touch the tile to its pixel.
+            for (var i = 0u; i < count; i++) {
+                let uv = point(places[i], i22s[i], center - places[i].xy);
+                sum += colors[i] * weight(uv);
+            }
+            // What follows writes to the same memory.
+            workgroupBarrier();
+        }
+    }
+    if (all(pixel < view.size)) {
+        // Rounded here, since textures may round halves otherwise.
+        let samples = floor(clamp(sum, vec4(0.0), vec4(1.0)) * 255.0 + 0.5);
+        textureStore(output, pixel, samples / 255.0);
+    }
+}
