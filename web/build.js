@@ -17,6 +17,7 @@ const contents = {
   js: join(here, 'js'),
   sample: join(here, 'sample'),
   decoder: join(wasm, 'dist'),
+  shader: join(here, 'shader'),
   'shader/render.wgsl': join(here, '..', 'gpu', 'src', 'render.wgsl'),
 };
 

@@ -1,5 +1,7 @@
 // Mouse, pen, touch and wheel on the stage.
 
+import { isCalm } from './motion.js';
+
 /** Wheel steps of at least this many pixels are those of a mouse, and are made smooth. */
 const NOTCH = 50;
 /** How long a picture slides on after it was let go, in milliseconds. */
@@ -76,7 +78,7 @@ export class PointerInput {
     this.#element.classList.remove('dragging');
     const recent = this.#recent.filter(({ time }) => event.timeStamp - time < 80);
     this.#recent = [];
-    if (recent.length < 2) return;
+    if (recent.length < 2 || isCalm()) return;
     const time = Math.max(16, event.timeStamp - recent[0].time);
     const sum = (key) => recent.reduce((total, move) => total + move[key], 0);
     const [vx, vy] = [sum('dx') / time, sum('dy') / time];

@@ -5,6 +5,7 @@ import { element } from './dom.js';
 import { listenForFiles } from './drop.js';
 import { decode, fromBlob, fromUrl, isGip } from './file.js';
 import { integer, zoom } from './format.js';
+import { GpuPainter } from './gpu-painter.js';
 import { PointerInput } from './input.js';
 import { KEYS, listenToKeys } from './keyboard.js';
 import { showPanel } from './panel.js';
@@ -21,12 +22,22 @@ const pool = new Pool(fail);
 const comparison = new Comparison(stageElement);
 const stage = new Stage(stageElement, pool, comparison, fail);
 const scrubber = new Scrubber(pool, (gaussians) => stage.showGaussians(gaussians));
+const parameters = new URLSearchParams(location.search);
+const gpu = startGpu(parameters.get('renderer'));
 let opening = new AbortController();
 
 /** Shows a message until it is dismissed or another file is opened. */
 function tell(text) {
   message.querySelector('p').textContent = text;
   message.hidden = false;
+}
+
+/** The painter that uses the GPU; `null` where there is none, and when the page's address forbids it. */
+function startGpu(renderer) {
+  if (renderer === 'tiles') return null;
+  const onLost = () => stage.setGpu(null);
+  const anyAdapter = renderer === 'webgpu';
+  return GpuPainter.create(find('#picture-gpu'), { anyAdapter, onLost }).catch(() => null);
 }
 
 /** For screen readers. */
@@ -47,7 +58,7 @@ async function open(find) {
     document.body.classList.add('loading');
     const result = await decode(file, pool, { signal, onProgress: (progress) => show(file, progress) });
     show(file, result);
-    await finish(file, result);
+    await finish(file, result, signal);
   } catch (error) {
     if (!signal.aborted) fail(error);
   } finally {
@@ -84,16 +95,28 @@ function show({ name }, { header, gaussians }) {
 }
 
 /** What needs the whole file, or what there is of it. */
-async function finish({ name }, { size, header, gaussians, error }) {
+async function finish({ name }, { size, header, gaussians, error }, signal) {
   if (error) {
     const kept = header ? ` What is shown came before that: ${integer(gaussians)} of ${integer(header.gaussians)} Gaussians.` : '';
     tell(`${name}: ${error.message}.${kept}`);
   }
   if (!header) return;
   const about = await pool.ask('about');
-  showPanel(panel, { name, size, header, about, arrived: gaussians, renderer: stage.renderer });
+  signal.throwIfAborted();
+  showPanel(panel, { name, size, header, about, arrived: gaussians });
   scrubber.setFile({ size, gaussians, layers: about.statistics.layers });
+  stage.draw();
   announce(`${name} is open.`);
+  await useGpu(header, signal);
+}
+
+/** Paints with the GPU, if there is one that can. */
+async function useGpu(header, signal) {
+  const painter = await gpu;
+  if (!painter) return;
+  const numbers = await pool.ask('gaussians');
+  signal.throwIfAborted();
+  stage.setGpu(painter.setPicture(header, numbers) ? painter : null);
 }
 
 /** Files that a person gave: a .gip to open, and a picture of another kind to compare with. */
@@ -169,8 +192,14 @@ const actions = {
 
 comparison.onArrival = () => stage.draw();
 stage.onFrame = ({ scale }) => {
-  find('#zoom').textContent = zoom(scale);
+  write(find('#zoom'), zoom(scale));
+  write(find('#renderer'), `Rendered by ${stage.renderer}.`);
 };
+
+/** Writes a text where it has changed. */
+function write(place, text) {
+  if (place && place.textContent !== text) place.textContent = text;
+}
 
 document.addEventListener('click', ({ target }) => {
   const action = target.closest('[data-action]')?.dataset.action;
@@ -187,5 +216,4 @@ listenToKeys(stage, actions);
 new PointerInput(stageElement, stage);
 setPanel(matchMedia('(min-width: 70rem)').matches);
 
-const parameters = new URLSearchParams(location.search);
 if (parameters.has('src')) open((signal) => fromUrl(parameters.get('src'), signal));

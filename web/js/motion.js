@@ -1,6 +1,9 @@
 // Smooth ways from one view to another.
 
-const calm = matchMedia('(prefers-reduced-motion: reduce)');
+const reduced = matchMedia('(prefers-reduced-motion: reduce)');
+
+/** Whether the person wants no movement on the screen. */
+export const isCalm = () => reduced.matches;
 
 const easeOut = (t) => 1 - (1 - t) ** 3;
 
@@ -28,7 +31,7 @@ export class Motion {
   start(goal, duration, now = performance.now()) {
     const { scale, x, y } = this.#view;
     const to = { scale: goal.scale, x: goal.x, y: goal.y };
-    this.#way = { from: { scale, x, y }, to, start: now, duration: calm.matches ? 0 : duration };
+    this.#way = { from: { scale, x, y }, to, start: now, duration: isCalm() ? 0 : duration };
   }
 
   stop() {

@@ -112,7 +112,7 @@ function metadata({ iccProfile, exif, xmp, texts }) {
 }
 
 /** Fills the panel. `about` has `metadata` and `statistics`; `arrived` counts Gaussians. */
-export function showPanel(panel, { name, size, header, about, arrived, renderer }) {
+export function showPanel(panel, { name, size, header, about, arrived }) {
   const { statistics } = about;
   const chunks = statistics.chunks.map(({ type, count, bytes: length }) => ({
     name: count > 1 ? `${type} × ${integer(count)}` : type,
@@ -127,7 +127,8 @@ export function showPanel(panel, { name, size, header, about, arrived, renderer 
     bars('Bytes by chunk', chunks),
     steps(statistics),
     metadata(about.metadata),
-    element('p', { className: 'small' }, `Rendered by ${renderer}.`),
+    // The page says here what renders the picture.
+    element('p', { className: 'small', id: 'renderer' }),
   ];
   panel.replaceChildren(...parts.filter((part) => part !== null));
 }

@@ -2,6 +2,7 @@
 
 import { Motion } from './motion.js';
 import { TilePainter } from './tile-painter.js';
+import { watchSize } from './size.js';
 import { Tiles } from './tiles.js';
 import { View } from './view.js';
 
@@ -13,7 +14,9 @@ export class Stage {
   #element;
   #pool;
   #tiles;
+  #canvas;
   #painter;
+  #gpuCanvas;
   #gpu = null;
   #outlinePainter;
   #outlineCanvas;
@@ -33,19 +36,21 @@ export class Stage {
     this.#comparison = comparison;
     const onArrival = () => this.draw();
     this.#tiles = new Tiles(pool, { onArrival, onError });
-    this.#painter = new TilePainter(element.querySelector('#picture'), 'picture');
+    this.#canvas = element.querySelector('#picture');
+    this.#gpuCanvas = element.querySelector('#picture-gpu');
+    this.#painter = new TilePainter(this.#canvas, 'picture');
     this.#outlineCanvas = element.querySelector('#outlines');
     this.#outlinePainter = new TilePainter(this.#outlineCanvas, 'outlines');
     this.#checkers = element.querySelector('#checkers');
-    new ResizeObserver(() => this.#resize()).observe(element);
-    addEventListener('resize', () => this.#resize());
-    this.#resize();
+    watchSize(element, (size) => {
+      this.view.setWindow(size);
+      this.draw();
+    });
   }
 
-  /** Renders with a `GpuPainter` from now on, or with tiles again after `null`. */
+  /** Paints with a `GpuPainter` that has the picture from now on, or with tiles again after `null`. */
   setGpu(gpu) {
     this.#gpu = gpu;
-    this.#element.dataset.renderer = gpu ? 'webgpu' : 'tiles';
     this.draw();
   }
 
@@ -59,6 +64,7 @@ export class Stage {
   reset() {
     this.#header = null;
     this.#gaussians = 0;
+    this.#gpu = null;
     this.#tiles.reset();
     this.motion.stop();
     this.draw();
@@ -92,15 +98,8 @@ export class Stage {
   }
 
   /** Whether everything that is in the window is sharp and at rest. */
-  get isComplete() {
+  get #isComplete() {
     return !this.#isAsked && this.#tiles.isComplete && !this.motion.isMoving;
-  }
-
-  #resize() {
-    const { width, height } = this.#element.getBoundingClientRect();
-    if (width === 0 || height === 0) return;
-    this.view.setWindow({ width, height, ratio: devicePixelRatio });
-    this.draw();
   }
 
   /** Draws soon, once for all changes until then. */
@@ -116,6 +115,7 @@ export class Stage {
     if (this.#header) this.#paint();
     this.onFrame(this.view);
     if (this.motion.isMoving) this.draw();
+    this.#element.setAttribute('aria-busy', !this.#isComplete);
   }
 
   #paint() {
@@ -127,7 +127,10 @@ export class Stage {
       ratio: this.view.window.ratio,
       kinds: this.#outlines ? ['outlines'] : [],
     };
-    if (this.#gpu) this.#gpu.paint(scene);
+    const gpu = this.#gpu?.canPaint(scene) ? this.#gpu : null;
+    this.#canvas.hidden = gpu !== null;
+    this.#gpuCanvas.hidden = gpu === null;
+    if (gpu) gpu.paint(scene);
     else {
       scene.kinds.unshift('picture');
       this.#painter.paint(scene, this.#tiles);

@@ -18,8 +18,8 @@ export class View {
   x = 0.5;
   y = 0.5;
   #picture = { width: 1, height: 1 };
-  /** In CSS pixels; `ratio` device pixels for each of them. */
-  #window = { width: 1, height: 1, ratio: 1 };
+  /** In CSS pixels; `ratio` device pixels for each of them, `device` of them in all. */
+  #window = { width: 1, height: 1, ratio: 1, device: { width: 1, height: 1 } };
 
   get picture() {
     return this.#picture;
@@ -119,14 +119,10 @@ export class View {
    * this level need no resampling.
    */
   get frame() {
-    const { ratio } = this.#window;
+    const { ratio, device: window } = this.#window;
     const { width, height } = this.#picture;
     const side = (stored) => clamp(Math.round(stored * this.scale * ratio), 1, MOST_SIDE);
     const level = { width: side(width), height: side(height) };
-    const window = {
-      width: Math.max(1, Math.round(this.#window.width * ratio)),
-      height: Math.max(1, Math.round(this.#window.height * ratio)),
-    };
     return {
       window,
       level,
