@@ -66,7 +66,7 @@ export class Scrubber {
     const { size, layers } = this.#file;
     const whole = layers.filter(({ end }) => end <= this.#value).length;
     const share = this.#value === size ? bytes(size) : `${integer(this.#value)} of ${bytes(size)}`;
-    const counts = `${integer(gaussians)} Gaussians · ${whole} of ${layers.length} layers`;
+    const counts = `${integer(gaussians)} Gaussians · ${whole} of ${layers.length} ${layers.length === 1 ? 'layer' : 'layers'}`;
     this.#output.replaceChildren(element('b', {}, share), element('span', {}, counts));
     this.#slider.setAttribute('aria-valuetext', `${share}, ${counts}`);
     this.#slider.style.setProperty('--share', this.#value / size);

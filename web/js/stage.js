@@ -106,6 +106,7 @@ export class Stage {
   draw() {
     if (this.#isAsked) return;
     this.#isAsked = true;
+    this.#element.setAttribute('aria-busy', true);
     requestAnimationFrame((now) => this.#frame(now));
   }
 

@@ -1,7 +1,7 @@
 // Paints tiles to a canvas, and what stands in for those that are not there yet.
 
-/** Levels of which tiles stand in. */
-const STAND_IN_LEVELS = 3;
+/** Most levels of which tiles stand in. */
+const STAND_IN_LEVELS = 2;
 
 /** Where a region of a level is in the window of a frame, in whole device pixels. */
 function place(frame, level, { x, y, width, height }) {
@@ -14,8 +14,12 @@ function place(frame, level, { x, y, width, height }) {
   return { left, top, width: right - left, height: bottom - top };
 }
 
-const isInside = ({ left, top, width, height }, window) =>
-  left < window.width && top < window.height && left + width > 0 && top + height > 0;
+/** How many pixels of the window a place takes. */
+function areaInside({ left, top, width, height }, window) {
+  const across = Math.min(left + width, window.width) - Math.max(left, 0);
+  const down = Math.min(top + height, window.height) - Math.max(top, 0);
+  return Math.max(0, across) * Math.max(0, down);
+}
 
 export class TilePainter {
   #canvas;
@@ -56,22 +60,31 @@ export class TilePainter {
       context.rect(left, top, width, height);
     }
     context.clip();
-    let known = gaussians;
-    if (this.#kind === 'picture' && tiles.preview) {
-      // Until the preview for this part of the file has come, the picture stays what it was.
-      known = tiles.preview.gaussians;
-      const { left, top } = frame;
-      context.drawImage(tiles.preview.bitmap, left, top, frame.level.width, frame.level.height);
-    }
-    for (const level of tiles.ofOtherLevels(frame, this.#kind, known).slice(-STAND_IN_LEVELS)) {
-      for (const tile of level) {
-        const at = place(frame, tile.level, tile.region);
-        if (!isInside(at, frame.window)) continue;
-        // Straight over what was there: a picture may have transparent parts.
-        context.clearRect(at.left, at.top, at.width, at.height);
-        context.drawImage(tile.bitmap, at.left, at.top, at.width, at.height);
+    this.#standIns(frame, gaussians, tiles).forEach((images, index) => {
+      for (const { bitmap, at } of images) {
+        // In place of what is below, not over it: a picture may have transparent parts.
+        if (index > 0) context.clearRect(at.left, at.top, at.width, at.height);
+        context.drawImage(bitmap, at.left, at.top, at.width, at.height);
       }
-    }
+    });
     context.restore();
+  }
+
+  /** Layers of { bitmap, at } from the bottom up, no more than are needed to cover the window. */
+  #standIns(frame, gaussians, tiles) {
+    const isPicture = this.#kind === 'picture';
+    // Until the preview for this part of the file has come, the picture stays what it was.
+    const known = isPicture && tiles.preview ? tiles.preview.gaussians : gaussians;
+    const whole = { left: frame.left, top: frame.top, ...frame.level };
+    const layers = [];
+    const levels = tiles.ofOtherLevels(frame, this.#kind, known).slice(0, STAND_IN_LEVELS);
+    for (const level of levels) {
+      const images = level.map(({ bitmap, level, region }) => ({ bitmap, at: place(frame, level, region) }));
+      const areas = images.map(({ at }) => areaInside(at, frame.window));
+      layers.unshift(images.filter((_, index) => areas[index] > 0));
+      if (areas.reduce((sum, area) => sum + area, 0) >= areaInside(whole, frame.window)) return layers;
+    }
+    if (isPicture && tiles.preview) layers.unshift([{ bitmap: tiles.preview.bitmap, at: whole }]);
+    return layers;
   }
 }

@@ -189,7 +189,7 @@ export class Tiles {
     return found;
   }
 
-  /** Kept tiles of other levels, in groups by level, that of the most similar scale last. */
+  /** Kept tiles of other levels, in groups by level, that of the most similar scale first. */
   ofOtherLevels(frame, kind, gaussians) {
     const levels = new Map();
     for (const tile of this.#kept.values()) {
@@ -199,6 +199,6 @@ export class Tiles {
       levels.get(name).push(tile);
     }
     const unlike = ([{ level }]) => Math.abs(Math.log(level.width / frame.level.width));
-    return [...levels.values()].sort((a, b) => unlike(b) - unlike(a));
+    return [...levels.values()].sort((a, b) => unlike(a) - unlike(b));
   }
 }
