@@ -9,6 +9,8 @@ import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync } from
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
+import { build } from 'esbuild';
+
 const root = dirname(fileURLToPath(import.meta.url));
 const target = join(root, 'target');
 const dist = join(root, 'dist');
@@ -30,10 +32,15 @@ function wasmBindgen() {
 
 const bindgen = wasmBindgen();
 run('cargo', 'build', '--release', '--locked', '--target', 'wasm32-unknown-unknown', '--target-dir', target);
+// The scripts beside those of wasm-bindgen, from where they are bundled.
+const scripts = join(target, 'scripts');
+rmSync(scripts, { recursive: true, force: true });
+cpSync(join(root, 'js'), scripts, { recursive: true });
+const module = join(target, 'wasm32-unknown-unknown', 'release', 'image_gip.wasm');
+run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', scripts, module);
+
 rmSync(dist, { recursive: true, force: true });
 mkdirSync(dist);
-const module = join(target, 'wasm32-unknown-unknown', 'release', 'image_gip.wasm');
-run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', dist, module);
 const wasm = join(dist, 'image_gip_bg.wasm');
 const features = ['bulk-memory', 'multivalue', 'mutable-globals', 'nontrapping-float-to-int', 'reference-types', 'sign-ext', 'simd'];
 run(
@@ -43,8 +50,22 @@ run(
   '--strip-debug',
   '--strip-producers',
   '--strip-target-features',
-  wasm,
+  join(scripts, 'image_gip_bg.wasm'),
   '--output',
   wasm,
 );
-for (const file of readdirSync(join(root, 'js'))) cpSync(join(root, 'js', file), join(dist, file));
+
+// What a page loads is few and small files. The worker is one by itself.
+await build({
+  entryPoints: ['index', 'core', 'gip-image', 'worker'].map((name) => join(scripts, `${name}.js`)),
+  outdir: dist,
+  bundle: true,
+  splitting: true,
+  format: 'esm',
+  target: 'es2022',
+  minify: true,
+  legalComments: 'none',
+});
+for (const file of readdirSync(scripts)) {
+  if (file.endsWith('.d.ts')) cpSync(join(scripts, file), join(dist, file));
+}

@@ -44,6 +44,8 @@ export class Decoder {
   render(options?: RenderOptions): { width: number; height: number; data: Uint8ClampedArray };
   /** Renders the samples as the format specifies them, bit for bit. */
   samples(options?: SampleOptions): Samples;
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  png(options?: SampleOptions): Promise<Uint8Array>;
 
   /** Frees the memory. Nothing else may be called after this. */
   close(): void;

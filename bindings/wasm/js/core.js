@@ -85,8 +85,8 @@ export class Decoder {
     for (const { gaussians, start, end } of this.#native.statistics().layers) {
       if (bytes >= end) count += gaussians;
       else if (this.header.coding === 'packed' && bytes > start) {
-        // All have the same number of bits.
-        count += Math.floor((gaussians * (bytes - start)) / (end - start));
+        // Twelve bytes before them, four after them, and all have the same number of bits.
+        count += Math.floor((gaussians * Math.max(0, bytes - start - 12)) / (end - start - 16));
       }
     }
     return count;
@@ -117,6 +117,12 @@ export class Decoder {
     if (depth !== 8 && depth !== 16) throw new RangeError(`depth is ${depth}; it must be 8 or 16`);
     const data = depth === 8 ? this.#native.render8(request) : this.#native.render16(request);
     return { width: request[4], height: request[5], color, channels: channelsOf[color], depth, data };
+  }
+
+  /** Renders a PNG file with the picture's ICC profile, which a browser then converts. */
+  async png(options = {}) {
+    const { encodePng } = await import('./png.js');
+    return encodePng(this.samples({ ...options, depth: 8 }), this.metadata.iccProfile);
   }
 
   /** Frees the memory. Nothing else may be called after this. */

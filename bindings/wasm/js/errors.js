@@ -4,23 +4,47 @@
 export class GipError extends Error {
   constructor(message, kind = 'failed', chunk = null, options = undefined) {
     super(message, options);
-    this.name = new.target.name;
     this.kind = kind;
     this.chunk = chunk;
+  }
+
+  // The names of classes change when scripts are made small.
+  get name() {
+    return 'GipError';
   }
 }
 
 /** Not a .gip file. */
-export class SignatureError extends GipError {}
+export class SignatureError extends GipError {
+  get name() {
+    return 'SignatureError';
+  }
+}
 /** The file breaks a rule of the format. */
-export class MalformedError extends GipError {}
+export class MalformedError extends GipError {
+  get name() {
+    return 'MalformedError';
+  }
+}
 /** The file requires something that this version does not have. */
-export class UnsupportedError extends GipError {}
+export class UnsupportedError extends GipError {
+  get name() {
+    return 'UnsupportedError';
+  }
+}
 /** The file ends too early. */
-export class UnexpectedEndError extends GipError {}
+export class UnexpectedEndError extends GipError {
+  get name() {
+    return 'UnexpectedEndError';
+  }
+}
 
 /** The file or the request requires more than a limit allows. */
 export class LimitError extends GipError {
+  get name() {
+    return 'LimitError';
+  }
+
   constructor(message, limit, wanted, allowed) {
     super(message, 'limit');
     this.limit = limit;
@@ -31,6 +55,10 @@ export class LimitError extends GipError {
 
 /** The file could not be fetched. `status` is that of the response; 0 if there was none. */
 export class NetworkError extends GipError {
+  get name() {
+    return 'NetworkError';
+  }
+
   constructor(message, status = 0, options = undefined) {
     super(message, 'network', null, options);
     this.status = status;

@@ -11,7 +11,7 @@ export class Host {
   }
 
   /** Calls a method of the decoder with this number. Returns the result and what to transfer. */
-  call(id, method, argument) {
+  async call(id, method, argument) {
     if (method === 'create') {
       this.#decoders.set(id, new Decoder(argument));
       return [];
@@ -26,6 +26,10 @@ export class Host {
         return [decoder.metadata];
       case 'gaussiansFor':
         return [decoder.gaussiansFor(...argument)];
+      case 'png': {
+        const file = await decoder.png(argument);
+        return [file, [file.buffer]];
+      }
       case 'gaussians': {
         const numbers = decoder.gaussians(argument);
         return [numbers, [numbers.buffer]];

@@ -64,6 +64,8 @@ interface Renderable {
   render(options?: RenderOptions & { signal?: AbortSignal }): Promise<ImageData>;
   /** Renders the samples as the format specifies them, bit for bit. */
   samples(options?: SampleOptions & { signal?: AbortSignal }): Promise<Samples>;
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  png(options?: SampleOptions & { signal?: AbortSignal }): Promise<Blob>;
 
   /** Frees the memory. Nothing else may be called after this. */
   close(): void;
@@ -97,5 +99,7 @@ export class StreamDecoder implements Renderable {
   gaussiansIn(bytes: number): Promise<number>;
   render(options?: RenderOptions & { signal?: AbortSignal }): Promise<ImageData>;
   samples(options?: SampleOptions & { signal?: AbortSignal }): Promise<Samples>;
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  png(options?: SampleOptions & { signal?: AbortSignal }): Promise<Blob>;
   close(): void;
 }

@@ -84,6 +84,11 @@ export class StreamDecoder {
     return abortable(this.#remote.call('samples', options), signal);
   }
 
+  async png({ signal, ...options } = {}) {
+    const file = await abortable(this.#remote.call('png', options), signal);
+    return new Blob([file], { type: 'image/png' });
+  }
+
   close() {
     this.#remote.close();
   }

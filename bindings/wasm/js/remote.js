@@ -48,7 +48,8 @@ class OwnThread {
   async call(id, method, argument) {
     const host = await this.#host;
     await new Promise((resolve) => setTimeout(resolve));
-    return host.call(id, method, argument)[0];
+    const [result] = await host.call(id, method, argument);
+    return result;
   }
 }
 
@@ -126,11 +127,25 @@ let lastId = 0;
 /** Frees decoders whose owners were forgotten without `close`. */
 const forgotten = new FinalizationRegistry((close) => close());
 
+/** A function that closes a decoder. It does not hold the object that is forgotten. */
+function closeOf(thread, id) {
+  return async () => {
+    try {
+      const running = await thread;
+      running.decoders -= 1;
+      await running.call(id, 'close');
+    } catch {
+      // There is no decoder then.
+    }
+  };
+}
+
 /** A decoder on one of the threads. All calls give promises, and are answered in their order. */
 export class RemoteDecoder {
   #thread;
   #id = ++lastId;
   #close;
+  #closed = false;
 
   constructor(options) {
     const id = this.#id;
@@ -140,26 +155,19 @@ export class RemoteDecoder {
       return thread;
     });
     thread.catch(() => {});
-    let open = true;
-    const close = () => {
-      if (!open) return;
-      open = false;
-      thread.then((thread) => {
-        thread.decoders -= 1;
-        return thread.call(id, 'close');
-      }).catch(() => {});
-    };
     this.#thread = thread;
-    this.#close = close;
-    forgotten.register(this, close, this);
+    this.#close = closeOf(thread, id);
+    forgotten.register(this, this.#close, this);
   }
 
   async call(method, argument) {
-    return (await this.#thread).call(this.#id, method, argument);
+    const thread = await this.#thread;
+    if (this.#closed) throw new GipError('the decoder is closed');
+    return thread.call(this.#id, method, argument);
   }
 
   close() {
-    forgotten.unregister(this);
-    this.#close();
+    this.#closed = true;
+    if (forgotten.unregister(this)) void this.#close();
   }
 }

@@ -5,9 +5,9 @@ import { Host } from './host.js';
 
 const host = new Host();
 
-self.onmessage = ({ data: { call, id, method, argument } }) => {
+self.onmessage = async ({ data: { call, id, method, argument } }) => {
   try {
-    const [result, transfer = []] = host.call(id, method, argument);
+    const [result, transfer = []] = await host.call(id, method, argument);
     self.postMessage({ call, result }, transfer);
   } catch (error) {
     self.postMessage({ call, error: pack(error) });
