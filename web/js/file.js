@@ -1,25 +1,23 @@
 // Reads a .gip file from wherever it comes, and gives it to the decoders as it arrives.
 
-import { GipError } from '../decoder/errors.js';
-import { fetchResponse, pieces } from '../decoder/source.js';
-
 const SIGNATURE = [0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a, 0x1a, 0x0a];
 
 /** Whether bytes begin as a .gip file does. */
 export const isGip = (bytes) => SIGNATURE.every((byte, index) => bytes[index] === byte);
 
 /** A file of the disk: { name, stream }. */
-export async function fromBlob(blob) {
-  return { name: blob.name ?? 'picture.gip', stream: blob.stream() };
-}
+export const fromFile = (file) => ({ name: file.name, stream: file.stream() });
 
 /** A file of the web. */
 export async function fromUrl(address, signal) {
   const url = new URL(address, location.href);
   if (!['http:', 'https:', 'blob:'].includes(url.protocol)) {
-    throw new GipError(`${url.protocol} addresses cannot be opened; use http: or https:`);
+    throw new Error(`${url.protocol} addresses cannot be opened; use http: or https:`);
   }
-  const response = await fetchResponse(url, { signal });
+  const response = await fetch(url, { signal }).catch((error) => {
+    throw signal.aborted ? error : new Error(`${url} cannot be fetched: ${error.message}`);
+  });
+  if (!response.ok) throw new Error(`${url} cannot be fetched: the server answers ${response.status}`);
   const name = decodeURIComponent(url.pathname.split('/').pop()) || url.host;
   return { name, stream: response.body };
 }
@@ -31,9 +29,15 @@ export async function fromUrl(address, signal) {
  */
 export async function decode({ stream }, pool, { signal, onProgress }) {
   let progress = { size: 0, header: null, gaussians: 0, complete: false, error: null };
+  const reader = stream.getReader();
+  const stop = () => void reader.cancel().catch(() => {});
+  signal.addEventListener('abort', stop, { once: true });
   await pool.tell('open');
   try {
-    for await (const piece of pieces(stream, signal)) {
+    while (!progress.complete) {
+      const { done, value: piece } = await reader.read();
+      signal.throwIfAborted();
+      if (done) break;
       progress.size += piece.length;
       const { header, gaussians, complete } = await pool.tell('feed', piece);
       signal.throwIfAborted();
@@ -45,6 +49,8 @@ export async function decode({ stream }, pool, { signal, onProgress }) {
     signal.throwIfAborted();
     // What arrived before the damage can still be shown.
     progress = { ...progress, ...(await pool.ask('progress')), error };
+  } finally {
+    stop();
   }
   signal.throwIfAborted();
   return progress;

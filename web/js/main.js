@@ -3,7 +3,7 @@
 import { Comparison } from './comparison.js';
 import { element } from './dom.js';
 import { listenForFiles } from './drop.js';
-import { decode, fromBlob, fromUrl, isGip } from './file.js';
+import { decode, fromFile, fromUrl, isGip } from './file.js';
 import { integer, zoom } from './format.js';
 import { GpuPainter } from './gpu-painter.js';
 import { PointerInput } from './input.js';
@@ -23,7 +23,7 @@ const comparison = new Comparison(stageElement);
 const stage = new Stage(stageElement, pool, comparison, fail);
 const scrubber = new Scrubber(pool, (gaussians) => stage.showGaussians(gaussians));
 const parameters = new URLSearchParams(location.search);
-const gpu = startGpu(parameters.get('renderer'));
+let gpu = startGpu(parameters.get('renderer'));
 let opening = new AbortController();
 
 /** Shows a message until it is dismissed or another file is opened. */
@@ -35,7 +35,10 @@ function tell(text) {
 /** The painter that uses the GPU; `null` where there is none, and when the page's address forbids it. */
 function startGpu(renderer) {
   if (renderer === 'tiles') return null;
-  const onLost = () => stage.setGpu(null);
+  const onLost = () => {
+    gpu = null;
+    stage.setGpu(null);
+  };
   const anyAdapter = renderer === 'webgpu';
   return GpuPainter.create(find('#picture-gpu'), { anyAdapter, onLost }).catch(() => null);
 }
@@ -45,14 +48,14 @@ function announce(text) {
   find('#status').textContent = text;
 }
 
-/** Opens the .gip file that a promise gives: { name, stream }. */
-async function open(find) {
+/** Opens the .gip file that a function finds: { name, stream }. */
+async function open(locate) {
   opening.abort();
   opening = new AbortController();
   const { signal } = opening;
   message.hidden = true;
   try {
-    const file = await find(signal);
+    const file = await locate(signal);
     signal.throwIfAborted();
     close();
     document.body.classList.add('loading');
@@ -107,7 +110,8 @@ async function finish({ name }, { size, header, gaussians, error }, signal) {
   scrubber.setFile({ size, gaussians, layers: about.statistics.layers });
   stage.draw();
   announce(`${name} is open.`);
-  await useGpu(header, signal);
+  // The shader knows nothing of colour profiles.
+  if (!about.metadata.iccProfile) await useGpu(header, signal);
 }
 
 /** Paints with the GPU, if there is one that can. */
@@ -124,7 +128,7 @@ async function openFiles(files) {
   const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, 8).arrayBuffer())));
   const gip = files.find((_, index) => isGip(heads[index]));
   const other = files.find((_, index) => !isGip(heads[index]));
-  if (gip) await open(() => fromBlob(gip));
+  if (gip) await open(() => fromFile(gip));
   if (other) await openOriginal(other);
 }
 

@@ -1,7 +1,5 @@
 // Workers that each have a decoder with the whole file. Calls to one worker are answered in order.
 
-import { unpack } from '../decoder/errors.js';
-
 /** Leaves one core to the page. */
 const WORKERS = Math.max(1, Math.min(4, (navigator.hardwareConcurrency ?? 2) - 1));
 
@@ -16,7 +14,7 @@ class Thread {
     this.#worker.onmessage = ({ data: { call, result, error } }) => {
       const { resolve, reject } = this.#calls.get(call);
       this.#calls.delete(call);
-      if (error) reject(unpack(error));
+      if (error) reject(new Error(error));
       else resolve(result);
     };
     this.#worker.onerror = (event) => onFailure(new Error(event.message || 'a worker cannot start'));

@@ -56,7 +56,7 @@ export class Stage {
 
   /** What renders, in words. */
   get renderer() {
-    if (this.#gpu) return `WebGPU on ${this.#gpu.name}`;
+    if (this.#gpu && !this.#gpuCanvas.hidden) return `WebGPU on ${this.#gpu.name}`;
     return `${this.#pool.size} ${this.#pool.size === 1 ? 'worker' : 'workers'}, in tiles`;
   }
 

@@ -1,7 +1,6 @@
 // Decodes the file and renders tiles of it: the other end of `pool.js`.
 
 import { Decoder, load } from '../decoder/core.js';
-import { pack } from '../decoder/errors.js';
 import { drawOutlines } from './outlines.js';
 
 const loading = load();
@@ -10,8 +9,13 @@ let decoder = null;
 let gaussians = null;
 
 const render = {
-  picture({ level, region, gaussians }) {
-    const { data, width, height } = decoder.render({ ...level, region, gaussians });
+  async picture({ level, region, gaussians }) {
+    const options = { ...level, region, gaussians };
+    if (decoder.metadata.iccProfile) {
+      // The browser converts the colours of PNG files.
+      return createImageBitmap(new Blob([await decoder.png(options)], { type: 'image/png' }));
+    }
+    const { data, width, height } = decoder.render(options);
     return createImageBitmap(new ImageData(data, width, height));
   },
   outlines({ level, region, gaussians: count, ratio }) {
@@ -41,7 +45,12 @@ const methods = {
   render: (job) => render[job.kind](job),
 };
 
-let turn = loading;
+/** What the page is told: the decoder's own errors have a kind, and are written for people. */
+function describe({ kind, message }) {
+  return kind || !decoder ? message : `the decoder failed: ${message}`;
+}
+
+let turn = Promise.resolve();
 
 self.onmessage = ({ data: { call, method, argument } }) => {
   // One after the other, although some wait for the browser.
@@ -52,7 +61,7 @@ self.onmessage = ({ data: { call, method, argument } }) => {
       const isBitmap = result instanceof ImageBitmap;
       self.postMessage({ call, result }, isBitmap ? [result] : []);
     } catch (error) {
-      self.postMessage({ call, error: pack(error) });
+      self.postMessage({ call, error: describe(error) });
     }
-  }, (error) => self.postMessage({ call, error: pack(error) }));
+  });
 };
