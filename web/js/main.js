@@ -97,11 +97,16 @@ function show({ name }, { header, gaussians }) {
   stage.showGaussians(gaussians);
 }
 
+/** What is shown of a damaged file. */
+function keptOf(header, gaussians) {
+  if (gaussians === 0) return 'Only the base colour can be shown.';
+  return `What is shown came before that: ${integer(gaussians)} of ${integer(header.gaussians)} Gaussians.`;
+}
+
 /** What needs the whole file, or what there is of it. */
 async function finish({ name }, { size, header, gaussians, error }, signal) {
   if (error) {
-    const kept = header ? ` What is shown came before that: ${integer(gaussians)} of ${integer(header.gaussians)} Gaussians.` : '';
-    tell(`${name}: ${error.message}.${kept}`);
+    tell(`${name}: ${error.message}.${header ? ` ${keptOf(header, gaussians)}` : ''}`);
   }
   if (!header) return;
   const about = await pool.ask('about');

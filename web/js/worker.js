@@ -3,6 +3,9 @@
 import { Decoder, load } from '../decoder/core.js';
 import { drawOutlines } from './outlines.js';
 
+/** Most kernel evaluations of a tile: one of a hostile file could take minutes otherwise. */
+const MOST_WORK = 2 ** 30;
+
 const loading = load();
 let decoder = null;
 /** The Gaussians for the outlines, when they were last needed. */
@@ -32,7 +35,7 @@ const render = {
 const methods = {
   open() {
     decoder?.close();
-    decoder = new Decoder({ statistics: true });
+    decoder = new Decoder({ statistics: true, limits: { work: MOST_WORK } });
     gaussians = null;
   },
   feed: (bytes) => decoder.feed(bytes),
