@@ -21,14 +21,13 @@ const contents = {
   'shader/render.wgsl': join(here, '..', 'gpu', 'src', 'render.wgsl'),
 };
 
-/** Builds the site, and returns its folder. */
-export function build() {
+/** Builds the site in a folder, and returns that. */
+export function build(site = join(here, 'dist')) {
   if (!existsSync(join(wasm, 'dist', 'image_gip_bg.wasm'))) {
     const run = (...args) => execFileSync('npm', args, { cwd: wasm, stdio: 'inherit' });
     run('ci');
     run('run', 'build');
   }
-  const site = join(here, 'dist');
   rmSync(site, { recursive: true, force: true });
   for (const [place, source] of Object.entries(contents)) {
     mkdirSync(dirname(join(site, place)), { recursive: true });

@@ -34,8 +34,8 @@ export async function serve(site, { port = 0, routes = {} } = {}) {
     try {
       const content = await readFile(file);
       // A new build is seen at once.
-      const headers = { 'Content-Type': types[extname(file)] ?? 'application/octet-stream', 'Cache-Control': 'no-cache' };
-      response.writeHead(200, headers).end(content);
+      const type = types[extname(file)] ?? 'application/octet-stream';
+      response.writeHead(200, { 'Content-Type': type, 'Cache-Control': 'no-cache' }).end(content);
     } catch {
       response.writeHead(404, { 'Content-Type': 'text/plain' }).end('not found');
     }

@@ -8,7 +8,10 @@ export const integer = (value) => whole.format(value);
 export const decimal = (value, digits) =>
   value.toLocaleString('en', { minimumFractionDigits: digits, maximumFractionDigits: digits });
 
-export const bytes = (count) => `${integer(count)} ${count === 1 ? 'byte' : 'bytes'}`;
+/** A number of things, whose name gets an s if there is not one. */
+export const count = (number, name) => `${integer(number)} ${name}${number === 1 ? '' : 's'}`;
+
+export const bytes = (number) => count(number, 'byte');
 
 /** A share of a whole, 0 to 1. */
 export const percent = (share) => `${decimal(share * 100, share < 0.1 ? 1 : 0)} %`;

@@ -114,8 +114,10 @@ export class GpuRenderer {
   #writeView({ level, region, gaussians, binTiles }) {
     const { header } = this.#picture;
     const view = new DataView(new ArrayBuffer(64));
-    const floats = (offset, values) => values.forEach((value, index) => view.setFloat32(offset + 4 * index, value, true));
-    const integers = (offset, values) => values.forEach((value, index) => view.setUint32(offset + 4 * index, value, true));
+    const floats = (offset, values) =>
+      values.forEach((value, index) => view.setFloat32(offset + 4 * index, value, true));
+    const integers = (offset, values) =>
+      values.forEach((value, index) => view.setUint32(offset + 4 * index, value, true));
     floats(0, [level.width / header.width, level.height / header.height, region.x, region.y]);
     integers(16, [region.width, region.height, gaussians, binTiles]);
     floats(32, header.baseColor.map((value) => value / 65535));

@@ -3,9 +3,11 @@
 /** How far arrows move, in CSS pixels. */
 const STEP = 90;
 
+const directions = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
 /** Keys, and what they do; the help shows this list. */
 export const KEYS = [
-  { keys: ['ArrowLeft', 'ArrowRight', 'ArrowUp', 'ArrowDown'], label: '← → ↑ ↓', does: 'move the picture (with Shift: further)' },
+  { keys: Object.keys(directions), label: '← → ↑ ↓', does: 'move the picture (with Shift: further)' },
   { keys: ['+', '='], label: '+', does: 'zoom in', action: 'zoomIn' },
   { keys: ['-', '_'], label: '−', does: 'zoom out', action: 'zoomOut' },
   { keys: ['0'], label: '0', does: 'the whole picture', action: 'fit' },
@@ -20,15 +22,17 @@ export const KEYS = [
   { keys: ['?'], label: '?', does: 'this help', action: 'help' },
 ];
 
-const directions = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+/** Whether a control has the focus that uses the key itself. */
+function isOfControl({ key, target }) {
+  if (target.closest('input')) return /^(Arrow|Page|Home|End)/.test(key);
+  return key === ' ' && target.closest('button, summary') !== null;
+}
 
 export function listenToKeys(stage, actions) {
   const byKey = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action])));
   addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || document.querySelector('dialog[open]')) return;
-    // Controls keep the keys that they know.
-    if (event.target.closest('input, select')) return;
-    if (event.key === ' ' && event.target.closest('button, summary')) return;
+    if (isOfControl(event)) return;
     const direction = directions[event.key];
     if (direction && stage.hasPicture) {
       const step = STEP * (event.shiftKey ? 4 : 1);

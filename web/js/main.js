@@ -146,6 +146,11 @@ async function openOriginal(file) {
     tell(`${file.name} is not a .gip file. Open a .gip first; its original can then be dropped to compare both.`);
   } else {
     message.hidden = true;
+    const { width, height } = stage.view.picture;
+    // More than a pixel of rounding.
+    if (Math.abs(bitmap.width * height - bitmap.height * width) > Math.max(width, height)) {
+      tell(`${file.name} has other proportions than this picture, and is shown stretched.`);
+    }
     comparison.setOriginal(bitmap);
     setComparing(true);
   }

@@ -1,7 +1,7 @@
 // The panel: what the file has, and what its bytes are spent on.
 
 import { element } from './dom.js';
-import { bytes, decimal, integer, percent } from './format.js';
+import { bytes, count, decimal, integer, percent } from './format.js';
 
 const CHUNKS = {
   GHDR: 'header',
@@ -61,7 +61,7 @@ function picture({ name, size, header }) {
     ['Picture', `${integer(header.width)} × ${integer(header.height)} pixels`],
     ['Rate', `${decimal((size * 8) / pixels, 3)} bits per pixel`],
     ['Colour', `${COLORS[header.color] ?? header.color}, ${header.depth} bits`],
-    ['Gaussians', `${integer(header.gaussians)} in ${integer(header.layers)} ${header.layers === 1 ? 'layer' : 'layers'}`],
+    ['Gaussians', `${integer(header.gaussians)} in ${count(header.layers, 'layer')}`],
     ['Coding', header.coding],
     ['Kernel', KERNELS[header.kernel] ?? header.kernel],
     ['Cut-off', `q = ${decimal(header.cutoff, header.cutoff % 1 ? 2 : 0)}`],
@@ -74,15 +74,15 @@ function picture({ name, size, header }) {
 /** Bits by attribute, if there are Gaussians. */
 function attributes({ attributeBits }, arrived) {
   const bits = Object.entries(attributeBits ?? {});
-  const total = bits.reduce((sum, [, count]) => sum + count, 0);
+  const total = bits.reduce((sum, [, number]) => sum + number, 0);
   if (total === 0) return null;
   const names = { position: 'position', precision: 'precision', shape: 'shape', color: 'colour' };
   return bars(
     `Bits per Gaussian: ${decimal(total / arrived, 2)}`,
-    bits.filter(([, count]) => count > 0).map(([name, count]) => ({
+    bits.filter(([, number]) => number > 0).map(([name, number]) => ({
       name: names[name],
-      value: decimal(count / arrived, 2),
-      share: count / total,
+      value: decimal(number / arrived, 2),
+      share: number / total,
     })),
   );
 }
@@ -114,8 +114,8 @@ function metadata({ iccProfile, exif, xmp, texts }) {
 /** Fills the panel. `about` has `metadata` and `statistics`; `arrived` counts Gaussians. */
 export function showPanel(panel, { name, size, header, about, arrived }) {
   const { statistics } = about;
-  const chunks = statistics.chunks.map(({ type, count, bytes: length }) => ({
-    name: count > 1 ? `${type} × ${integer(count)}` : type,
+  const chunks = statistics.chunks.map(({ type, count: times, bytes: length }) => ({
+    name: times > 1 ? `${type} × ${integer(times)}` : type,
     note: CHUNKS[type] ?? '',
     value: integer(length),
     share: length / size,

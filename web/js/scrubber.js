@@ -1,7 +1,7 @@
 // The slider over the bytes of the file.
 
 import { element } from './dom.js';
-import { bytes, integer } from './format.js';
+import { bytes, count, integer } from './format.js';
 
 /** How long the whole file plays, in milliseconds. */
 const DURATION = 5000;
@@ -66,7 +66,7 @@ export class Scrubber {
     const { size, layers } = this.#file;
     const whole = layers.filter(({ end }) => end <= this.#value).length;
     const share = this.#value === size ? bytes(size) : `${integer(this.#value)} of ${bytes(size)}`;
-    const counts = `${integer(gaussians)} Gaussians · ${whole} of ${layers.length} ${layers.length === 1 ? 'layer' : 'layers'}`;
+    const counts = `${count(gaussians, 'Gaussian')} · ${whole} of ${count(layers.length, 'layer')}`;
     this.#output.replaceChildren(element('b', {}, share), element('span', {}, counts));
     this.#slider.setAttribute('aria-valuetext', `${share}, ${counts}`);
     this.#slider.style.setProperty('--share', this.#value / size);

@@ -7,7 +7,7 @@ const TILE = 256;
 /** Longest side in pixels of the preview: the whole picture, which stands in for missing tiles. */
 const PREVIEW = 512;
 /** Tiles are kept for so many windows. */
-const KEPT_WINDOWS = 6;
+const KEPT_WINDOWS = 4;
 /** The scale must have rested for so many milliseconds before tiles are rendered for it. */
 const REST = 70;
 

@@ -5,7 +5,9 @@ import { test } from 'node:test';
 
 import { View, visibleRegion } from '../js/view.js';
 
-const windowOf = (width, height, ratio) => ({ width, height, ratio, device: { width: width * ratio, height: height * ratio } });
+function windowOf(width, height, ratio) {
+  return { width, height, ratio, device: { width: width * ratio, height: height * ratio } };
+}
 
 function viewOf(picture, window = windowOf(800, 600, 2)) {
   const view = new View();

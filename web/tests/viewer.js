@@ -1,6 +1,8 @@
 // What the tests of the viewer share: a browser on the built page, and pictures.
 
-import { readFile } from 'node:fs/promises';
+import { mkdtemp, readFile, rm } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 
 import { launch } from '../../bindings/wasm/tests/browser.js';
 import { build } from '../build.js';
@@ -19,7 +21,9 @@ export const sampleBytes = () => readFile(new URL('../sample/sumac.gip', import.
 
 /** Starts a server and a browser. */
 export async function start({ routes = {}, flags = [] } = {}) {
-  const server = await serve(build(), { routes });
+  // A folder of its own: other tests run beside this one.
+  const site = await mkdtemp(join(tmpdir(), 'gip-viewer-'));
+  const server = await serve(build(site), { routes });
   const browser = await launch(...flags);
   return {
     browser,
@@ -27,6 +31,7 @@ export async function start({ routes = {}, flags = [] } = {}) {
     async stop() {
       await browser.close();
       await server.close();
+      await rm(site, { recursive: true });
     },
   };
 }

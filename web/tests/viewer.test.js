@@ -3,7 +3,8 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { difference, drop, missing, openViewer, sampleBytes, screenshot, settled, start, vectorBytes, viewOf } from './viewer.js';
+import { difference, drop, missing, openViewer, sampleBytes, screenshot } from './viewer.js';
+import { settled, start, vectorBytes, viewOf } from './viewer.js';
 
 const SAMPLE = { width: 576, height: 576 };
 
@@ -58,7 +59,8 @@ onPage('a file by drop replaces the one before', {}, async (page) => {
   await drop(page, { name: 'vector.gip', bytes });
   await page.waitForFunction(() => document.title.startsWith('vector.gip'));
   await settled(page);
-  const [width, height] = (await page.locator('#panel').innerText()).match(/(\d+) × (\d+) pixels/).slice(1).map(Number);
+  const panel = await page.locator('#panel').innerText();
+  const [width, height] = panel.match(/(\d+) × (\d+) pixels/).slice(1).map(Number);
   await assertShows(page, await viewOf(page, { width, height }), bytes);
 });
 
@@ -158,6 +160,11 @@ onPage('the slider shows what the first bytes give', {}, async (page) => {
   await page.waitForFunction(() => document.querySelector('#shown').textContent.includes('4 of 4 layers'));
   await settled(page);
   await assertShows(page, view, sample);
+  // The slider has the focus, but only its own keys.
+  await page.keyboard.press('o');
+  assert.ok(await page.locator('#outlines').isVisible());
+  await page.keyboard.press('Home');
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('0 of 26,694'));
 });
 
 onPage('the file plays from its first byte', {}, async (page) => {
@@ -226,7 +233,8 @@ onPage('the original is on the left of the divider', {}, async (page) => {
 onPage('damaged and other files give a message', { path: '/' }, async (page) => {
   const message = page.locator('#message p');
   const says = async (pattern) => {
-    await page.waitForFunction((source) => new RegExp(source).test(document.querySelector('#message p').textContent), pattern.source);
+    const isSaid = (source) => new RegExp(source).test(document.querySelector('#message p').textContent);
+    await page.waitForFunction(isSaid, pattern.source);
     assert.ok(await message.isVisible());
   };
   await drop(page, await flat(page, '#00ff00'));
