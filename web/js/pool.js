@@ -17,7 +17,12 @@ class Thread {
       if (error) reject(new Error(error));
       else resolve(result);
     };
-    this.#worker.onerror = (event) => onFailure(new Error(event.message || 'a worker cannot start'));
+    this.#worker.onerror = (event) => {
+      const error = new Error(event.message || 'The workers that render the picture cannot start.');
+      for (const { reject } of this.#calls.values()) reject(error);
+      this.#calls.clear();
+      onFailure(error);
+    };
   }
 
   call(method, argument) {

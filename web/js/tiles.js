@@ -57,6 +57,9 @@ export class Tiles {
     this.#queue = [];
     this.#running.clear();
     this.#failed.clear();
+    this.#level = '';
+    clearTimeout(this.#timer);
+    this.#timer = 0;
   }
 
   /** Whether nothing is missing, as far as was asked for. */
