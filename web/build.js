@@ -24,6 +24,7 @@ const contents = {
 /** Builds the site in a folder, and returns that. */
 export function build(site = join(here, 'dist')) {
   if (!existsSync(join(wasm, 'dist', 'image_gip_bg.wasm'))) {
+    console.log('Building the decoder first, which takes some minutes.');
     const run = (...args) => execFileSync('npm', args, { cwd: wasm, stdio: 'inherit' });
     run('ci');
     run('run', 'build');
