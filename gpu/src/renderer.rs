@@ -17,9 +17,10 @@ const PREPARE: u32 = 256;
 /// The default of [`GpuRenderer::with_max_work`].
 const MAX_WORK: u64 = 1 << 34;
 
-/// Renders pictures on a GPU: the compute shader [`SHADER`](crate::SHADER) and its pipelines on one device.
+/// Renders pictures on a GPU: the compute shader [`SHADER`](crate::SHADER) and its pipelines on one
+/// device.
 ///
-/// Cheap calls only submit work; they do not wait for the GPU.
+/// Calls submit work, and only [`GpuRenderer::wait`] and [`GpuRenderer::read`] wait for it.
 #[derive(Debug)]
 pub struct GpuRenderer {
     device: wgpu::Device,
@@ -67,7 +68,7 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// [`RenderError::DeviceLimit`] when a buffer would be larger than the device allows: with the
-    /// default limits of devices, from 2.7 million Gaussians on. [`RenderError::Device`] when it has
+    /// default limits of devices, from 2.8 million Gaussians on. [`RenderError::Device`] when it has
     /// no memory left.
     pub fn upload(&self, picture: &Picture<'_>) -> Result<GpuPicture, RenderError> {
         let workgroups = picture.gaussians().len().div_ceil(PREPARE as usize) as u64;
