@@ -5,11 +5,10 @@ import { readFileSync } from 'node:fs';
 import { before, test } from 'node:test';
 
 import { Decoder, load } from '../dist/core.js';
-import { parseIndex, resultOf } from './vectors.js';
+import { parseIndex, resultOf, unlimited } from './vectors.js';
 
 const vectors = new URL('../../../spec/vectors/', import.meta.url);
 const read = (file) => new Uint8Array(readFileSync(new URL(file, vectors)));
-const unlimited = { pixels: 2 ** 40, outputPixels: 2 ** 40, gaussians: 2 ** 32, memory: 2 ** 40, work: 2 ** 60 };
 
 before(() => load(readFileSync(new URL('../dist/image_gip_bg.wasm', import.meta.url))));
 

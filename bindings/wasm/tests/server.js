@@ -24,11 +24,13 @@ export async function serve(routes = {}) {
       await routes[path](request, response);
       return;
     }
+    if (path === '/favicon.ico') return void response.writeHead(204).end();
     const safe = normalize(path);
     const file = safe.startsWith('/vectors/') ? join(vectors, safe.slice(9)) : join(root, safe);
     try {
       const content = await readFile(file);
-      response.writeHead(200, { 'Content-Type': types[extname(file)] ?? 'text/plain' });
+      const type = types[extname(file)] ?? 'text/plain';
+      response.writeHead(200, { 'Content-Type': type, 'Access-Control-Allow-Origin': '*' });
       response.end(content);
     } catch {
       response.writeHead(404).end();
@@ -45,10 +47,3 @@ export async function serve(routes = {}) {
   };
 }
 
-/** A route that answers with an HTML page. */
-export function page(body, headers = {}) {
-  return (_, response) => {
-    response.writeHead(200, { 'Content-Type': types['.html'], ...headers });
-    response.end(`<!doctype html><html lang="en"><title>test</title>${body}`);
-  };
-}

@@ -13,6 +13,15 @@ function crc32(bytes) {
   return ((crc ^ 0xffffffff) >>> 0).toString(16).padStart(8, '0');
 }
 
+/** The vectors are to be decoded whatever they cost. */
+export const unlimited = {
+  pixels: 2 ** 40,
+  outputPixels: 2 ** 40,
+  gaussians: 2 ** 32,
+  memory: 2 ** 40,
+  work: 2 ** 60,
+};
+
 /** The lines of index.tsv. */
 export function parseIndex(text) {
   const [, ...lines] = text.trimEnd().split('\n');
