@@ -3,12 +3,12 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { before, test } from 'node:test';
-import { crc32, inflateSync } from 'node:zlib';
+import { inflateSync } from 'node:zlib';
 
 import { Decoder, load } from '../dist/core.js';
 import { GipError, LimitError, MalformedError } from '../dist/index.js';
 import { makePicture } from './picture.js';
-import { parseIndex, resultOf, unlimited } from './vectors.js';
+import { crc32, parseIndex, resultOf, unlimited } from './vectors.js';
 
 const vectors = new URL('../../../spec/vectors/', import.meta.url);
 const read = (file) => new Uint8Array(readFileSync(new URL(file, vectors)));

@@ -47,3 +47,36 @@ export async function serve(routes = {}) {
   };
 }
 
+const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/**
+ * A slow server of one file. `sent` counts the bytes that it has sent, `requests` has the ranges that
+ * were asked for. It sends `piece` bytes, and then waits for `interval` milliseconds or for `gate`.
+ */
+export function slow(bytes, { piece = 8192, interval = 5, ranges = true, gate = null } = {}) {
+  const log = { sent: 0, requests: [], open: 0 };
+  const route = async (request, response) => {
+    const range = /^bytes=(\d+)-$/.exec(request.headers.range ?? '');
+    log.requests.push(request.headers.range ?? null);
+    const start = ranges && range ? Number(range[1]) : 0;
+    const headers = { 'Content-Type': 'image/gip', ETag: '"1"', 'Cache-Control': 'no-store' };
+    if (ranges && range) {
+      headers['Content-Range'] = `bytes ${start}-${bytes.length - 1}/${bytes.length}`;
+    }
+    response.writeHead(ranges && range ? 206 : 200, headers);
+    log.open += 1;
+    let closed = false;
+    const end = new Promise((resolve) => response.on('close', resolve)).then(() => {
+      closed = true;
+      log.open -= 1;
+    });
+    for (let at = start; at < bytes.length && !closed; at += piece) {
+      const part = bytes.subarray(at, at + piece);
+      log.sent += part.length;
+      await Promise.race([new Promise((resolve) => response.write(part, resolve)), end]);
+      await (gate?.(log.sent) ?? pause(interval));
+    }
+    response.end();
+  };
+  return { route, log };
+}
