@@ -1,7 +1,8 @@
 // What the package costs and how fast it is. Not a test: prints figures.
 //
 //     npm run build && npm install --no-save sharp
-//     cargo build --profile native --example native && node benchmarks/run.mjs [FOLDER] [COUNT]
+//     cargo build --release --manifest-path benchmarks/Cargo.toml
+//     node benchmarks/run.mjs [FOLDER] [COUNT]
 //
 // FOLDER has pictures, by default ../../shared/data/kodak; the first COUNT (6) of them are encoded at 0.5
 // bits per pixel by the tool `gip` (the variable GIP, or ../../target/release/gip), and as WebP and AVIF
@@ -63,7 +64,7 @@ async function ofSize(name, bytes, encoded) {
 
 /** A native decoder of a file on one thread: a function that gives milliseconds. */
 function nativeDecoder(file) {
-  const program = spawn(join(root, 'target/native/examples/native'), [file]);
+  const program = spawn(join(root, 'benchmarks/target/release/native'), [file]);
   const lines = createInterface({ input: program.stdout })[Symbol.asyncIterator]();
   return {
     async time() {

@@ -58,6 +58,7 @@ export class Decoder {
 
   /** Takes the next bytes of the file. Bytes after its end are ignored. */
   feed(bytes) {
+    if (!(bytes instanceof Uint8Array)) throw new TypeError('the bytes must be a Uint8Array');
     this.#native.feed(bytes);
     return this.progress;
   }

@@ -89,6 +89,7 @@ test('errors have a class, a kind and a chunk', async () => {
         region: await outcome(gip.decode(bytes, { region: { x: 90, y: 0, width: 7, height: 1 } })),
         width: await outcome(gip.decode(bytes, { width: 1.5 })),
         source: await outcome(gip.decode(12)),
+        bytes: await outcome(new gip.StreamDecoder().feed(new ArrayBuffer(8))),
         closed: await outcome(closed.render()),
       };
     },
@@ -107,6 +108,7 @@ test('errors have a class, a kind and a chunk', async () => {
     region: ['RangeError', null, null, true],
     width: ['RangeError', null, null, true],
     source: ['TypeError', null, null, true],
+    bytes: ['TypeError', null, null, true],
     closed: ['GipError', 'failed', null, true],
   });
 });
