@@ -25,7 +25,9 @@ function wasmBindgen() {
   const program = join(folder, 'bin', 'wasm-bindgen');
   if (!existsSync(program)) {
     const place = ['--root', folder, '--target-dir', join(target, 'tools')];
-    run('cargo', 'install', 'wasm-bindgen-cli', '--version', `=${version}`, '--bin', 'wasm-bindgen', ...place);
+    // It runs for seconds; to optimize it would take minutes.
+    const tool = ['wasm-bindgen-cli', '--version', `=${version}`, '--bin', 'wasm-bindgen', '--debug'];
+    run('cargo', 'install', '--quiet', ...tool, ...place);
   }
   return program;
 }
@@ -42,11 +44,10 @@ run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', scripts, module)
 rmSync(dist, { recursive: true, force: true });
 mkdirSync(dist);
 const wasm = join(dist, 'image_gip_bg.wasm');
-const features = ['bulk-memory', 'multivalue', 'mutable-globals', 'nontrapping-float-to-int', 'reference-types', 'sign-ext', 'simd'];
 run(
   join(root, 'node_modules', '.bin', 'wasm-opt'),
+  // The features are those that the module says it has.
   '-O3',
-  ...features.map((feature) => `--enable-${feature}`),
   '--strip-debug',
   '--strip-producers',
   '--strip-target-features',

@@ -13,6 +13,9 @@ export function load(
   source?: URL | string | Response | Promise<Response> | BufferSource | WebAssembly.Module,
 ): Promise<void>;
 
+/** The bytes that all decoders of this thread take. They are used again, but never given back. */
+export function memorySize(): number;
+
 /** Decodes bytes as they arrive, and renders what has arrived. `load` must have finished. */
 export class Decoder {
   constructor(options?: { limits?: Limits; statistics?: boolean });

@@ -5,8 +5,11 @@ import { defaultLimits } from './limits.js';
 
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
+/** The largest width and height of an output. */
+const mostSide = 2 ** 23;
 
 let loading = null;
+let memory = null;
 
 /**
  * Loads the decoder, once per thread. Without an argument it is fetched from beside this script.
@@ -16,22 +19,27 @@ export function load(source = undefined) {
     loading = null;
     throw error;
   });
-  return loading.then(() => undefined);
+  return loading.then((exports) => {
+    memory = exports.memory;
+  });
 }
 
-function integer(value, name, least) {
-  if (!Number.isInteger(value) || value < least || value > all) {
-    throw new RangeError(`${name} is ${value}; it must be an integer of at least ${least}`);
+/** The bytes that all decoders of this thread take. They are used again, but never given back. */
+export const memorySize = () => memory?.buffer.byteLength ?? 0;
+
+function integer(value, name, least, most = all) {
+  if (!Number.isInteger(value) || value < least || value > most) {
+    throw new RangeError(`${name} is ${value}; it must be an integer from ${least} to ${most}`);
   }
   return value;
 }
 
 /** The size of the whole output, with the picture's proportions where one side is missing. */
 function outputSize(header, { width, height } = {}) {
-  const other = (side, from, to) => Math.max(1, Math.round((side * to) / from));
+  const other = (side, from, to) => Math.min(mostSide, Math.max(1, Math.round((side * to) / from)));
   if (width === undefined && height === undefined) return [header.width, header.height];
-  if (width !== undefined) integer(width, 'width', 1);
-  if (height !== undefined) integer(height, 'height', 1);
+  if (width !== undefined) integer(width, 'width', 1, mostSide);
+  if (height !== undefined) integer(height, 'height', 1, mostSide);
   return [
     width ?? other(height, header.height, header.width),
     height ?? other(width, header.width, header.height),
@@ -50,6 +58,7 @@ export class Decoder {
 
   /** Takes the next bytes of the file. Bytes after its end are ignored. */
   feed(bytes) {
+    if (!(bytes instanceof Uint8Array)) throw new TypeError('the bytes must be a Uint8Array');
     this.#native.feed(bytes);
     return this.progress;
   }

@@ -75,6 +75,7 @@ const classes = {
 /** The decoder calls this. */
 export function decodeError(kind, message, chunk = null) {
   if (kind === 'request') return new RangeError(message);
+  if (kind === 'type') return new TypeError(message);
   return new (classes[kind] ?? GipError)(message, kind, chunk);
 }
 
@@ -89,6 +90,7 @@ export function pack(error) {
   if (kind === 'limit') return { kind, message, limit, wanted, allowed };
   if (error instanceof GipError) return { kind, message, chunk };
   if (error instanceof RangeError) return { kind: 'request', message };
+  if (error instanceof TypeError) return { kind: 'type', message };
   // WebAssembly traps when its memory is exhausted.
   return { kind: 'failed', message: `the decoder failed: ${message}`, chunk: null };
 }

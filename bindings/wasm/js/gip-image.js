@@ -1,5 +1,6 @@
 // The element `<gip-image>`, which lays out like `<img>` and loads what its size needs.
 
+import { ImageAttributes } from './image-attributes.js';
 import { moved, plan } from './layout.js';
 import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
@@ -12,10 +13,7 @@ const growth = 1.25;
 
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-// Where there are no elements, as in Node, the module can be imported all the same.
-const Base = globalThis.HTMLElement ?? class {};
-
-export class GipImageElement extends Base {
+export class GipImageElement extends ImageAttributes {
   static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'crossorigin'];
 
   #internals;
@@ -52,7 +50,7 @@ export class GipImageElement extends Base {
     this.#layOut();
   }
 
-  // The properties of `<img>`.
+  // What `<img>` tells of its picture.
 
   get naturalWidth() {
     return this.#header?.width ?? 0;
@@ -82,47 +80,6 @@ export class GipImageElement extends Base {
     });
   }
 
-  get src() {
-    const src = this.getAttribute('src');
-    return src ? new URL(src, document.baseURI).href : '';
-  }
-
-  set src(value) {
-    this.setAttribute('src', value);
-  }
-
-  get alt() {
-    return this.getAttribute('alt') ?? '';
-  }
-
-  set alt(value) {
-    this.setAttribute('alt', value);
-  }
-
-  get loading() {
-    return this.getAttribute('loading')?.toLowerCase() === 'lazy' ? 'lazy' : 'eager';
-  }
-
-  set loading(value) {
-    this.setAttribute('loading', value);
-  }
-
-  get width() {
-    return Math.round(contentSize(this).width);
-  }
-
-  set width(value) {
-    this.setAttribute('width', value);
-  }
-
-  get height() {
-    return Math.round(contentSize(this).height);
-  }
-
-  set height(value) {
-    this.setAttribute('height', value);
-  }
-
   // Reactions.
 
   connectedCallback() {
@@ -147,6 +104,7 @@ export class GipImageElement extends Base {
 
   disconnectedCallback() {
     unobserve(this);
+    this.#near = undefined;
     // An element that only moves in the page is connected again at once.
     queueMicrotask(() => {
       if (!this.isConnected) this.#reset();

@@ -18,12 +18,16 @@ function onResize(entries) {
 
 /** A size in pixels of the screen, which some browsers tell exactly. */
 function deviceSize(element, css, exact) {
-  if (!exact) return inDevicePixels(css);
-  const { inlineSize, blockSize } = exact;
+  const computed = inDevicePixels(css);
+  if (!exact) return computed;
   const vertical = !getComputedStyle(element).writingMode.startsWith('horizontal');
-  return vertical
-    ? { width: blockSize, height: inlineSize }
-    : { width: inlineSize, height: blockSize };
+  const [width, height] = vertical
+    ? [exact.blockSize, exact.inlineSize]
+    : [exact.inlineSize, exact.blockSize];
+  // They differ by rounding, by a zoom of CSS, which only the one has, and by an emulated density, which
+  // only the other has.
+  const side = (a, b) => (Math.abs(a - b) <= 1 ? a : Math.max(a, b));
+  return { width: side(width, computed.width), height: side(height, computed.height) };
 }
 
 /** A size in CSS pixels as one in pixels of the screen. */

@@ -5,12 +5,13 @@ import { GipError, unpack } from './errors.js';
 /** Most workers; each takes a few megabytes. */
 const mostWorkers = Math.max(1, Math.min(4, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1));
 
-/** A worker with a decoder. */
+/** A worker with decoders. */
 class WorkerThread {
   decoders = 0;
   #worker;
   #calls = new Map();
   #last = 0;
+  #ended = false;
 
   constructor(worker) {
     this.#worker = worker;
@@ -20,19 +21,24 @@ class WorkerThread {
       if (error) reject(unpack(error));
       else resolve(result);
     };
-    worker.onerror = () => {
-      threads.delete(this);
-      for (const { reject } of this.#calls.values()) reject(new GipError('the worker has ended'));
-      this.#calls.clear();
-    };
+    worker.onerror = () => this.#end();
   }
 
-  call(id, method, argument) {
-    const call = ++this.#last;
+  async call(id, method, argument) {
+    if (this.#ended) throw new GipError('the worker has ended');
+    const call = (this.#last += 1);
     return new Promise((resolve, reject) => {
-      this.#calls.set(call, { resolve, reject });
       this.#worker.postMessage({ call, id, method, argument });
+      this.#calls.set(call, { resolve, reject });
     });
+  }
+
+  #end() {
+    this.#ended = true;
+    this.#worker.terminate();
+    threads.delete(this);
+    for (const { reject } of this.#calls.values()) reject(new GipError('the worker has ended'));
+    this.#calls.clear();
   }
 }
 
@@ -80,8 +86,8 @@ const starts = [
 ];
 
 const threads = new Set();
-let starting = 0;
 let canStart = typeof Worker === 'function';
+let starting = null;
 let own = null;
 
 async function startWorker() {
@@ -89,37 +95,30 @@ async function startWorker() {
     let worker;
     try {
       worker = start();
-      return new WorkerThread(await ready(worker));
+      threads.add(new WorkerThread(await ready(worker)));
+      return;
     } catch {
       worker?.terminate();
     }
   }
-  return null;
+  canStart = false;
 }
 
 /** The thread for the next decoder: the one with the fewest. */
 async function nextThread() {
-  const idle = [...threads].reduce((a, b) => (a && a.decoders <= b.decoders ? a : b), null);
-  const mayStart = canStart && threads.size + starting < mostWorkers;
-  if (idle && (idle.decoders === 0 || !mayStart)) return idle;
-  if (mayStart) {
-    starting += 1;
-    const thread = await startWorker();
-    starting -= 1;
-    if (thread) {
-      threads.add(thread);
+  for (;;) {
+    const least = [...threads].reduce((a, b) => (a && a.decoders <= b.decoders ? a : b), null);
+    const mayStart = canStart && threads.size < mostWorkers;
+    if (least?.decoders === 0 || !mayStart) {
+      const thread = least ?? (own ??= new OwnThread());
+      thread.decoders += 1;
       return thread;
     }
-    canStart = threads.size > 0;
-    return nextThread();
+    starting ??= startWorker().finally(() => {
+      starting = null;
+    });
+    await starting;
   }
-  if (starting > 0) {
-    // Others are waiting for the first workers.
-    await new Promise((resolve) => setTimeout(resolve, 5));
-    return nextThread();
-  }
-  own ??= new OwnThread();
-  return own;
 }
 
 let lastId = 0;
@@ -150,7 +149,6 @@ export class RemoteDecoder {
   constructor(options) {
     const id = this.#id;
     const thread = nextThread().then(async (thread) => {
-      thread.decoders += 1;
       await thread.call(id, 'create', options);
       return thread;
     });

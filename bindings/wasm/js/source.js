@@ -2,11 +2,12 @@
 
 import { NetworkError } from './errors.js';
 
-/** Fetches, and makes failures `NetworkError`s. An abort stays what it is. */
-export async function fetchResponse(url, init = {}) {
+/** Fetches a URL or a Request, and makes failures `NetworkError`s. An abort stays what it is. */
+export async function fetchResponse(source, init = {}) {
+  const url = source.url ?? source;
   let response;
   try {
-    response = await fetch(url, init);
+    response = await fetch(source, init);
   } catch (error) {
     if (init.signal?.aborted) throw error;
     throw new NetworkError(`${url} cannot be fetched: ${error.message}`, 0, { cause: error });

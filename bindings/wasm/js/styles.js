@@ -36,7 +36,8 @@ function length(attribute) {
 export function layOut(own, { width, height, header, broken }) {
   const [w, h] = [length(width), length(height)];
   const rules = [];
-  if (w) rules.push(`width: ${w.css}`);
+  // A block is to be as wide as the picture, not as the page.
+  rules.push(`width: ${w?.css ?? 'max-content'}`);
   if (h) rules.push(`height: ${h.css}`);
   if (!broken) {
     const natural = header ?? { width: 0, height: 0 };

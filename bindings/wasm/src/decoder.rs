@@ -125,22 +125,24 @@ impl Decoder {
 
 impl Decoder {
     fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
-        let Some(header) = self.stream.header() else {
-            return Err(exception(&DecodeError::UnexpectedEnd { chunk: None }));
-        };
+        let Some(header) = self.stream.header() else { return Err(no_header()) };
         let numbers = request.try_into().map_err(|_| JsValue::from("eight numbers"))?;
         let request = Request::new(numbers, header);
-        if request.pixels() > self.max_output {
-            return Err(too_many_pixels(request.pixels(), self.max_output));
-        }
         // All strips together may take the work that is allowed.
         let mut limits = self.limits.clone();
         limits.max_work /= u64::from(samples::strips(&request).1.max(1));
-        let result = self.stream.set_limits(limits).and_then(|()| {
-            let picture =
-                self.stream.picture().ok_or(DecodeError::UnexpectedEnd { chunk: None })?;
-            samples::render::<T>(&picture, &request)
-        });
-        result.map_err(|error| exception(&error))
+        self.stream.set_limits(limits).map_err(|error| exception(&error))?;
+        let Some(picture) = self.stream.picture() else { return Err(no_header()) };
+        // This checks that the region is inside the output.
+        picture.output_len(&request.options()).map_err(|error| exception(&error))?;
+        if request.pixels() > self.max_output {
+            return Err(too_many_pixels(request.pixels(), self.max_output));
+        }
+        samples::render::<T>(&picture, &request).map_err(|error| exception(&error))
     }
+}
+
+/// The exception for a rendering before the header has arrived.
+fn no_header() -> JsValue {
+    exception(&DecodeError::UnexpectedEnd { chunk: None })
 }

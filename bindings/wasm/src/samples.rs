@@ -67,7 +67,6 @@ pub(crate) fn render<T: Sample>(
     picture: &Picture<'_>,
     request: &Request,
 ) -> Result<T::Array, DecodeError> {
-    // This also checks that the region is inside the output.
     let length = picture.output_len(&request.options())?;
     let out = T::allocate(length as u32);
     let (rows, _) = strips(request);

@@ -19,6 +19,8 @@ export function launch(...args) {
       '--disable-background-networking',
       '--disable-component-update',
       '--disable-sync',
+      // `measureUserAgentSpecificMemory` answers at once.
+      '--enable-blink-features=ForceEagerMeasureMemory',
       ...args,
     ],
   });

@@ -24,11 +24,13 @@ export async function serve(routes = {}) {
       await routes[path](request, response);
       return;
     }
+    if (path === '/favicon.ico') return void response.writeHead(204).end();
     const safe = normalize(path);
     const file = safe.startsWith('/vectors/') ? join(vectors, safe.slice(9)) : join(root, safe);
     try {
       const content = await readFile(file);
-      response.writeHead(200, { 'Content-Type': types[extname(file)] ?? 'text/plain' });
+      const type = types[extname(file)] ?? 'text/plain';
+      response.writeHead(200, { 'Content-Type': type, 'Access-Control-Allow-Origin': '*' });
       response.end(content);
     } catch {
       response.writeHead(404).end();
@@ -45,10 +47,36 @@ export async function serve(routes = {}) {
   };
 }
 
-/** A route that answers with an HTML page. */
-export function page(body, headers = {}) {
-  return (_, response) => {
-    response.writeHead(200, { 'Content-Type': types['.html'], ...headers });
-    response.end(`<!doctype html><html lang="en"><title>test</title>${body}`);
+const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+/**
+ * A slow server of one file. `sent` counts the bytes that it has sent, `requests` has the ranges that
+ * were asked for. It sends `piece` bytes, and then waits for `interval` milliseconds or for `gate`.
+ */
+export function slow(bytes, { piece = 8192, interval = 5, ranges = true, gate = null } = {}) {
+  const log = { sent: 0, requests: [], open: 0 };
+  const route = async (request, response) => {
+    const range = /^bytes=(\d+)-$/.exec(request.headers.range ?? '');
+    log.requests.push(request.headers.range ?? null);
+    const start = ranges && range ? Number(range[1]) : 0;
+    const headers = { 'Content-Type': 'image/gip', ETag: '"1"', 'Cache-Control': 'no-store' };
+    if (ranges && range) {
+      headers['Content-Range'] = `bytes ${start}-${bytes.length - 1}/${bytes.length}`;
+    }
+    response.writeHead(ranges && range ? 206 : 200, headers);
+    log.open += 1;
+    let closed = false;
+    const end = new Promise((resolve) => response.on('close', resolve)).then(() => {
+      closed = true;
+      log.open -= 1;
+    });
+    for (let at = start; at < bytes.length && !closed; at += piece) {
+      const part = bytes.subarray(at, at + piece);
+      log.sent += part.length;
+      await Promise.race([new Promise((resolve) => response.write(part, resolve)), end]);
+      await (gate?.(log.sent) ?? pause(interval));
+    }
+    response.end();
   };
+  return { route, log };
 }

@@ -2,7 +2,8 @@
 
 import { decode, GipError, LimitError, open, StreamDecoder } from '../dist/index.js';
 import type { Header, Picture, Region, Samples, Source } from '../dist/index.js';
-import { Decoder, load } from '../dist/core.js';
+import { Decoder, load, memorySize } from '../dist/core.js';
+import type { GipImageElement } from '../dist/gip-image.js';
 
 export async function everything(source: Source, signal: AbortSignal): Promise<void> {
   const region: Region = { x: 0, y: 0, width: 8, height: 8 };
@@ -19,7 +20,12 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   await load(new URL('https://example.com/'));
   const decoder = new Decoder({ limits: { memory: 1e6 } });
   const data: Uint8ClampedArray = decoder.render({ gaussians: 3 }).data;
-  void [image, header, samples, numbers, layers, shape, complete, maybe, data];
+  const element: GipImageElement = document.createElement('gip-image');
+  element.loading = 'lazy';
+  await element.decode();
+  const png: Blob = await picture.png({ width: 10 });
+  const bytes: number = memorySize();
+  void [png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
   // @ts-expect-error: not a source
   await decode(12);
   // @ts-expect-error: there is no such colour model

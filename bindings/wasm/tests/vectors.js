@@ -7,11 +7,21 @@ const table = Uint32Array.from({ length: 256 }, (_, byte) => {
   return crc;
 });
 
-function crc32(bytes) {
+/** The CRC-32 of bytes (spec, section 4.2). */
+export function crc32(bytes) {
   let crc = 0xffffffff;
   for (const byte of bytes) crc = (crc >>> 8) ^ table[(crc ^ byte) & 0xff];
-  return ((crc ^ 0xffffffff) >>> 0).toString(16).padStart(8, '0');
+  return (crc ^ 0xffffffff) >>> 0;
 }
+
+/** The vectors are to be decoded whatever they cost. */
+export const unlimited = {
+  pixels: 2 ** 40,
+  outputPixels: 2 ** 40,
+  gaussians: 2 ** 32,
+  memory: 2 ** 40,
+  work: 2 ** 60,
+};
 
 /** The lines of index.tsv. */
 export function parseIndex(text) {
@@ -63,7 +73,8 @@ export async function resultOf(decoder, bytes, { rendering }) {
     await decoder.feed(bytes.subarray(half));
     await decoder.finish();
     if (rendering === 'error') return 'no error';
-    return crc32(bytesOf(await decoder.samples(optionsOf(rendering))));
+    const crc = crc32(bytesOf(await decoder.samples(optionsOf(rendering))));
+    return crc.toString(16).padStart(8, '0');
   } catch (error) {
     if (error.kind === undefined) throw error;
     const what = [error.kind.replace('-', ' '), error.chunk].filter(Boolean).join(' ');
