@@ -93,12 +93,13 @@ export async function screenshot(page) {
 
 /**
  * How far a screenshot is from what the decoder renders for a view: the mean difference of the
- * samples, and the share of the picture's pixels in which a sample differs by more than 16.
+ * samples, and the share of the picture's pixels in which a sample differs by more than 16. Pixels
+ * before the share `from` of the window do not count; `order` has the decoder's channel for each.
  */
-export function difference(page, shot, view, bytes, { gaussians, from = 0 } = {}) {
+export function difference(page, shot, view, bytes, { gaussians, from = 0, order = [0, 1, 2] } = {}) {
   const file = bytes.toString('base64');
   return page.evaluate(
-    async ({ shot, frame, file, gaussians, from }) => {
+    async ({ shot, frame, file, gaussians, from, order }) => {
       const { Decoder, load } = await import('/decoder/core.js');
       const { visibleRegion } = await import('/js/view.js');
       const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -118,7 +119,7 @@ export function difference(page, shot, view, bytes, { gaussians, from = 0 } = {}
         if (left + ((at / 4) % region.width) < from * bitmap.width) continue;
         let most = 0;
         for (let channel = 0; channel < 3; channel += 1) {
-          const difference = Math.abs(wanted[at + channel] - found[at + channel]);
+          const difference = Math.abs(wanted[at + order[channel]] - found[at + channel]);
           sum += difference;
           most = Math.max(most, difference);
         }
@@ -127,6 +128,6 @@ export function difference(page, shot, view, bytes, { gaussians, from = 0 } = {}
       }
       return { mean: sum / 3 / count, far: far / count };
     },
-    { shot, frame: view.frame, file, gaussians, from },
+    { shot, frame: view.frame, file, gaussians, from, order },
   );
 }
