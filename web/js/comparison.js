@@ -5,7 +5,7 @@ const SQUARES_FROM = 3;
 /** Most pixels of a smaller copy. */
 const MOST_COPY = 2 ** 23;
 
-const names = (level) => `${level.width}x${level.height}`;
+const isSize = (level, { width, height }) => level.width === width && level.height === height;
 
 export class Comparison {
   #stage;
@@ -13,9 +13,9 @@ export class Comparison {
   #context;
   #divider;
   #original = null;
-  /** The original at the size of a level that is smaller: { name, bitmap }. */
+  /** The original at the size of a level that is smaller. */
   #copy = null;
-  #copying = '';
+  #isCopying = false;
   #isOn = false;
   /** The share of the window with the original. */
   #split = 0.5;
@@ -43,10 +43,9 @@ export class Comparison {
   /** Takes an `ImageBitmap`, or `null`. */
   setOriginal(bitmap) {
     this.#original?.close();
-    this.#copy?.bitmap.close();
+    this.#copy?.close();
     this.#original = bitmap;
     this.#copy = null;
-    this.#copying = '';
     if (!bitmap) this.toggle(false);
   }
 
@@ -108,24 +107,27 @@ export class Comparison {
     this.#context.drawImage(copy || this.#original, left, top, level.width, level.height);
   }
 
-  /** The original at the size of a level, as the browser reduces pictures best. */
+  /** The original at the size of a level, as the browser reduces pictures best; `null` until it is made. */
   #smaller(level) {
-    const name = names(level);
-    if (this.#copy?.name === name) return this.#copy.bitmap;
-    if (this.#copying !== name && level.width * level.height <= MOST_COPY) {
-      this.#copying = name;
-      const original = this.#original;
-      const size = { resizeWidth: level.width, resizeHeight: level.height, resizeQuality: 'high' };
-      createImageBitmap(original, size).then((bitmap) => {
-        if (original !== this.#original || this.#copying !== name) {
-          bitmap.close();
-          return;
-        }
-        this.#copy?.bitmap.close();
-        this.#copy = { name, bitmap };
-        this.onArrival();
-      }, () => {});
-    }
+    if (this.#copy && isSize(level, this.#copy)) return this.#copy;
+    if (!this.#isCopying && level.width * level.height <= MOST_COPY) this.#makeCopy(level);
     return null;
+  }
+
+  async #makeCopy(level) {
+    const original = this.#original;
+    const size = { resizeWidth: level.width, resizeHeight: level.height, resizeQuality: 'high' };
+    this.#isCopying = true;
+    const copy = await createImageBitmap(original, size).catch(() => null);
+    this.#isCopying = false;
+    if (!copy) return;
+    if (original !== this.#original) {
+      copy.close();
+      return;
+    }
+    this.#copy?.close();
+    this.#copy = copy;
+    // Perhaps of a level that is over; then the next frame asks again.
+    this.onArrival();
   }
 }

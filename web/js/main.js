@@ -86,7 +86,6 @@ function close() {
 function show({ name }, { header, gaussians }) {
   if (!header) return;
   if (!stage.hasPicture) {
-    // The stage has its size only when the page without a picture has gone.
     document.body.classList.remove('empty');
     stage.setPicture(header);
     document.title = `${name} - gip viewer`;
@@ -165,10 +164,10 @@ function setComparing(isOn) {
 
 function setPanel(shown) {
   panel.hidden = !shown;
-  document.body.classList.toggle('with-panel', shown);
   drawToggles();
 }
 
+/** The states of the buttons that stay pressed. */
 function drawToggles() {
   const states = { outlines: stage.outlines, compare: comparison.isOn, panel: !panel.hidden };
   for (const [action, isOn] of Object.entries(states)) {

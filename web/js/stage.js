@@ -1,8 +1,8 @@
 // The picture in its window: joins the view, the tiles and what paints them.
 
 import { Motion } from './motion.js';
-import { TilePainter } from './tile-painter.js';
 import { watchSize } from './size.js';
+import { TilePainter } from './tile-painter.js';
 import { Tiles } from './tiles.js';
 import { View } from './view.js';
 
@@ -22,7 +22,7 @@ export class Stage {
   #outlineCanvas;
   #comparison;
   #checkers;
-  /** { width, height, channels } of the picture; `null` without one. */
+  /** That of the file; `null` without a picture. */
   #header = null;
   /** How many Gaussians are shown. */
   #gaussians = 0;

@@ -25,6 +25,7 @@ function* tilesIn(level, region) {
   }
 }
 
+/** The tiles of the file that is open. */
 export class Tiles {
   #pool;
   #onArrival;
@@ -38,7 +39,7 @@ export class Tiles {
   #timer = 0;
   /** Counts files, since answers for an earlier file may still come. */
   #file = 0;
-  /** { gaussians, bitmap } */
+  /** The whole picture, small, with so many Gaussians: { gaussians, bitmap }. */
   preview = null;
 
   constructor(pool, { onArrival, onError }) {
