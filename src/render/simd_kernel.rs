@@ -92,7 +92,7 @@ impl Exponential {
 /// [`math::exp`](crate::math::exp), sixteen at a time.
 #[inline(always)]
 pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let y = (x * LOG2_E).max(-126.0).min(126.0);
+    let y = smaller(simd, larger(simd, x * LOG2_E, -126.0), 126.0);
     let shifted = y + ROUND_MAGIC;
     let f = y - (shifted - ROUND_MAGIC);
     let mut p = f32x16::splat(simd, EXP2_POLYNOMIAL[0]);

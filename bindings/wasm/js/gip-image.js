@@ -1,9 +1,10 @@
 // The element `<gip-image>`, which lays out like `<img>` and loads what its size needs.
 
 import { ImageAttributes } from './image-attributes.js';
-import { moved, plan } from './layout.js';
+import { plan } from './layout.js';
 import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
+import { Painting } from './painting.js';
 import { commonSheet, contentSize, layOut, ownSheet } from './styles.js';
 
 export * from './index.js';
@@ -18,8 +19,7 @@ export class GipImageElement extends ImageAttributes {
 
   #internals;
   #style = ownSheet();
-  #frame = document.createElement('div');
-  #canvas = null;
+  #painting = new Painting();
   #alternative = document.createElement('span');
 
   /** `waiting` for a reason to load, `loading`, `complete`, or `broken`. */
@@ -34,18 +34,16 @@ export class GipImageElement extends ImageAttributes {
   /** The content box in CSS pixels, and in pixels of the screen. */
   #css = { width: 0, height: 0 };
   #device = { width: 0, height: 0 };
-  /** What the canvas shows: a plan, and with how many Gaussians. */
-  #drawn = null;
-  #painting = false;
+  /** Whether something is being rendered. */
+  #busy = false;
 
   constructor() {
     super();
     this.#internals = this.attachInternals();
     const root = this.attachShadow({ mode: 'open' });
     root.adoptedStyleSheets = [commonSheet(), this.#style];
-    this.#frame.className = 'frame';
     this.#alternative.part = 'alt';
-    root.append(this.#frame);
+    root.append(this.#painting.frame);
     this.#describe();
     this.#layOut();
   }
@@ -95,7 +93,7 @@ export class GipImageElement extends ImageAttributes {
       },
       onnear: (near) => {
         this.#near = near;
-        if (!near) this.#clear();
+        if (!near) this.#painting.clear();
         this.#refresh();
       },
     });
@@ -141,16 +139,8 @@ export class GipImageElement extends ImageAttributes {
     this.#header = null;
     this.#profile = undefined;
     this.#state = 'waiting';
-    this.#clear();
-    this.shadowRoot.replaceChildren(this.#frame);
-  }
-
-  /** Frees the pixels, which can be had again. */
-  #clear() {
-    this.#canvas?.remove();
-    if (this.#canvas) this.#canvas.width = 0;
-    this.#canvas = null;
-    this.#drawn = null;
+    this.#painting.clear();
+    this.shadowRoot.replaceChildren(this.#painting.frame);
   }
 
   #measure() {
@@ -179,7 +169,9 @@ export class GipImageElement extends ImageAttributes {
       if (!url) throw new TypeError('the attribute src is empty');
     } catch (error) {
       // Listeners that are added after the attribute are to hear of it.
-      queueMicrotask(() => this.#fail(error));
+      queueMicrotask(() => {
+        if (this.#state === 'loading' && !this.#loader) this.#fail(error);
+      });
       return;
     }
     const loader = new Loader(
@@ -229,7 +221,7 @@ export class GipImageElement extends ImageAttributes {
     this.#loader = null;
     this.#header = null;
     this.#state = 'broken';
-    this.#clear();
+    this.#painting.clear();
     this.shadowRoot.replaceChildren(this.#alternative);
     this.#layOut();
     this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
@@ -250,13 +242,7 @@ export class GipImageElement extends ImageAttributes {
   /** Puts what has been drawn where it belongs now, until it is rendered anew. */
   #place() {
     const now = this.#plan();
-    if (!now || !this.#drawn) return;
-    this.#frame.style.width = `${this.#css.width}px`;
-    this.#frame.style.height = `${this.#css.height}px`;
-    const place = moved(this.#drawn.plan, now);
-    for (const side of ['left', 'top', 'width', 'height']) {
-      this.#canvas.style[side] = `${place[side]}px`;
-    }
+    if (now) this.#painting.place(this.#css, now);
   }
 
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
@@ -265,7 +251,7 @@ export class GipImageElement extends ImageAttributes {
     if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
     const plan = this.#plan();
     if (!plan) return null;
-    const [old, header] = [this.#drawn, this.#header];
+    const [old, header] = [this.#painting.drawn, this.#header];
     if (old && equal(old.plan, plan)) {
       // A file that begins again, since it was replaced, is not shown before it is better.
       const known = arrived === old.arrived && header === old.header;
@@ -275,8 +261,8 @@ export class GipImageElement extends ImageAttributes {
   }
 
   async #paint() {
-    if (this.#painting) return;
-    this.#painting = true;
+    if (this.#busy) return;
+    this.#busy = true;
     try {
       for (let next; this.#loader && (next = this.#next()); ) {
         const loader = this.#loader;
@@ -288,7 +274,7 @@ export class GipImageElement extends ImageAttributes {
         }
       }
     } finally {
-      this.#painting = false;
+      this.#busy = false;
     }
     const settled = this.#near !== undefined && this.#header && !this.#loader?.lacking;
     if (this.#state === 'loading' && settled) {
@@ -308,21 +294,8 @@ export class GipImageElement extends ImageAttributes {
   }
 
   #show(image, drawn) {
-    if (!this.#canvas) {
-      this.#canvas = document.createElement('canvas');
-      this.#canvas.part = 'picture';
-      this.#frame.append(this.#canvas);
-    }
     const wide = this.#profile && matchMedia('(color-gamut: p3)').matches;
-    const context = this.#canvas.getContext('2d', { colorSpace: wide ? 'display-p3' : 'srgb' });
-    Object.assign(this.#canvas, { width: image.width, height: image.height });
-    if (image instanceof ImageData) {
-      context.putImageData(image, 0, 0);
-    } else {
-      context.drawImage(image, 0, 0);
-      image.close();
-    }
-    this.#drawn = drawn;
+    this.#painting.show(image, drawn, wide ? 'display-p3' : 'srgb');
     this.#place();
   }
 }

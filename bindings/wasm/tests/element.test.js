@@ -170,6 +170,37 @@ for (const [name, [kind, bytes]] of Object.entries(broken)) {
   });
 }
 
+test('an empty source, and one that is no URL', async () => {
+  for (const src of ['', 'http://[']) {
+    await withPage(element(`src="${src}" alt="None"`), async (page) => {
+      await until(() => page.evaluate(() => document.querySelector('gip-image').complete === true), 'the error');
+      assert.equal(await page.evaluate(() => document.querySelector('gip-image').shadowRoot.textContent), 'None');
+    });
+  }
+});
+
+test('it can be taken out of the page and put back, and moved', async () => {
+  await withPage(element('src="/picture.gip"'), async (page) => {
+    await settled(page);
+    const widths = await page.evaluate(async () => {
+      const image = document.querySelector('gip-image');
+      const canvas = () => image.shadowRoot.querySelector('canvas')?.width;
+      const div = document.createElement('div');
+      document.body.append(div);
+      div.append(image);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      const moved = [canvas(), image.naturalWidth];
+      image.remove();
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      const removed = [canvas(), image.naturalWidth];
+      document.body.append(image);
+      await image.decode();
+      return [moved, removed, [canvas(), image.naturalWidth]];
+    });
+    assert.deepEqual(widths, [[96, 96], [undefined, 0], [96, 96]]);
+  });
+});
+
 test('a lost connection is an error too', async () => {
   harness.server.routes['/lost.gip'] = (_, response) => {
     response.writeHead(200, { 'Content-Length': picture.length });
