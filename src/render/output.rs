@@ -3,6 +3,8 @@
 #[cfg(feature = "std")]
 use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u8x16, u8x64};
 
+#[cfg(feature = "std")]
+use super::simd_kernel::{larger, smaller};
 use super::tile::PairPlane;
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT};
 use crate::color::ColorModel;
@@ -211,8 +213,8 @@ fn pixels_simd<S: Simd, T: Sample, const CHANNELS: usize>(
     for (channel, source) in sources.into_iter().enumerate() {
         if let Some(plane) = source {
             let line = f32x16::load_array_ref(simd, &planes[plane][row]);
-            let scaled = line.max(0.0).min(1.0) * T::SCALE + 0.5;
-            channels[channel] = i32x16::truncate_from(scaled);
+            let clamped = smaller(simd, larger(simd, line, 0.0), 1.0);
+            channels[channel] = i32x16::truncate_from(clamped * T::SCALE + 0.5);
         }
     }
     T::pixels(simd, channels)

@@ -6,6 +6,26 @@ use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 use crate::kernel::QUARTIC_CUTOFF;
 use crate::math::{EXP2_POLYNOMIAL, LOG2_E, ROUND_MAGIC};
 
+/// The larger of each value and a limit; the limit for NaN.
+#[inline(always)]
+pub(crate) fn larger<S: Simd>(simd: S, values: f32x16<S>, limit: f32) -> f32x16<S> {
+    // The maximum of WebAssembly passes NaN on and orders zeros, for which x86 takes eight
+    // instructions.
+    if cfg!(target_arch = "wasm32") {
+        return values.simd_gt(limit).select(values, f32x16::splat(simd, limit));
+    }
+    values.max(limit)
+}
+
+/// The smaller of each value and a limit; the limit for NaN.
+#[inline(always)]
+pub(crate) fn smaller<S: Simd>(simd: S, values: f32x16<S>, limit: f32) -> f32x16<S> {
+    if cfg!(target_arch = "wasm32") {
+        return values.simd_lt(limit).select(values, f32x16::splat(simd, limit));
+    }
+    values.min(limit)
+}
+
 /// A kernel as a type, for which the inner loop is compiled.
 pub(crate) trait Weight: Copy {
     /// The part of the weight that depends on u only, which all points of a column share.
@@ -32,8 +52,8 @@ impl Weight for Quartic {
     }
 
     #[inline(always)]
-    fn weight<S: Simd>(self, _: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S> {
-        let t = (column - v * v).max(0.0);
+    fn weight<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> f32x16<S> {
+        let t = larger(simd, column - v * v, 0.0);
         t * t
     }
 }
@@ -72,7 +92,7 @@ impl Exponential {
 /// [`math::exp`](crate::math::exp), sixteen at a time.
 #[inline(always)]
 pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
-    let y = (x * LOG2_E).max(-126.0).min(126.0);
+    let y = smaller(simd, larger(simd, x * LOG2_E, -126.0), 126.0);
     let shifted = y + ROUND_MAGIC;
     let f = y - (shifted - ROUND_MAGIC);
     let mut p = f32x16::splat(simd, EXP2_POLYNOMIAL[0]);

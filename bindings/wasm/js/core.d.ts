@@ -1,0 +1,55 @@
+/** The decoder on the calling thread: nothing is asynchronous but loading it. For workers. */
+
+import type { Gaussian9, Limits, Progress, RenderOptions, SampleOptions, Samples } from './types.js';
+import type { Header, Metadata, Statistics } from './types.js';
+
+export type * from './types.js';
+
+/**
+ * Loads the decoder, once per thread; later calls wait for the same. Without an argument,
+ * `image_gip_bg.wasm` is fetched from beside this script.
+ */
+export function load(
+  source?: URL | string | Response | Promise<Response> | BufferSource | WebAssembly.Module,
+): Promise<void>;
+
+/** The bytes that all decoders of this thread take. They are used again, but never given back. */
+export function memorySize(): number;
+
+/** Decodes bytes as they arrive, and renders what has arrived. `load` must have finished. */
+export class Decoder {
+  constructor(options?: { limits?: Limits; statistics?: boolean });
+
+  /**
+   * Takes the next bytes of the file, in pieces of any size. Bytes after the end of the file are
+   * ignored. After an error, nothing more can be fed, but what arrived before can be rendered.
+   */
+  feed(bytes: Uint8Array): Progress;
+  /** Throws an `UnexpectedEndError` if the file is not complete. */
+  finish(): void;
+
+  /** The header; `null` until it has arrived. */
+  readonly header: Header | null;
+  /** The metadata that has arrived. It is complete when the first Gaussian has arrived. */
+  readonly metadata: Metadata;
+  readonly progress: Progress;
+
+  /** How many Gaussians are enough for an output of this size in pixels; 0 without a header. */
+  gaussiansFor(width: number, height: number): number;
+  /** How many Gaussians a decoder has after the first `bytes` of the file. */
+  gaussiansIn(bytes: number): number;
+  /** The Gaussians that have arrived, or some of them, in the order of the file. */
+  gaussians(range?: { start?: number; end?: number }): Gaussian9;
+  /** Chunks, layers, bits per attribute. */
+  statistics(): Statistics;
+
+  /** Renders 8-bit RGBA samples with straight alpha. */
+  render(options?: RenderOptions): { width: number; height: number; data: Uint8ClampedArray };
+  /** Renders the samples as the format specifies them, bit for bit. */
+  samples(options?: SampleOptions): Samples;
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  png(options?: SampleOptions): Promise<Uint8Array>;
+
+  /** Frees the memory. Nothing else may be called after this. */
+  close(): void;
+}

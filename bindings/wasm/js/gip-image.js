@@ -1,0 +1,305 @@
+// The element `<gip-image>`, which lays out like `<img>` and loads what its size needs.
+
+import { ImageAttributes } from './image-attributes.js';
+import { plan } from './layout.js';
+import { Loader } from './loader.js';
+import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
+import { Painting } from './painting.js';
+import { commonSheet, contentSize, layOut, ownSheet } from './styles.js';
+
+export * from './index.js';
+
+/** While a picture arrives it is rendered anew with so many times the Gaussians. */
+const growth = 1.25;
+
+const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+
+export class GipImageElement extends ImageAttributes {
+  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'crossorigin'];
+
+  #internals;
+  #style = ownSheet();
+  #painting = new Painting();
+  #alternative = document.createElement('span');
+
+  /** `waiting` for a reason to load, `loading`, `complete`, or `broken`. */
+  #state = 'waiting';
+  #loader = null;
+  /** The header that the layout follows. */
+  #header = null;
+  /** The ICC profile; `undefined` as long as it is not known. */
+  #profile = undefined;
+  /** Whether the element is on the screen, or close to it; `undefined` as long as that is not known. */
+  #near = undefined;
+  /** The content box in CSS pixels, and in pixels of the screen. */
+  #css = { width: 0, height: 0 };
+  #device = { width: 0, height: 0 };
+  /** Whether something is being rendered. */
+  #busy = false;
+
+  constructor() {
+    super();
+    this.#internals = this.attachInternals();
+    const root = this.attachShadow({ mode: 'open' });
+    root.adoptedStyleSheets = [commonSheet(), this.#style];
+    this.#alternative.part = 'alt';
+    root.append(this.#painting.frame);
+    this.#describe();
+    this.#layOut();
+  }
+
+  // What `<img>` tells of its picture.
+
+  get naturalWidth() {
+    return this.#header?.width ?? 0;
+  }
+
+  get naturalHeight() {
+    return this.#header?.height ?? 0;
+  }
+
+  get currentSrc() {
+    return this.#loader ? this.src : '';
+  }
+
+  /** Whether nothing more is to come: the picture is shown, is broken, or there is none. */
+  get complete() {
+    return this.#state === 'complete' || this.#state === 'broken' || !this.hasAttribute('src');
+  }
+
+  /** Waits for the picture, as `load` and `error` tell of it. */
+  decode() {
+    if (this.#state === 'complete') return Promise.resolve();
+    return new Promise((resolve, reject) => {
+      const options = { once: true };
+      if (this.#state === 'broken') reject(new DOMException('the picture is broken', 'EncodingError'));
+      this.addEventListener('load', () => resolve(), options);
+      this.addEventListener('error', ({ error }) => reject(error), options);
+    });
+  }
+
+  // Reactions.
+
+  connectedCallback() {
+    observe(this, {
+      onresize: (css, device) => {
+        this.#css = css;
+        this.#device = device;
+        this.#refresh();
+      },
+      onzoom: () => {
+        this.#measure();
+        this.#refresh();
+      },
+      onnear: (near) => {
+        this.#near = near;
+        if (!near) this.#painting.clear();
+        this.#refresh();
+      },
+    });
+    this.#refresh();
+  }
+
+  disconnectedCallback() {
+    unobserve(this);
+    this.#near = undefined;
+    // An element that only moves in the page is connected again at once.
+    queueMicrotask(() => {
+      if (!this.isConnected) this.#reset();
+    });
+  }
+
+  attributeChangedCallback(name, before, after) {
+    if (name === 'src' || (name === 'crossorigin' && before !== after)) this.#reset();
+    if (name === 'alt') this.#describe();
+    this.#layOut();
+    this.#refresh();
+  }
+
+  #describe() {
+    const alt = this.getAttribute('alt');
+    this.#internals.role = alt === '' ? 'presentation' : 'img';
+    this.#internals.ariaLabel = alt;
+    this.#alternative.textContent = alt ?? '';
+  }
+
+  #layOut() {
+    layOut(this.#style, {
+      width: this.getAttribute('width'),
+      height: this.getAttribute('height'),
+      header: this.#header,
+      broken: this.#state === 'broken',
+    });
+  }
+
+  /** Forgets the picture. */
+  #reset() {
+    this.#loader?.close();
+    this.#loader = null;
+    this.#header = null;
+    this.#profile = undefined;
+    this.#state = 'waiting';
+    this.#painting.clear();
+    this.shadowRoot.replaceChildren(this.#painting.frame);
+  }
+
+  #measure() {
+    this.#css = contentSize(this);
+    this.#device = inDevicePixels(this.#css);
+  }
+
+  // Loading.
+
+  /** Does what is to be done: begins, goes on, places what is there, and renders it anew. */
+  #refresh() {
+    if (this.#state === 'waiting') this.#begin();
+    if (!this.#header || !this.#loader) return;
+    this.#place();
+    void this.#want();
+    void this.#paint();
+  }
+
+  #begin() {
+    if (!this.isConnected || !this.hasAttribute('src')) return;
+    if (this.loading === 'lazy' && !this.#near) return;
+    this.#state = 'loading';
+    let url;
+    try {
+      url = this.src;
+      if (!url) throw new TypeError('the attribute src is empty');
+    } catch (error) {
+      // Listeners that are added after the attribute are to hear of it.
+      queueMicrotask(() => {
+        if (this.#state === 'loading' && !this.#loader) this.#fail(error);
+      });
+      return;
+    }
+    const loader = new Loader(
+      url,
+      {
+        credentials: this.getAttribute('crossorigin') === 'use-credentials' ? 'include' : 'same-origin',
+        referrerPolicy: this.getAttribute('referrerpolicy') ?? '',
+        priority: this.getAttribute('fetchpriority') ?? 'auto',
+      },
+      () => this.#arrived(loader),
+      (error) => {
+        if (this.#loader === loader) this.#fail(error);
+      },
+    );
+    this.#loader = loader;
+    loader.want(0);
+  }
+
+  /** Something has arrived. */
+  async #arrived(loader) {
+    if (this.#loader !== loader || !loader.header) return;
+    if (loader.header !== this.#header) {
+      this.#header = loader.header;
+      this.#layOut();
+      this.#measure();
+    }
+    await this.#want();
+    if (this.#loader !== loader) return;
+    void this.#paint();
+    this.dispatchEvent(new ProgressEvent('progress', { loaded: loader.received }));
+  }
+
+  /** Asks for the Gaussians that the size needs. */
+  async #want() {
+    const loader = this.#loader;
+    const { width, height } = this.#plan() ?? { width: 1, height: 1 };
+    try {
+      const gaussians = await loader.gaussiansFor(width, height);
+      if (this.#loader === loader) loader.want(gaussians);
+    } catch (error) {
+      if (this.#loader === loader) this.#fail(error);
+    }
+  }
+
+  #fail(error) {
+    this.#loader?.close();
+    this.#loader = null;
+    this.#header = null;
+    this.#state = 'broken';
+    this.#painting.clear();
+    this.shadowRoot.replaceChildren(this.#alternative);
+    this.#layOut();
+    this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
+  }
+
+  // Painting.
+
+  #plan() {
+    const { objectFit, objectPosition } = getComputedStyle(this);
+    const scale = pinch();
+    const device = {
+      width: Math.round(this.#device.width * scale),
+      height: Math.round(this.#device.height * scale),
+    };
+    return plan({ css: this.#css, device, natural: this.#header, fit: objectFit, position: objectPosition });
+  }
+
+  /** Puts what has been drawn where it belongs now, until it is rendered anew. */
+  #place() {
+    const now = this.#plan();
+    if (now) this.#painting.place(this.#css, now);
+  }
+
+  /** What is to be rendered; `null` if it is there already, or nothing can be. */
+  #next() {
+    const { arrived, lacking } = this.#loader;
+    if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
+    const plan = this.#plan();
+    if (!plan) return null;
+    const [old, header] = [this.#painting.drawn, this.#header];
+    if (old && equal(old.plan, plan)) {
+      // A file that begins again, since it was replaced, is not shown before it is better.
+      const known = arrived === old.arrived && header === old.header;
+      if (lacking ? arrived < old.arrived * growth : known) return null;
+    }
+    return { plan, arrived, header };
+  }
+
+  async #paint() {
+    if (this.#busy) return;
+    this.#busy = true;
+    try {
+      for (let next; this.#loader && (next = this.#next()); ) {
+        const loader = this.#loader;
+        try {
+          const image = await this.#render(loader, next.plan);
+          if (this.#loader === loader && this.#near) this.#show(image, next);
+        } catch (error) {
+          if (this.#loader === loader) this.#fail(error);
+        }
+      }
+    } finally {
+      this.#busy = false;
+    }
+    const settled = this.#near !== undefined && this.#header && !this.#loader?.lacking;
+    if (this.#state === 'loading' && settled) {
+      this.#state = 'complete';
+      this.dispatchEvent(new Event('load'));
+    }
+  }
+
+  async #render(loader, { width, height, region }) {
+    if (this.#profile === undefined) {
+      const { iccProfile } = await loader.metadata();
+      if (this.#loader === loader) this.#profile = iccProfile;
+    }
+    if (!this.#profile) return loader.render({ width, height, region });
+    // The browser knows how to convert colours.
+    return createImageBitmap(await loader.png({ width, height, region }));
+  }
+
+  #show(image, drawn) {
+    const wide = this.#profile && matchMedia('(color-gamut: p3)').matches;
+    this.#painting.show(image, drawn, wide ? 'display-p3' : 'srgb');
+    this.#place();
+  }
+}
+
+if (globalThis.customElements && !customElements.get('gip-image')) {
+  customElements.define('gip-image', GipImageElement);
+}

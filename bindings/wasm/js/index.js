@@ -1,0 +1,121 @@
+// The package's interface for scripts. It works in a worker of its own, and never blocks the page.
+
+import { RemoteDecoder } from './remote.js';
+import { read } from './source.js';
+
+export {
+  GipError,
+  LimitError,
+  MalformedError,
+  NetworkError,
+  SignatureError,
+  UnexpectedEndError,
+  UnsupportedError,
+} from './errors.js';
+export { defaultLimits } from './limits.js';
+
+/** Rejects as soon as the signal is aborted. */
+function abortable(promise, signal) {
+  if (!signal) return promise;
+  return new Promise((resolve, reject) => {
+    const abort = () => reject(signal.reason);
+    if (signal.aborted) abort();
+    signal.addEventListener('abort', abort, { once: true });
+    promise.then(resolve, reject).finally(() => signal.removeEventListener('abort', abort));
+  });
+}
+
+/** Decodes bytes as they arrive, and renders what has arrived. */
+export class StreamDecoder {
+  #remote;
+  #progress = { header: null, gaussians: 0, complete: false };
+
+  constructor({ limits, statistics } = {}) {
+    this.#remote = new RemoteDecoder({ limits, statistics });
+  }
+
+  get header() {
+    return this.#progress.header;
+  }
+
+  get complete() {
+    return this.#progress.complete;
+  }
+
+  get arrived() {
+    return this.#progress.gaussians;
+  }
+
+  async feed(bytes) {
+    this.#progress = await this.#remote.call('feed', bytes);
+    return this.#progress;
+  }
+
+  finish() {
+    return this.#remote.call('finish');
+  }
+
+  metadata() {
+    return this.#remote.call('metadata');
+  }
+
+  statistics() {
+    return this.#remote.call('statistics');
+  }
+
+  gaussiansIn(bytes) {
+    return this.#remote.call('gaussiansIn', bytes);
+  }
+
+  gaussians({ start, end } = {}) {
+    return this.#remote.call('gaussians', { start, end });
+  }
+
+  gaussiansFor(width, height) {
+    return this.#remote.call('gaussiansFor', [width, height]);
+  }
+
+  async render({ signal, ...options } = {}) {
+    const { width, height, data } = await abortable(this.#remote.call('render', options), signal);
+    return new ImageData(data, width, height);
+  }
+
+  samples({ signal, ...options } = {}) {
+    return abortable(this.#remote.call('samples', options), signal);
+  }
+
+  async png({ signal, ...options } = {}) {
+    const file = await abortable(this.#remote.call('png', options), signal);
+    return new Blob([file], { type: 'image/png' });
+  }
+
+  close() {
+    this.#remote.close();
+  }
+}
+
+/** Reads a whole file. */
+export async function open(source, { signal, limits, statistics } = {}) {
+  const decoder = new StreamDecoder({ limits, statistics });
+  try {
+    for await (const bytes of read(source, signal)) {
+      const { complete } = await abortable(decoder.feed(bytes), signal);
+      if (complete) return decoder;
+    }
+    await abortable(decoder.finish(), signal);
+    return decoder;
+  } catch (error) {
+    decoder.close();
+    throw error;
+  }
+}
+
+/** Reads a file, and renders it once. */
+export async function decode(source, { signal, limits, ...options } = {}) {
+  const picture = await open(source, { signal, limits });
+  try {
+    return await picture.render({ ...options, signal });
+  } finally {
+    picture.close();
+  }
+}

@@ -1,0 +1,52 @@
+// The pixels of an element: a canvas that shows a region of the picture, in a frame that is its box.
+
+import { moved } from './layout.js';
+
+export class Painting {
+  frame = document.createElement('div');
+  /** What the canvas shows: the plan that was rendered, and of what; `null` for nothing. */
+  drawn = null;
+  #canvas = null;
+
+  constructor() {
+    this.frame.className = 'frame';
+  }
+
+  /** Shows an `ImageData` or an `ImageBitmap`. */
+  show(image, drawn, colorSpace) {
+    if (!this.#canvas) {
+      this.#canvas = document.createElement('canvas');
+      this.#canvas.part = 'picture';
+      this.frame.append(this.#canvas);
+    }
+    const context = this.#canvas.getContext('2d', { colorSpace });
+    Object.assign(this.#canvas, { width: image.width, height: image.height });
+    if (image instanceof ImageData) {
+      context.putImageData(image, 0, 0);
+    } else {
+      context.drawImage(image, 0, 0);
+      image.close();
+    }
+    this.drawn = drawn;
+  }
+
+  /** Puts what is shown where it belongs in a box of this size, by the plan for it. */
+  place(box, plan) {
+    if (!this.drawn) return;
+    this.frame.style.width = `${box.width}px`;
+    this.frame.style.height = `${box.height}px`;
+    const place = moved(this.drawn.plan, plan);
+    for (const side of ['left', 'top', 'width', 'height']) {
+      this.#canvas.style[side] = `${place[side]}px`;
+    }
+  }
+
+  /** Frees the pixels, which can be had again. */
+  clear() {
+    if (!this.#canvas) return;
+    this.#canvas.remove();
+    this.#canvas.width = 0;
+    this.#canvas = null;
+    this.drawn = null;
+  }
+}

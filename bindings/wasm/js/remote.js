@@ -1,0 +1,171 @@
+// Decoders in workers, or on this thread where there can be none.
+
+import { GipError, unpack } from './errors.js';
+
+/** Most workers; each takes a few megabytes. */
+const mostWorkers = Math.max(1, Math.min(4, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1));
+
+/** A worker with decoders. */
+class WorkerThread {
+  decoders = 0;
+  #worker;
+  #calls = new Map();
+  #last = 0;
+  #ended = false;
+
+  constructor(worker) {
+    this.#worker = worker;
+    worker.onmessage = ({ data: { call, result, error } }) => {
+      const { resolve, reject } = this.#calls.get(call);
+      this.#calls.delete(call);
+      if (error) reject(unpack(error));
+      else resolve(result);
+    };
+    worker.onerror = () => this.#end();
+  }
+
+  async call(id, method, argument) {
+    if (this.#ended) throw new GipError('the worker has ended');
+    const call = (this.#last += 1);
+    return new Promise((resolve, reject) => {
+      this.#worker.postMessage({ call, id, method, argument });
+      this.#calls.set(call, { resolve, reject });
+    });
+  }
+
+  #end() {
+    this.#ended = true;
+    this.#worker.terminate();
+    threads.delete(this);
+    for (const { reject } of this.#calls.values()) reject(new GipError('the worker has ended'));
+    this.#calls.clear();
+  }
+}
+
+/** This thread. Each call is a task of its own, so that the page can do other things in between. */
+class OwnThread {
+  decoders = 0;
+  #host = import('./host.js').then(async ({ Host }) => {
+    const host = new Host();
+    await host.load();
+    return host;
+  });
+
+  async call(id, method, argument) {
+    const host = await this.#host;
+    await new Promise((resolve) => setTimeout(resolve));
+    const [result] = await host.call(id, method, argument);
+    return result;
+  }
+}
+
+/** Waits until a worker has loaded its decoder. */
+function ready(worker) {
+  return new Promise((resolve, reject) => {
+    worker.onmessage = ({ data }) => {
+      if (data === 'ready') resolve(worker);
+      else reject(new GipError('a worker cannot load the decoder'));
+    };
+    worker.onerror = (event) => {
+      event.preventDefault();
+      reject(new GipError('there can be no worker'));
+    };
+  });
+}
+
+/** The ways to start a worker: a script of another origin needs one of this origin that imports it. */
+const starts = [
+  () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'image-gip' }),
+  () => {
+    const script = `import ${JSON.stringify(new URL('./worker.js', import.meta.url).href)};`;
+    const url = URL.createObjectURL(new Blob([script], { type: 'text/javascript' }));
+    const worker = new Worker(url, { type: 'module', name: 'image-gip' });
+    setTimeout(() => URL.revokeObjectURL(url), 60_000);
+    return worker;
+  },
+];
+
+const threads = new Set();
+let canStart = typeof Worker === 'function';
+let starting = null;
+let own = null;
+
+async function startWorker() {
+  for (const start of starts) {
+    let worker;
+    try {
+      worker = start();
+      threads.add(new WorkerThread(await ready(worker)));
+      return;
+    } catch {
+      worker?.terminate();
+    }
+  }
+  canStart = false;
+}
+
+/** The thread for the next decoder: the one with the fewest. */
+async function nextThread() {
+  for (;;) {
+    const least = [...threads].reduce((a, b) => (a && a.decoders <= b.decoders ? a : b), null);
+    const mayStart = canStart && threads.size < mostWorkers;
+    if (least?.decoders === 0 || !mayStart) {
+      const thread = least ?? (own ??= new OwnThread());
+      thread.decoders += 1;
+      return thread;
+    }
+    starting ??= startWorker().finally(() => {
+      starting = null;
+    });
+    await starting;
+  }
+}
+
+let lastId = 0;
+
+/** Frees decoders whose owners were forgotten without `close`. */
+const forgotten = new FinalizationRegistry((close) => close());
+
+/** A function that closes a decoder. It does not hold the object that is forgotten. */
+function closeOf(thread, id) {
+  return async () => {
+    try {
+      const running = await thread;
+      running.decoders -= 1;
+      await running.call(id, 'close');
+    } catch {
+      // There is no decoder then.
+    }
+  };
+}
+
+/** A decoder on one of the threads. All calls give promises, and are answered in their order. */
+export class RemoteDecoder {
+  #thread;
+  #id = ++lastId;
+  #close;
+  #closed = false;
+
+  constructor(options) {
+    const id = this.#id;
+    const thread = nextThread().then(async (thread) => {
+      await thread.call(id, 'create', options);
+      return thread;
+    });
+    thread.catch(() => {});
+    this.#thread = thread;
+    this.#close = closeOf(thread, id);
+    forgotten.register(this, this.#close, this);
+  }
+
+  async call(method, argument) {
+    const thread = await this.#thread;
+    if (this.#closed) throw new GipError('the decoder is closed');
+    return thread.call(this.#id, method, argument);
+  }
+
+  close() {
+    this.#closed = true;
+    if (forgotten.unregister(this)) void this.#close();
+  }
+}

@@ -1,0 +1,71 @@
+// The style sheets inside `<gip-image>`. The page's own styles come before them.
+
+/** A style sheet: unlike a `<style>`, no content security policy refuses it. */
+function sheet(text) {
+  const made = new CSSStyleSheet();
+  made.replaceSync(text);
+  return made;
+}
+
+let common = null;
+
+/** What all elements have. */
+export function commonSheet() {
+  common ??= sheet(`
+    :host { display: inline-block; }
+    :host([hidden]) { display: none; }
+    .frame { position: absolute; overflow: hidden; }
+    canvas { position: absolute; display: block; }
+  `);
+  return common;
+}
+
+/** The style sheet of one element. */
+export const ownSheet = () => sheet('');
+
+/** A length as the attributes `width` and `height` of `<img>` have it, as CSS; `null` for none. */
+function length(attribute) {
+  const match = /^\s*(\d+(?:\.\d+)?)(%?)/.exec(attribute ?? '');
+  return match && { value: Number(match[1]), css: `${match[1]}${match[2] || 'px'}`, percent: !!match[2] };
+}
+
+/**
+ * Makes the element's size that of an `<img>`: from the attributes, from the header once it has arrived,
+ * and from the alternative text if there is no picture.
+ */
+export function layOut(own, { width, height, header, broken }) {
+  const [w, h] = [length(width), length(height)];
+  const rules = [];
+  // A block is to be as wide as the picture, not as the page.
+  rules.push(`width: ${w?.css ?? 'max-content'}`);
+  if (h) rules.push(`height: ${h.css}`);
+  if (!broken) {
+    const natural = header ?? { width: 0, height: 0 };
+    // The contents are placed by hand. What would be their size is the picture's.
+    rules.push(
+      'contain: size layout paint',
+      `contain-intrinsic-size: ${natural.width}px ${natural.height}px`,
+      'min-width: 0',
+      'min-height: 0',
+    );
+    if (header) rules.push(`aspect-ratio: auto ${header.width} / ${header.height}`);
+    else if (w?.value && h?.value && !w.percent && !h.percent) {
+      rules.push(`aspect-ratio: auto ${w.value} / ${h.value}`);
+    }
+  }
+  own.replaceSync(`:host { ${rules.join('; ')} }`);
+}
+
+/** The size of an element's content box in CSS pixels. */
+export function contentSize(element) {
+  const style = getComputedStyle(element);
+  const side = (name, edges) => {
+    const outer = style.boxSizing === 'border-box' ? edges : [];
+    const size = outer.reduce((sum, edge) => sum - parseFloat(style[edge]), parseFloat(style[name]));
+    return size > 0 ? size : 0;
+  };
+  return {
+    width: side('width', ['paddingLeft', 'paddingRight', 'borderLeftWidth', 'borderRightWidth']),
+    height: side('height', ['paddingTop', 'paddingBottom', 'borderTopWidth', 'borderBottomWidth']),
+  };
+}

@@ -1,0 +1,148 @@
+//! The push decoder and its renderings.
+
+use image_gip::{DecodeError, Limits, StreamDecoder};
+use js_sys::{Float32Array, Uint8ClampedArray, Uint16Array};
+use wasm_bindgen::prelude::*;
+
+use crate::errors::{exception, too_many_pixels};
+use crate::layer_extents::LayerExtents;
+use crate::objects;
+use crate::request::Request;
+use crate::samples::{self, Sample};
+
+/// Numbers per Gaussian in [`Decoder::gaussians`].
+const GAUSSIAN_NUMBERS: usize = 9;
+
+/// Decodes bytes as they arrive, and renders what has arrived.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Decoder {
+    stream: StreamDecoder,
+    limits: Limits,
+    /// Most pixels of one rendering.
+    max_output: u64,
+    layer_extents: LayerExtents,
+}
+
+#[wasm_bindgen]
+impl Decoder {
+    /// A decoder with limits as `Limits` has them, and for the pixels of one rendering.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        statistics: bool,
+        max_pixels: f64,
+        max_output: f64,
+        max_gaussians: f64,
+        max_memory: f64,
+        max_work: f64,
+    ) -> Self {
+        let mut limits = Limits::default();
+        // These casts clamp.
+        limits.max_pixels = max_pixels as u64;
+        limits.max_gaussians = max_gaussians as u32;
+        limits.max_memory = max_memory as u64;
+        limits.max_work = max_work as u64;
+        limits.max_width = 1 << 20;
+        limits.max_height = 1 << 20;
+        let stream = StreamDecoder::new().with_limits(limits.clone());
+        let stream = if statistics { stream.with_statistics() } else { stream };
+        Self {
+            stream,
+            limits,
+            max_output: max_output as u64,
+            layer_extents: LayerExtents::default(),
+        }
+    }
+
+    /// Takes the next bytes of the file.
+    pub fn feed(&mut self, bytes: &[u8]) -> Result<(), JsValue> {
+        let accepted = self.stream.feed(bytes).map_err(|error| exception(&error))?;
+        self.layer_extents.feed(&bytes[..accepted]);
+        Ok(())
+    }
+
+    /// Fails if the file is not complete.
+    pub fn finish(&self) -> Result<(), JsValue> {
+        self.stream.finish().map_err(|error| exception(&error))
+    }
+
+    /// Whether the whole file has arrived.
+    pub fn complete(&self) -> bool {
+        self.stream.is_complete()
+    }
+
+    /// The number of Gaussians that have arrived.
+    pub fn arrived(&self) -> usize {
+        self.stream.gaussians().len()
+    }
+
+    /// The header; `undefined` until it has arrived.
+    pub fn header(&self) -> JsValue {
+        self.stream.header().map_or(JsValue::UNDEFINED, objects::header)
+    }
+
+    /// The metadata that has arrived.
+    pub fn metadata(&self) -> JsValue {
+        objects::metadata(self.stream.metadata())
+    }
+
+    /// Chunks, layers, bits and steps of what has arrived.
+    pub fn statistics(&self) -> JsValue {
+        objects::statistics(&self.stream, self.layer_extents.extents())
+    }
+
+    /// How many Gaussians are enough for an output of this size; 0 until the header has arrived.
+    #[wasm_bindgen(js_name = gaussiansFor)]
+    pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
+        self.stream.header().map_or(0, |header| header.gaussians_for(width, height))
+    }
+
+    /// The Gaussians from `start` to before `end` that have arrived: for each of them x and y of
+    /// the centre, l11, l21 and l22 of the Cholesky factor, and four amplitudes.
+    pub fn gaussians(&self, start: usize, end: usize) -> Float32Array {
+        let all = self.stream.gaussians();
+        let end = end.min(all.len());
+        let chosen = &all[start.min(end)..end];
+        let mut numbers = Vec::with_capacity(chosen.len() * GAUSSIAN_NUMBERS);
+        for gaussian in chosen {
+            numbers.extend_from_slice(&gaussian.center);
+            numbers.extend_from_slice(&gaussian.cholesky);
+            numbers.extend_from_slice(&gaussian.color);
+        }
+        Float32Array::from(numbers.as_slice())
+    }
+
+    /// Renders interleaved 8-bit samples. See [`Request::new`] for the numbers.
+    pub fn render8(&mut self, request: &[u32]) -> Result<Uint8ClampedArray, JsValue> {
+        self.render::<u8>(request)
+    }
+
+    /// Renders interleaved 16-bit samples. See [`Request::new`] for the numbers.
+    pub fn render16(&mut self, request: &[u32]) -> Result<Uint16Array, JsValue> {
+        self.render::<u16>(request)
+    }
+}
+
+impl Decoder {
+    fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
+        let Some(header) = self.stream.header() else { return Err(no_header()) };
+        let numbers = request.try_into().map_err(|_| JsValue::from("eight numbers"))?;
+        let request = Request::new(numbers, header);
+        // All strips together may take the work that is allowed.
+        let mut limits = self.limits.clone();
+        limits.max_work /= u64::from(samples::strips(&request).1.max(1));
+        self.stream.set_limits(limits).map_err(|error| exception(&error))?;
+        let Some(picture) = self.stream.picture() else { return Err(no_header()) };
+        // This checks that the region is inside the output.
+        picture.output_len(&request.options()).map_err(|error| exception(&error))?;
+        if request.pixels() > self.max_output {
+            return Err(too_many_pixels(request.pixels(), self.max_output));
+        }
+        samples::render::<T>(&picture, &request).map_err(|error| exception(&error))
+    }
+}
+
+/// The exception for a rendering before the header has arrived.
+fn no_header() -> JsValue {
+    exception(&DecodeError::UnexpectedEnd { chunk: None })
+}

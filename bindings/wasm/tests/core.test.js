@@ -1,0 +1,166 @@
+// The decoder on one thread, in Node.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { before, test } from 'node:test';
+import { inflateSync } from 'node:zlib';
+
+import { Decoder, load } from '../dist/core.js';
+import { GipError, LimitError, MalformedError } from '../dist/index.js';
+import { makePicture } from './picture.js';
+import { crc32, parseIndex, resultOf, unlimited } from './vectors.js';
+
+const vectors = new URL('../../../spec/vectors/', import.meta.url);
+const read = (file) => new Uint8Array(readFileSync(new URL(file, vectors)));
+
+before(() => load(readFileSync(new URL('../dist/image_gip_bg.wasm', import.meta.url))));
+
+test('every line of the test vectors', async () => {
+  const lines = parseIndex(readFileSync(new URL('index.tsv', vectors), 'utf8'));
+  assert.ok(lines.length > 150);
+  for (const line of lines) {
+    const found = await resultOf(new Decoder({ limits: unlimited }), read(line.file), line);
+    assert.equal(found, line.result, `${line.file}, ${line.rendering}`);
+  }
+});
+
+/** A decoder that has read a file. */
+function opened(bytes, options) {
+  const decoder = new Decoder(options);
+  decoder.feed(bytes);
+  decoder.finish();
+  return decoder;
+}
+
+test('header, metadata and statistics', () => {
+  const chunks = [
+    ['eXIf', Buffer.from('II*\0')],
+    ['tEXt', Buffer.from('Title\0A picture')],
+    ['xMPd', Buffer.from('<x/>')],
+  ];
+  const bytes = makePicture({ width: 30, height: 20, layers: [3, 4], chunks });
+  const decoder = opened(bytes, { statistics: true });
+  assert.deepEqual(decoder.header, {
+    version: 1,
+    coding: 'packed',
+    width: 30,
+    height: 20,
+    color: 'rgb',
+    channels: 3,
+    depth: 8,
+    gaussians: 7,
+    layers: 2,
+    kernel: 'quartic',
+    cutoff: 4,
+    parameterization: 'cholesky',
+    baseColor: [30000, 32000, 34000],
+  });
+  const { metadata } = decoder;
+  assert.equal(metadata.iccProfile, null);
+  assert.deepEqual([...metadata.exif], [...Buffer.from('II*\0')]);
+  assert.equal(metadata.xmp, '<x/>');
+  assert.deepEqual(metadata.texts, [{ keyword: 'Title', text: 'A picture' }]);
+  const statistics = decoder.statistics();
+  const [end] = statistics.layers.slice(-1);
+  assert.equal(end.end + 12, bytes.length, 'all but the last chunk');
+  assert.equal(statistics.chunks.reduce((sum, chunk) => sum + chunk.bytes, 8), bytes.length);
+  assert.deepEqual(statistics.attributeBits, { position: 448, precision: 0, shape: 672, color: 672 });
+  assert.equal(statistics.latticeSteps, null);
+  decoder.close();
+});
+
+test('the Gaussians are those of the file', () => {
+  const bytes = makePicture({ layers: [5] });
+  const decoder = opened(bytes);
+  const numbers = decoder.gaussians();
+  assert.equal(numbers.length, 45);
+  const at = bytes.indexOf('GAUS') + 8;
+  for (let gaussian = 0; gaussian < 5; gaussian += 1) {
+    for (let component = 0; component < 8; component += 1) {
+      const stored = bytes.readFloatLE(at + gaussian * 32 + component * 4);
+      assert.equal(numbers[gaussian * 9 + component], stored);
+    }
+    assert.equal(numbers[gaussian * 9 + 8], 0);
+  }
+  assert.deepEqual(decoder.gaussians({ start: 4, end: 100 }), numbers.slice(36));
+  decoder.close();
+});
+
+test('what a part of a file has, as a decoder of that part tells', () => {
+  for (const bytes of [makePicture({ layers: [5, 60] }), read('entropy-layers.gip')]) {
+    const whole = opened(bytes);
+    for (let length = 0; length <= bytes.length; length += 13) {
+      const part = new Decoder();
+      const { gaussians } = part.feed(bytes.subarray(0, length));
+      assert.equal(whole.gaussiansIn(length), gaussians, `${length} bytes`);
+      part.close();
+    }
+    whole.close();
+  }
+});
+
+test('an output that is rendered in strips is the same', () => {
+  const decoder = opened(makePicture({ layers: [50] }));
+  const [width, height] = [3000, 2000];
+  const { data } = decoder.render({ width, height });
+  assert.equal(data.length, width * height * 4);
+  // Rows on both sides of the border between strips.
+  const y = Math.floor(2 ** 22 / width) - 2;
+  const part = decoder.render({ width, height, region: { x: 0, y, width, height: 4 } });
+  assert.deepEqual(part.data, data.subarray(y * width * 4, (y + 4) * width * 4));
+  decoder.close();
+});
+
+test('a PNG file has the samples', async () => {
+  const decoder = opened(makePicture({ width: 200, height: 150, layers: [20] }));
+  const png = Buffer.from(await decoder.png());
+  const at = png.indexOf('IDAT');
+  const rows = inflateSync(png.subarray(at + 4, at + 4 + png.readUInt32BE(at - 4)));
+  const { data } = decoder.samples();
+  assert.equal(rows.length, 150 * 601);
+  assert.deepEqual([...rows.subarray(601 * 3 + 1, 601 * 4)], [...data.subarray(600 * 3, 600 * 4)]);
+  assert.equal(png.readUInt32BE(at + 4 + png.readUInt32BE(at - 4)), crc32(png.subarray(at, png.indexOf('IEND') - 8)));
+  decoder.close();
+});
+
+test('requests that cannot be met', () => {
+  const decoder = opened(makePicture());
+  const kinds = [
+    [{ width: 0 }, RangeError],
+    [{ width: -1 }, RangeError],
+    [{ width: 2 ** 24 }, RangeError],
+    [{ width: Number.NaN }, RangeError],
+    [{ region: { x: 0, y: 0, width: 97, height: 1 } }, RangeError],
+    [{ region: { x: 2 ** 32 - 1, y: 0, width: 2 ** 32 - 1, height: 1 } }, RangeError],
+    [{ width: 2 ** 23, height: 2 ** 23 }, LimitError],
+    [{ gaussians: 1.5 }, RangeError],
+  ];
+  for (const [options, kind] of kinds) {
+    assert.throws(() => decoder.render(options), kind, JSON.stringify(options));
+  }
+  assert.throws(() => decoder.samples({ color: 'gray' }), RangeError);
+  assert.throws(() => decoder.samples({ color: 'cmyk' }), RangeError);
+  assert.throws(() => decoder.samples({ depth: 12 }), RangeError);
+  assert.equal(decoder.render().data.length, 96 * 64 * 4, 'it can still render');
+  decoder.close();
+});
+
+test('limits', () => {
+  const bytes = makePicture();
+  const limited = (limits) => () => opened(bytes, { limits }).render();
+  assert.throws(limited({ pixels: 100 }), LimitError);
+  assert.throws(limited({ gaussians: 100 }), LimitError);
+  assert.throws(limited({ memory: 1000 }), LimitError);
+  assert.throws(limited({ work: 1000 }), LimitError);
+  assert.throws(limited({ outputPixels: 100 }), { limit: 'pixels of one rendering', wanted: 6144, allowed: 100 });
+});
+
+test('after an error there is what came before it', () => {
+  const bytes = read('xcrc-layer.gip');
+  const decoder = new Decoder();
+  assert.throws(() => decoder.feed(bytes), MalformedError);
+  assert.equal(decoder.progress.gaussians, 1);
+  assert.ok(decoder.render().data.length > 0);
+  assert.throws(() => decoder.feed(bytes), GipError);
+  decoder.close();
+});

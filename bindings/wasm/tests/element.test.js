@@ -1,0 +1,283 @@
+// `<gip-image>` while it loads.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+import { file, harness, script, settled, slow, until, withPage } from './harness.js';
+import { makePicture } from './picture.js';
+
+const picture = makePicture({ width: 96, height: 64, layers: [40, 160, 400] });
+/** So large that a small display needs a sixth of it. */
+const large = makePicture({ width: 1200, height: 800, layers: [400, 1600, 4000, 6000] });
+
+const element = (attributes) => `${script}<gip-image ${attributes}></gip-image>`;
+
+/** The size of the canvas, and the mean of its samples' differences from another picture of it. */
+const canvasOf = (page) =>
+  page.evaluate(() => {
+    const canvas = document.querySelector('gip-image').shadowRoot.querySelector('canvas');
+    if (!canvas) return null;
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    return { width: canvas.width, height: canvas.height, data: [...data] };
+  });
+
+const difference = (a, b) =>
+  a.data.reduce((sum, value, index) => sum + Math.abs(value - b.data[index]), 0) / a.data.length;
+
+test('it shows the samples of the decoder', async () => {
+  harness.server.routes['/picture.gip'] = file(picture);
+  await withPage(element('src="/picture.gip"'), async (page) => {
+    await settled(page);
+    const { width, height, data } = await page.evaluate(async () => {
+      const { decode } = await import('/dist/index.js');
+      const { width, height, data } = await decode('/picture.gip');
+      return { width, height, data: [...data] };
+    });
+    const canvas = await canvasOf(page);
+    assert.deepEqual([canvas.width, canvas.height], [width, height]);
+    assert.equal(difference(canvas, { data }), 0);
+    assert.ok(new Set(data).size > 100, 'there is a picture to compare');
+  });
+});
+
+test('the header gives the size, and pixels follow while they arrive', async () => {
+  // The gate opens as the test goes on.
+  let allowed = 200;
+  const gate = async (sent) => until(() => sent < allowed, 'the next piece');
+  const { route } = slow(picture, { piece: 100, gate });
+  harness.server.routes['/slow.gip'] = route;
+  await withPage(element('src="/slow.gip"'), async (page) => {
+    const size = () => page.evaluate(() => {
+      const { width, height } = document.querySelector('gip-image').getBoundingClientRect();
+      return [width, height];
+    });
+    await until(async () => (await size())[0] === 96, 'the size');
+    assert.deepEqual(await size(), [96, 64]);
+    assert.equal(await canvasOf(page), null);
+
+    const seen = [];
+    for (const part of [0.15, 0.5, 1]) {
+      allowed = part === 1 ? Infinity : picture.length * part;
+      await until(async () => {
+        const canvas = await canvasOf(page);
+        const last = seen.at(-1);
+        return canvas && (!last || difference(canvas, last) > 0);
+      }, 'a better picture');
+      if (part === 1) await settled(page);
+      seen.push(await canvasOf(page));
+    }
+    const [first, second] = seen.map((canvas) => difference(canvas, seen.at(-1)));
+    assert.ok(first > second && second > 0, `${first}, ${second}`);
+  });
+});
+
+test('the download stops when the size has what it needs, and goes on when it grows', async () => {
+  const { route, log } = slow(large, { piece: 4096, interval: 10 });
+  harness.server.routes['/large.gip'] = route;
+  await withPage(element('src="/large.gip" width="60"'), async (page) => {
+    await settled(page);
+    await until(() => log.open === 0, 'the end of the transfer');
+    const small = log.sent;
+    assert.ok(small < 0.35 * large.length, `${small} of ${large.length} bytes`);
+    assert.ok(small >= large.length / 6);
+
+    await page.evaluate(() => document.querySelector('gip-image').setAttribute('width', '360'));
+    await until(() => log.requests.length === 2 && log.open === 0, 'the rest');
+    const [, range] = log.requests;
+    const start = Number(/^bytes=(\d+)-$/.exec(range)[1]);
+    assert.ok(start > 0 && start <= small, 'it goes on where it was');
+    assert.ok(log.sent < 0.75 * large.length + small - start, `${log.sent} of ${large.length} bytes`);
+    await until(async () => (await canvasOf(page)).width === 360, 'a sharper picture');
+
+    // Smaller again: nothing more is fetched.
+    await page.evaluate(() => document.querySelector('gip-image').setAttribute('width', '100'));
+    await until(async () => (await canvasOf(page)).width === 100, 'a smaller picture');
+    assert.equal(log.requests.length, 2);
+  });
+});
+
+test('without ranges it begins again when it grows', async () => {
+  const { route, log } = slow(large, { piece: 16_384, interval: 10, ranges: false });
+  harness.server.routes['/whole.gip'] = route;
+  await withPage(element('src="/whole.gip" width="60"'), async (page) => {
+    await settled(page);
+    await until(() => log.open === 0, 'the end of the transfer');
+    await page.evaluate(() => document.querySelector('gip-image').setAttribute('width', '1200'));
+    const complete = () => page.evaluate(async () => {
+      const { decode } = await import('/dist/index.js');
+      const image = await decode('/large-at-once.gip');
+      const canvas = document.querySelector('gip-image').shadowRoot.querySelector('canvas');
+      if (canvas.width !== image.width) return false;
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      return data.every((value, index) => value === image.data[index]);
+    });
+    harness.server.routes['/large-at-once.gip'] = file(large);
+    await until(complete, 'the whole picture');
+    assert.equal(log.requests.length, 2);
+  });
+});
+
+test('a file that was replaced meanwhile is loaded from its beginning', async () => {
+  const other = makePicture({ width: 1200, height: 800, layers: [400, 1600, 4000, 6000], seed: 2 });
+  const [old, now] = [large, other].map((bytes) => slow(bytes, { piece: 16_384, interval: 10 }));
+  harness.server.routes['/replaced.gip'] = old.route;
+  harness.server.routes['/other.gip'] = file(other);
+  await withPage(element('src="/replaced.gip" width="60"'), async (page) => {
+    await settled(page);
+    await until(() => old.log.open === 0, 'the end of the transfer');
+    harness.server.routes['/replaced.gip'] = now.route;
+    await page.evaluate(() => document.querySelector('gip-image').setAttribute('width', '1200'));
+    await until(() => page.evaluate(async () => {
+      const { decode } = await import('/dist/index.js');
+      const image = await decode('/other.gip');
+      const canvas = document.querySelector('gip-image').shadowRoot.querySelector('canvas');
+      if (canvas?.width !== image.width) return false;
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      return data.every((value, index) => value === image.data[index]);
+    }), 'the other picture');
+  });
+});
+
+const broken = {
+  'not-a-picture.gip': ['signature', Buffer.from('<!doctype html>')],
+  'damaged.gip': ['malformed', Buffer.concat([picture.subarray(0, 3000), Buffer.alloc(picture.length - 3000)])],
+  'truncated.gip': ['unexpected-end', picture.subarray(0, picture.length / 2)],
+  'empty.gip': ['unexpected-end', Buffer.alloc(0)],
+  'missing.gip': ['network', null],
+};
+
+for (const [name, [kind, bytes]] of Object.entries(broken)) {
+  test(`${name}: the alternative text, and an error event`, async () => {
+    if (bytes) harness.server.routes[`/${name}`] = file(bytes);
+    const watch = `<script>
+      addEventListener('error', (event) => { globalThis.kind = event.error?.kind; }, true);
+    </script>`;
+    await withPage(`${watch}<p>${element(`src="/${name}" alt="A mountain"`)}`, async (page) => {
+      await settled(page);
+      assert.equal(await page.evaluate(() => globalThis.kind), kind);
+      assert.equal(await canvasOf(page), null);
+      const text = await page.evaluate(() => {
+        const image = document.querySelector('gip-image');
+        return [image.shadowRoot.textContent, image.getBoundingClientRect().width > 50, image.complete];
+      });
+      assert.deepEqual(text, ['A mountain', true, true]);
+      await assert.rejects(page.evaluate(() => document.querySelector('gip-image').decode()));
+      // Another source is another chance.
+      await page.evaluate(() => document.querySelector('gip-image').setAttribute('src', '/picture.gip'));
+      await settled(page);
+      assert.equal((await canvasOf(page)).width, 96);
+    }, { quiet: true });
+  });
+}
+
+test('an empty source, and one that is no URL', async () => {
+  for (const src of ['', 'http://[']) {
+    await withPage(element(`src="${src}" alt="None"`), async (page) => {
+      await until(() => page.evaluate(() => document.querySelector('gip-image').complete === true), 'the error');
+      assert.equal(await page.evaluate(() => document.querySelector('gip-image').shadowRoot.textContent), 'None');
+    });
+  }
+});
+
+test('it can be taken out of the page and put back, and moved', async () => {
+  await withPage(element('src="/picture.gip"'), async (page) => {
+    await settled(page);
+    const widths = await page.evaluate(async () => {
+      const image = document.querySelector('gip-image');
+      const canvas = () => image.shadowRoot.querySelector('canvas')?.width;
+      const div = document.createElement('div');
+      document.body.append(div);
+      div.append(image);
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      const moved = [canvas(), image.naturalWidth];
+      image.remove();
+      await new Promise((resolve) => setTimeout(resolve, 50));
+      const removed = [canvas(), image.naturalWidth];
+      document.body.append(image);
+      await image.decode();
+      return [moved, removed, [canvas(), image.naturalWidth]];
+    });
+    assert.deepEqual(widths, [[96, 96], [undefined, 0], [96, 96]]);
+  });
+});
+
+test('a lost connection is an error too', async () => {
+  harness.server.routes['/lost.gip'] = (_, response) => {
+    response.writeHead(200, { 'Content-Length': picture.length });
+    response.write(picture.subarray(0, 2000), () => setTimeout(() => response.destroy(), 100));
+  };
+  await withPage(element('src="/lost.gip" alt="Lost"'), async (page) => {
+    await settled(page);
+    assert.equal(await page.evaluate(() => document.querySelector('gip-image').shadowRoot.textContent), 'Lost');
+  }, { quiet: true });
+});
+
+test('it is an image with a name to those who do not see it', async () => {
+  const html = `${script}<gip-image src="/picture.gip" alt="A mountain"></gip-image>
+    <gip-image src="/picture.gip" alt=""></gip-image>`;
+  await withPage(html, async (page) => {
+    await settled(page);
+    const client = await page.context().newCDPSession(page);
+    const { nodes } = await client.send('Accessibility.getFullAXTree');
+    const images = nodes.filter(({ role }) => role?.value === 'image');
+    assert.deepEqual(images.map(({ name }) => name.value), ['A mountain']);
+  });
+});
+
+test('it is as sharp as the screen, and is rendered anew when that changes', async () => {
+  const html = element('src="/picture.gip" style="width: 60px"');
+  await withPage(html, async (page) => {
+    await settled(page);
+    const width = async () => (await canvasOf(page)).width;
+    assert.equal(await width(), 120);
+    const client = await page.context().newCDPSession(page);
+    const metrics = { width: 700, height: 500, deviceScaleFactor: 2.5, mobile: false };
+    await client.send('Emulation.setDeviceMetricsOverride', metrics);
+    await until(async () => (await width()) === 150, 'more pixels');
+    await page.evaluate(() => document.querySelector('gip-image').style.setProperty('width', '80px'));
+    await until(async () => (await width()) === 200, 'a larger picture');
+  }, { context: { deviceScaleFactor: 2 } });
+});
+
+const fits = [
+  'object-fit: contain',
+  'object-fit: cover',
+  'object-fit: none',
+  'object-fit: scale-down; object-position: 0 100%',
+  'object-fit: cover; object-position: 10px 0',
+  'padding: 7px 20px; object-fit: contain',
+  'border-radius: 30px',
+];
+
+for (const style of fits) {
+  test(`drawn like <img>: ${style}`, async () => {
+    const css = `<style>.both { width: 150px; height: 150px; ${style} }</style>`;
+    await withPage(css + element('src="/picture.gip" class="both"'), async (page) => {
+      await settled(page);
+      const other = await page.evaluate(async () => {
+        const { open } = await import('/dist/index.js');
+        const blob = await (await open('/picture.gip')).png();
+        const image = document.createElement('img');
+        image.className = 'both';
+        image.src = URL.createObjectURL(blob);
+        await image.decode();
+        document.querySelector('gip-image').after(image);
+      });
+      assert.equal(other, undefined);
+      const shots = [];
+      for (const selector of ['gip-image', 'img']) {
+        const png = (await page.locator(selector).screenshot()).toString('base64');
+        shots.push(await page.evaluate(async (png) => {
+          const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${png}`)).blob());
+          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+          context.drawImage(bitmap, 0, 0);
+          return { data: [...context.getImageData(0, 0, bitmap.width, bitmap.height).data] };
+        }, png));
+      }
+      assert.equal(shots[0].data.length, shots[1].data.length);
+      // The browser resamples, the element renders at the size.
+      const found = difference(...shots);
+      assert.ok(found < 2, `they differ by ${found}`);
+    });
+  });
+}

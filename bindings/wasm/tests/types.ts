@@ -1,0 +1,38 @@
+// Uses the package as a TypeScript program does. It is compiled, not run.
+
+import { decode, GipError, LimitError, open, StreamDecoder } from '../dist/index.js';
+import type { Header, Picture, Region, Samples, Source } from '../dist/index.js';
+import { Decoder, load, memorySize } from '../dist/core.js';
+import type { GipImageElement } from '../dist/gip-image.js';
+
+export async function everything(source: Source, signal: AbortSignal): Promise<void> {
+  const region: Region = { x: 0, y: 0, width: 8, height: 8 };
+  const image: ImageData = await decode(source, { width: 64, region, signal, limits: { work: 1e9 } });
+  const picture: Picture = await open(new Response(), { statistics: true });
+  const header: Header = picture.header;
+  const samples: Samples = await picture.samples({ color: 'rgba', depth: 16 });
+  const numbers: Float32Array = await picture.gaussians({ start: 0, end: 10 });
+  const { layers, attributeBits } = await picture.statistics();
+  const shape: number | undefined = attributeBits?.shape;
+  const stream = new StreamDecoder();
+  const { complete } = await stream.feed(new Uint8Array());
+  const maybe: Header | null = stream.header;
+  await load(new URL('https://example.com/'));
+  const decoder = new Decoder({ limits: { memory: 1e6 } });
+  const data: Uint8ClampedArray = decoder.render({ gaussians: 3 }).data;
+  const element: GipImageElement = document.createElement('gip-image');
+  element.loading = 'lazy';
+  await element.decode();
+  const png: Blob = await picture.png({ width: 10 });
+  const bytes: number = memorySize();
+  void [png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
+  // @ts-expect-error: not a source
+  await decode(12);
+  // @ts-expect-error: there is no such colour model
+  await picture.samples({ color: 'cmyk' });
+}
+
+export function chunkOf(error: unknown): string | null {
+  if (error instanceof LimitError) return `${error.limit} ${error.wanted}`;
+  return error instanceof GipError ? error.chunk : null;
+}

@@ -1,0 +1,57 @@
+// Reads a .gip file from wherever it comes, and gives it to the decoders as it arrives.
+
+const SIGNATURE = [0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a, 0x1a, 0x0a];
+
+/** Whether bytes begin as a .gip file does. */
+export const isGip = (bytes) => SIGNATURE.every((byte, index) => bytes[index] === byte);
+
+/** A file of the disk: { name, stream }. */
+export const fromFile = (file) => ({ name: file.name, stream: file.stream() });
+
+/** A file of the web. */
+export async function fromUrl(address, signal) {
+  const url = new URL(address, location.href);
+  if (!['http:', 'https:', 'blob:'].includes(url.protocol)) {
+    throw new Error(`${url.protocol} addresses cannot be opened; use http: or https:`);
+  }
+  const response = await fetch(url, { signal }).catch((error) => {
+    throw signal.aborted ? error : new Error(`${url} cannot be fetched: ${error.message}`);
+  });
+  if (!response.ok) throw new Error(`${url} cannot be fetched: the server answers ${response.status}`);
+  const name = decodeURIComponent(url.pathname.split('/').pop()) || url.host;
+  return { name, stream: response.body };
+}
+
+/**
+ * Decodes a file as it arrives. `onProgress` gets { size, header, gaussians, complete } after each
+ * piece, where `size` is that of the file so far; so does the caller in the end, with the `error` that
+ * a damaged file ends with.
+ */
+export async function decode({ stream }, pool, { signal, onProgress }) {
+  let progress = { size: 0, header: null, gaussians: 0, complete: false, error: null };
+  const reader = stream.getReader();
+  const stop = () => void reader.cancel().catch(() => {});
+  signal.addEventListener('abort', stop, { once: true });
+  await pool.tell('open');
+  try {
+    while (!progress.complete) {
+      const { done, value: piece } = await reader.read();
+      signal.throwIfAborted();
+      if (done) break;
+      progress.size += piece.length;
+      const { header, gaussians, complete } = await pool.tell('feed', piece);
+      signal.throwIfAborted();
+      progress = { ...progress, header, gaussians, complete };
+      onProgress(progress);
+    }
+    await pool.tell('finish');
+  } catch (error) {
+    signal.throwIfAborted();
+    // What arrived before the damage can still be shown.
+    progress = { ...progress, ...(await pool.ask('progress')), error };
+  } finally {
+    stop();
+  }
+  signal.throwIfAborted();
+  return progress;
+}

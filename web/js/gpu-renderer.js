@@ -1,0 +1,128 @@
+// Runs the shader of `gpu` with WebGPU: all Gaussians, anew for each frame.
+
+import { mostOverlap } from './overlap.js';
+
+/** Most evaluations of the kernel in a frame: more could stop the GPU for seconds. */
+const MOST_WORK = 2 ** 34;
+/** Width and height of a tile of the shader in pixels, and the most bins along a side. */
+const TILE = 16;
+const MOST_BINS = 16;
+/** Gaussians of a workgroup of `prepare`. */
+const PREPARE = 256;
+const KERNELS = { exponential: 0, quartic: 1 };
+
+/** The tiles and bins of a rendering, as the shader divides it. */
+function divide({ width, height }) {
+  const [columns, rows] = [Math.ceil(width / TILE), Math.ceil(height / TILE)];
+  const binTiles = Math.ceil(Math.max(columns, rows) / MOST_BINS);
+  return { columns, rows, binTiles, bins: Math.ceil(columns / binTiles) * Math.ceil(rows / binTiles) };
+}
+
+export class GpuRenderer {
+  #device;
+  #layout;
+  #prepare;
+  #render;
+  #view;
+  /** { header, gaussians, splats, bins, overlap }: the picture and its buffers. */
+  #picture = null;
+
+  /** Compiles the shader: `code` is that of render.wgsl. */
+  static async create(device, code) {
+    const binding = (index, resource) => ({ binding: index, visibility: GPUShaderStage.COMPUTE, ...resource });
+    const layout = device.createBindGroupLayout({
+      entries: [
+        binding(0, { buffer: { type: 'uniform' } }),
+        binding(1, { buffer: { type: 'read-only-storage' } }),
+        binding(2, { buffer: { type: 'storage' } }),
+        binding(3, { buffer: { type: 'storage' } }),
+        binding(4, { storageTexture: { format: 'rgba8unorm' } }),
+      ],
+    });
+    const module = device.createShaderModule({ code });
+    const pipelineLayout = device.createPipelineLayout({ bindGroupLayouts: [layout] });
+    const pipelines = ['prepare', 'render'].map((entryPoint) =>
+      device.createComputePipelineAsync({ layout: pipelineLayout, compute: { module, entryPoint } }),
+    );
+    return new GpuRenderer(device, layout, await Promise.all(pipelines));
+  }
+
+  constructor(device, layout, [prepare, render]) {
+    this.#device = device;
+    this.#layout = layout;
+    this.#prepare = prepare;
+    this.#render = render;
+    this.#view = device.createBuffer({ size: 64, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
+  }
+
+  /** Takes a picture: its header, and nine numbers for each Gaussian. Returns whether it can. */
+  setPicture(header, numbers) {
+    this.clear();
+    const count = Math.max(1, numbers.length / 9);
+    const words = Math.ceil(count / 32);
+    const sizes = { gaussians: 36 * count, splats: 48 * count, bins: 4 * words * MOST_BINS ** 2 };
+    const { maxStorageBufferBindingSize, maxBufferSize } = this.#device.limits;
+    const most = Math.min(maxStorageBufferBindingSize, maxBufferSize);
+    if (!(header.kernel in KERNELS) || Math.max(...Object.values(sizes)) > most) return false;
+    const usage = GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST;
+    this.#picture = { header, overlap: mostOverlap(numbers, header) };
+    for (const [name, size] of Object.entries(sizes)) {
+      this.#picture[name] = this.#device.createBuffer({ size, usage });
+    }
+    this.#device.queue.writeBuffer(this.#picture.gaussians, 0, numbers);
+    return true;
+  }
+
+  /** Frees the picture. */
+  clear() {
+    for (const name of ['gaussians', 'splats', 'bins']) this.#picture?.[name].destroy();
+    this.#picture = null;
+  }
+
+  /** Whether there is a picture, and so many pixels of it are little enough work. */
+  canRender(pixels) {
+    return this.#picture !== null && this.#picture.overlap * pixels <= MOST_WORK;
+  }
+
+  /** What `record` needs to render the picture to a texture. */
+  bind(texture) {
+    const { gaussians, splats, bins } = this.#picture;
+    const buffers = [this.#view, gaussians, splats, bins].map((buffer) => ({ buffer }));
+    const entries = [...buffers, texture.createView()].map((resource, binding) => ({ binding, resource }));
+    return this.#device.createBindGroup({ layout: this.#layout, entries });
+  }
+
+  /**
+   * Records the commands that render a region of a level (both in pixels) with the first Gaussians,
+   * to the corner of the texture of `bindings`.
+   */
+  record(encoder, { level, region, gaussians }, bindings) {
+    const { columns, rows, binTiles, bins } = divide(region);
+    this.#writeView({ level, region, gaussians, binTiles });
+    const used = 4 * Math.ceil(gaussians / 32) * bins;
+    if (used > 0) encoder.clearBuffer(this.#picture.bins, 0, used);
+    const pass = encoder.beginComputePass();
+    pass.setBindGroup(0, bindings);
+    pass.setPipeline(this.#prepare);
+    pass.dispatchWorkgroups(Math.ceil(gaussians / PREPARE));
+    pass.setPipeline(this.#render);
+    pass.dispatchWorkgroups(columns, rows);
+    pass.end();
+  }
+
+  /** Fills the uniform `View` of the shader. */
+  #writeView({ level, region, gaussians, binTiles }) {
+    const { header } = this.#picture;
+    const view = new DataView(new ArrayBuffer(64));
+    const floats = (offset, values) =>
+      values.forEach((value, index) => view.setFloat32(offset + 4 * index, value, true));
+    const integers = (offset, values) =>
+      values.forEach((value, index) => view.setUint32(offset + 4 * index, value, true));
+    floats(0, [level.width / header.width, level.height / header.height, region.x, region.y]);
+    integers(16, [region.width, region.height, gaussians, binTiles]);
+    floats(32, header.baseColor.map((value) => value / 65535));
+    integers(48, [header.channels, KERNELS[header.kernel]]);
+    floats(56, [header.cutoff]);
+    this.#device.queue.writeBuffer(this.#view, 0, view.buffer);
+  }
+}

@@ -1,0 +1,349 @@
+// The viewer in the browser: what a person sees after what a person does.
+
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+
+import { makePicture } from '../../bindings/wasm/tests/picture.js';
+import { swappedProfile } from '../../bindings/wasm/tests/profile.js';
+import { difference, drop, missing, openViewer, sampleBytes, screenshot } from './viewer.js';
+import { settled, start, vectorBytes, viewOf } from './viewer.js';
+
+const SAMPLE = { width: 576, height: 576 };
+
+let viewer;
+let sample;
+
+if (!missing) {
+  before(async () => {
+    sample = await sampleBytes();
+    viewer = await start({
+      routes: {
+        '/missing.gip': (_, response) => response.writeHead(404).end(),
+        '/rgb.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
+      },
+    });
+  });
+  after(() => viewer?.stop());
+}
+
+/** A test on a page of its own, which must neither fail nor ask other servers. */
+function onPage(name, { path = '/?src=sample/sumac.gip', ...options }, run) {
+  test(name, { skip: missing, timeout: 60_000 }, async () => {
+    const { page, problems, close } = await openViewer(viewer, path, { reducedMotion: 'reduce', ...options });
+    try {
+      if (path.includes('src=sample')) await settled(page);
+      await run(page);
+      assert.deepEqual(problems, []);
+    } finally {
+      await close();
+    }
+  });
+}
+
+async function assertShows(page, view, bytes, options) {
+  const { mean, far } = await difference(page, await screenshot(page), view, bytes, options);
+  assert.ok(mean < 0.5 && far < 0.01, `mean ${mean}, far ${far}`);
+}
+
+const textOf = (page, selector) => page.locator(selector).textContent();
+
+onPage('a file by URL shows whole, with its facts', {}, async (page) => {
+  await assertShows(page, await viewOf(page, SAMPLE), sample);
+  assert.equal(await page.title(), 'sumac.gip - gip viewer');
+  const panel = await page.locator('#panel').innerText();
+  for (const fact of ['26,694 bytes', '576 × 576 pixels', '6,296 in 4 layers', 'GAUS × 4', 'shape', 'position']) {
+    assert.ok(panel.includes(fact), fact);
+  }
+});
+
+onPage('a file by drop replaces the one before', {}, async (page) => {
+  const bytes = await vectorBytes('rgb8.gip');
+  await drop(page, { name: 'vector.gip', bytes });
+  await page.waitForFunction(() => document.title.startsWith('vector.gip'));
+  await settled(page);
+  const panel = await page.locator('#panel').innerText();
+  const [width, height] = panel.match(/(\d+) × (\d+) pixels/).slice(1).map(Number);
+  await assertShows(page, await viewOf(page, { width, height }), bytes);
+});
+
+onPage('wheel and drag give a sharp part of the picture', {}, async (page) => {
+  const view = await viewOf(page, SAMPLE);
+  const stage = await page.locator('#stage').boundingBox();
+  const at = { x: 300, y: 250 };
+  await page.mouse.move(stage.x + at.x, stage.y + at.y);
+  for (const notches of [-500, -300]) {
+    await page.mouse.wheel(0, notches);
+    await settled(page);
+    view.zoomTo(view.scale * Math.exp(-notches * 0.002), at);
+  }
+  await page.mouse.down();
+  await page.mouse.move(stage.x + 400, stage.y + 200, { steps: 5 });
+  await page.mouse.up();
+  view.panBy(100, -50);
+  await settled(page);
+  await assertShows(page, view, sample);
+});
+
+onPage('the keyboard zooms to 100 times and back, and moves', {}, async (page) => {
+  const view = await viewOf(page, SAMPLE);
+  for (let press = 0; press < 16; press += 1) await page.keyboard.press('+');
+  await settled(page);
+  assert.equal(await textOf(page, '#zoom'), '10,000 %');
+  await page.keyboard.press('ArrowRight');
+  view.zoomTo(100);
+  view.panBy(-90, 0);
+  await settled(page);
+  await assertShows(page, view, sample);
+  await page.keyboard.press('1');
+  await settled(page);
+  assert.equal(await textOf(page, '#zoom'), '100 %');
+  await page.keyboard.press('0');
+  await settled(page);
+  view.fit();
+  await assertShows(page, view, sample);
+});
+
+onPage('a screen of high density gets its own pixels', { deviceScaleFactor: 2 }, async (page) => {
+  const view = await viewOf(page, SAMPLE);
+  assert.equal(view.window.ratio, 2);
+  await assertShows(page, view, sample);
+});
+
+onPage('an ICC profile is applied', { path: '/' }, async (page) => {
+  // Red and green are exchanged.
+  const bytes = makePicture({ chunks: [['iCCP', swappedProfile()]] });
+  await drop(page, { name: 'profile.gip', bytes });
+  await settled(page);
+  const view = await viewOf(page, { width: 96, height: 64 });
+  const shot = await screenshot(page);
+  const asStored = await difference(page, shot, view, bytes);
+  const exchanged = await difference(page, shot, view, bytes, { order: [1, 0, 2] });
+  assert.ok(asStored.mean > 3 && exchanged.mean < 1.5, `${asStored.mean}, ${exchanged.mean}`);
+});
+
+onPage('outlines are where the Gaussians are', { path: '/' }, async (page) => {
+  const bytes = await vectorBytes('entropy-one.gip');
+  await drop(page, { name: 'one.gip', bytes });
+  await settled(page);
+  await page.keyboard.press('o');
+  await settled(page);
+  assert.ok(await page.locator('#legend').isVisible());
+  const found = await page.evaluate(async (file) => {
+    const { Decoder, load } = await import('/decoder/core.js');
+    const { View } = await import('/js/view.js');
+    await load();
+    const decoder = new Decoder();
+    decoder.feed(Uint8Array.from(atob(file), (letter) => letter.charCodeAt(0)));
+    const [x, y, l11, l21, l22] = decoder.gaussians();
+    const view = new View();
+    const { width, height } = document.querySelector('#stage').getBoundingClientRect();
+    view.setWindow({ width, height, ratio: 1, device: document.querySelector('#outlines') });
+    view.setPicture(decoder.header);
+    const { frame } = view;
+    const [sx, sy] = [frame.level.width / decoder.header.width, frame.level.height / decoder.header.height];
+    const context = document.querySelector('#outlines').getContext('2d');
+    const alpha = (distance, t) => {
+      const px = frame.left + (x + distance * l11 * Math.cos(t)) * sx;
+      const py = frame.top + (y + distance * (l21 * Math.cos(t) + l22 * Math.sin(t))) * sy;
+      return context.getImageData(Math.floor(px), Math.floor(py), 1, 1).data[3];
+    };
+    const around = Array.from({ length: 12 }, (_, index) => (index * Math.PI) / 6);
+    return { on: around.map((t) => alpha(1, t)), off: around.map((t) => alpha(0.5, t)) };
+  }, bytes.toString('base64'));
+  // Parts of the ellipse may be outside of the picture.
+  assert.ok(found.on.filter((alpha) => alpha > 100).length >= 4, String(found.on));
+  assert.ok(found.off.every((alpha) => alpha === 0), String(found.off));
+  await page.keyboard.press('o');
+  assert.ok(await page.locator('#outlines').isHidden());
+});
+
+onPage('the slider shows what the first bytes give', {}, async (page) => {
+  const view = await viewOf(page, SAMPLE);
+  for (const key of [',', ',', ',']) await page.keyboard.press(key);
+  const output = page.locator('#shown');
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.includes('1 of 4 layers'));
+  await settled(page);
+  const text = await output.textContent();
+  const gaussians = Number(text.match(/([\d,]+) Gaussians/)[1].replace(',', ''));
+  assert.ok(gaussians > 100 && gaussians < 1000, text);
+  await assertShows(page, view, sample, { gaussians });
+  // In the middle of the next layer there is nothing more.
+  await page.locator('#scrubber').fill('5000');
+  assert.match(await output.textContent(), /^5,000 of 26,694 bytes/);
+  await page.locator('#scrubber').fill('26694');
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.includes('4 of 4 layers'));
+  await settled(page);
+  await assertShows(page, view, sample);
+  // The slider has the focus, but only its own keys.
+  await page.keyboard.press('o');
+  assert.ok(await page.locator('#outlines').isVisible());
+  await page.keyboard.press('Home');
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('0 of 26,694'));
+});
+
+onPage('the file plays from its first byte', {}, async (page) => {
+  const label = () => page.locator('#play').getAttribute('aria-label');
+  await page.keyboard.press(' ');
+  await page.waitForFunction(() => Number(document.querySelector('#scrubber').value) < 13_000);
+  assert.equal(await label(), 'Pause');
+  await page.keyboard.press(' ');
+  assert.notEqual(await label(), 'Pause');
+  // From there to the end.
+  await page.locator('#scrubber').fill('22000');
+  await page.locator('#play').click();
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('26,694 bytes'));
+  await settled(page);
+  await assertShows(page, await viewOf(page, SAMPLE), sample);
+});
+
+/** A PNG file of one colour. */
+async function flat(page, color) {
+  const url = await page.evaluate((color) => {
+    const canvas = Object.assign(document.createElement('canvas'), { width: 576, height: 576 });
+    const context = canvas.getContext('2d');
+    context.fillStyle = color;
+    context.fillRect(0, 0, 576, 576);
+    return canvas.toDataURL('image/png');
+  }, color);
+  return { name: 'original.png', type: 'image/png', bytes: Buffer.from(url.split(',')[1], 'base64') };
+}
+
+/** The colour of the stage at a share of its width, half-way down. */
+async function colorAt(page, shot, share) {
+  return page.evaluate(
+    async ({ shot, share }) => {
+      const bytes = Uint8Array.from(atob(shot), (letter) => letter.charCodeAt(0));
+      const bitmap = await createImageBitmap(new Blob([bytes]));
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+      context.drawImage(bitmap, 0, 0);
+      return [...context.getImageData(bitmap.width * share, bitmap.height * 0.4, 1, 1).data.slice(0, 3)];
+    },
+    { shot, share },
+  );
+}
+
+onPage('the original is on the left of the divider', {}, async (page) => {
+  await page.keyboard.press('c');
+  assert.match(await textOf(page, '#message p'), /Drop the original/);
+  await drop(page, await flat(page, '#00ff00'));
+  const divider = page.locator('#divider');
+  await divider.waitFor();
+  await settled(page);
+  let shot = await screenshot(page);
+  assert.deepEqual(await colorAt(page, shot, 0.4), [0, 255, 0]);
+  const { mean } = await difference(page, shot, await viewOf(page, SAMPLE), sample, { from: 0.6 });
+  assert.ok(mean < 1, String(mean));
+
+  const handle = await page.locator('#divider .handle').boundingBox();
+  await page.mouse.move(handle.x + 20, handle.y + 20);
+  await page.mouse.down();
+  await page.mouse.move(handle.x - 200, handle.y, { steps: 4 });
+  await page.mouse.up();
+  shot = await screenshot(page);
+  assert.notDeepEqual(await colorAt(page, shot, 0.4), [0, 255, 0]);
+
+  await divider.press('End');
+  assert.equal(await divider.getAttribute('aria-valuenow'), '100');
+  shot = await screenshot(page);
+  assert.deepEqual(await colorAt(page, shot, 0.7), [0, 255, 0]);
+  await page.keyboard.press('c');
+  assert.ok(await divider.isHidden());
+});
+
+onPage('damaged and other files give a message', { path: '/' }, async (page) => {
+  const message = page.locator('#message p');
+  const says = async (pattern) => {
+    const isSaid = (source) => new RegExp(source).test(document.querySelector('#message p').textContent);
+    await page.waitForFunction(isSaid, pattern.source);
+    assert.ok(await message.isVisible());
+  };
+  await drop(page, await flat(page, '#00ff00'));
+  await says(/Open a \.gip first/);
+  await drop(page, { name: 'notes.txt', bytes: Buffer.from('not a picture') });
+  await says(/neither a \.gip/);
+  await drop(page, { name: 'header.gip', bytes: await vectorBytes('xcrc-header.gip') });
+  await says(/header\.gip.*GHDR/);
+  assert.ok(await page.locator('#welcome').isVisible());
+  const half = sample.subarray(0, 13_000);
+  await drop(page, { name: 'half.gip', bytes: half });
+  await says(/half\.gip.*What is shown came before that: [\d,]+ of 6,296/);
+  await settled(page);
+  await page.locator('#message button').click();
+  assert.ok(await message.isHidden());
+  await assertShows(page, await viewOf(page, SAMPLE), half);
+});
+
+onPage('a URL that is not there gives a message', { path: '/?src=missing.gip' }, async (page) => {
+  await page.waitForFunction(() => document.querySelector('#message p').textContent.includes('404'));
+  assert.ok(await page.locator('#welcome').isVisible());
+  await page.getByRole('button', { name: 'Open a sample' }).click();
+  await settled(page);
+  assert.ok(await page.locator('#message').isHidden());
+});
+
+onPage('keys open and close help and details', {}, async (page) => {
+  await page.keyboard.press('?');
+  assert.ok(await page.locator('#help').isVisible());
+  // The keys belong to the help now.
+  await page.keyboard.press('i');
+  await page.keyboard.press('Escape');
+  assert.ok(await page.locator('#help').isHidden());
+  const details = page.getByRole('button', { name: 'Details' });
+  const shown = await page.locator('#panel').isVisible();
+  await page.keyboard.press('i');
+  assert.equal(await page.locator('#panel').isVisible(), !shown);
+  assert.equal(await details.getAttribute('aria-pressed'), String(!shown));
+});
+
+const phone = { viewport: { width: 375, height: 667 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true };
+
+onPage('a phone has everything within reach', phone, async (page) => {
+  const layout = await page.evaluate(() => {
+    const outside = [...document.querySelectorAll('button, input, #stage')]
+      .filter((element) => element.checkVisibility() && !element.closest('dialog'))
+      .map((element) => [element.outerHTML.slice(0, 60), element.getBoundingClientRect()])
+      .filter(([, { left, right, top, bottom }]) => left < 0 || top < 0 || right > innerWidth || bottom > innerHeight);
+    const small = [...document.querySelectorAll('header button')]
+      .filter((button) => button.checkVisibility() && button.getBoundingClientRect().height < 40);
+    const { height } = document.querySelector('#stage').getBoundingClientRect();
+    return { outside, small: small.length, share: height / innerHeight, width: document.scrollingElement.scrollWidth };
+  });
+  assert.deepEqual(layout.outside, []);
+  assert.equal(layout.small, 0);
+  assert.ok(layout.share > 0.6, String(layout.share));
+  assert.equal(layout.width, 375);
+  await page.getByRole('button', { name: 'Details' }).tap();
+  assert.ok(await page.locator('#panel').isVisible());
+});
+
+onPage('two fingers zoom, one moves', phone, async (page) => {
+  const view = await viewOf(page, SAMPLE);
+  const stage = await page.locator('#stage').boundingBox();
+  const client = await page.context().newCDPSession(page);
+  const touch = (type, ...points) =>
+    client.send('Input.dispatchTouchEvent', {
+      type,
+      touchPoints: points.map(([x, y], id) => ({ x: stage.x + x, y: stage.y + y, id })),
+    });
+  await touch('touchStart', [150, 200], [200, 200]);
+  await touch('touchMove', [100, 200], [250, 200]);
+  await touch('touchEnd');
+  view.zoomTo(view.scale * 3, { x: 175, y: 200 });
+  await settled(page);
+  assert.equal(await textOf(page, '#zoom'), `${Math.round(view.scale * 100)} %`);
+  await touch('touchStart', [150, 200]);
+  await touch('touchMove', [110, 260]);
+  await touch('touchEnd');
+  view.panBy(-40, 60);
+  await settled(page);
+  await assertShows(page, view, sample);
+});
+
+onPage('the page follows the colour scheme', { path: '/', colorScheme: 'dark' }, async (page) => {
+  const background = () => page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const dark = await background();
+  await page.emulateMedia({ colorScheme: 'light' });
+  const light = await background();
+  const brightness = (color) => color.match(/\d+/g).map(Number).reduce((a, b) => a + b) / 3;
+  assert.ok(brightness(dark) < 64 && brightness(light) > 192, `${dark} ${light}`);
+});
