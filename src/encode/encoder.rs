@@ -122,7 +122,8 @@ impl Encoder {
         self
     }
 
-    /// How much time to spend, from 1 (least) to 9 (most). Default 5.
+    /// How much time to spend, from 1 (least) to 9 (most). Default 5. Up to that, each effort takes about
+    /// one and a half times as long as the one before, and from there on twice as long.
     pub fn with_effort(mut self, effort: u8) -> Self {
         self.effort = effort;
         self
