@@ -5,7 +5,7 @@ import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-import { build } from './build.js';
+import { assemble, buildDecoder } from './build.js';
 
 const types = {
   '.css': 'text/css; charset=utf-8',
@@ -55,6 +55,7 @@ export async function serve(site, { port = 0, routes = {} } = {}) {
 
 if (import.meta.url === pathToFileURL(process.argv[1]).href) {
   const port = Number(process.argv[2] ?? 8000);
-  const { origin } = await serve(build(), { port });
+  buildDecoder();
+  const { origin } = await serve(assemble(), { port });
   console.log(`The viewer is at ${origin}/ (Ctrl+C ends it).`);
 }
