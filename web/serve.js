@@ -25,13 +25,14 @@ const types = {
  */
 export async function serve(site, { port = 0, routes = {} } = {}) {
   const server = createServer(async (request, response) => {
-    const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-    if (routes[path]) {
-      routes[path](request, response);
-      return;
-    }
-    const file = join(site, path.endsWith('/') ? `${path}index.html` : path);
     try {
+      const { pathname } = new URL(request.url, 'http://localhost');
+      if (routes[pathname]) {
+        await routes[pathname](request, response);
+        return;
+      }
+      const path = normalize(decodeURIComponent(pathname));
+      const file = join(site, path.endsWith('/') ? `${path}index.html` : path);
       const content = await readFile(file);
       // A new build is seen at once.
       const type = types[extname(file)] ?? 'application/octet-stream';
