@@ -1,5 +1,5 @@
 // Puts the viewer together in `dist/`, which any web server can serve: the page, the decoder of
-// `bindings/wasm`, and the shader of `gpu`. Builds the decoder if that was not done yet.
+// `bindings/wasm`, and the shader of `gpu`. `node web/build.js` also builds the decoder.
 
 import { execFileSync } from 'node:child_process';
 import { cpSync, existsSync, mkdirSync, rmSync } from 'node:fs';
@@ -21,14 +21,20 @@ const contents = {
   'shader/render.wgsl': join(here, '..', 'gpu', 'src', 'render.wgsl'),
 };
 
-/** Builds the site in a folder, and returns that. */
-export function build(site = join(here, 'dist')) {
-  if (!existsSync(join(wasm, 'dist', 'image_gip_bg.wasm'))) {
-    console.log('Building the decoder first, which takes some minutes.');
-    const run = (...args) => execFileSync('npm', args, { cwd: wasm, stdio: 'inherit' });
-    run('ci');
-    run('run', 'build');
-  }
+const hasDecoder = () => existsSync(join(wasm, 'dist', 'image_gip_bg.wasm'));
+
+/** Builds the decoder, if that was not done yet. */
+export function buildDecoder() {
+  if (hasDecoder()) return;
+  console.log('Building the decoder first, which takes some minutes.');
+  const run = (...args) => execFileSync('npm', args, { cwd: wasm, stdio: 'inherit' });
+  run('ci');
+  run('run', 'build');
+}
+
+/** Puts the site together in a folder, and returns that. */
+export function assemble(site = join(here, 'dist')) {
+  if (!hasDecoder()) throw new Error('first build the decoder: npm ci && npm run build in bindings/wasm');
   rmSync(site, { recursive: true, force: true });
   for (const [place, source] of Object.entries(contents)) {
     mkdirSync(dirname(join(site, place)), { recursive: true });
@@ -37,4 +43,7 @@ export function build(site = join(here, 'dist')) {
   return site;
 }
 
-if (import.meta.url === pathToFileURL(process.argv[1]).href) console.log(build());
+if (import.meta.url === pathToFileURL(process.argv[1]).href) {
+  buildDecoder();
+  console.log(assemble());
+}

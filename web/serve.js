@@ -5,7 +5,7 @@ import { createServer } from 'node:http';
 import { extname, join, normalize } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
-import { build } from './build.js';
+import { assemble, buildDecoder } from './build.js';
 
 const types = {
   '.css': 'text/css; charset=utf-8',
@@ -25,13 +25,14 @@ const types = {
  */
 export async function serve(site, { port = 0, routes = {} } = {}) {
   const server = createServer(async (request, response) => {
-    const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
-    if (routes[path]) {
-      routes[path](request, response);
-      return;
-    }
-    const file = join(site, path.endsWith('/') ? `${path}index.html` : path);
     try {
+      const { pathname } = new URL(request.url, 'http://localhost');
+      if (routes[pathname]) {
+        await routes[pathname](request, response);
+        return;
+      }
+      const path = normalize(decodeURIComponent(pathname));
+      const file = join(site, path.endsWith('/') ? `${path}index.html` : path);
       const content = await readFile(file);
       // A new build is seen at once.
       const type = types[extname(file)] ?? 'application/octet-stream';
@@ -55,6 +56,7 @@ export async function serve(site, { port = 0, routes = {} } = {}) {
 
 if (import.meta.url === pathToFileURL(process.argv[1]).href) {
   const port = Number(process.argv[2] ?? 8000);
-  const { origin } = await serve(build(), { port });
+  buildDecoder();
+  const { origin } = await serve(assemble(), { port });
   console.log(`The viewer is at ${origin}/ (Ctrl+C ends it).`);
 }

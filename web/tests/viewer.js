@@ -5,7 +5,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 
 import { launch } from '../../bindings/wasm/tests/browser.js';
-import { build } from '../build.js';
+import { assemble } from '../build.js';
 import { View } from '../js/view.js';
 import { serve } from '../serve.js';
 
@@ -23,7 +23,7 @@ export const sampleBytes = () => readFile(new URL('../sample/sumac.gip', import.
 export async function start({ routes = {}, flags = [] } = {}) {
   // A folder of its own: other tests run beside this one.
   const site = await mkdtemp(join(tmpdir(), 'gip-viewer-'));
-  const server = await serve(build(site), { routes });
+  const server = await serve(assemble(site), { routes });
   const browser = await launch(...flags);
   return {
     browser,
