@@ -32,7 +32,7 @@ function printSizes() {
     console.log(name.padEnd(20) + numbers.map((number) => String(number).padStart(9)).join(''));
     return numbers;
   };
-  const files = readdirSync(join(root, 'dist')).filter((file) => !file.endsWith('.d.ts'));
+  const files = readdirSync(join(root, 'dist')).filter((file) => /\.(js|wasm)$/.test(file));
   const all = files.map((file) => row(file, readFileSync(join(root, 'dist', file))));
   const sums = all.reduce((a, b) => a.map((value, at) => value + b[at]));
   console.log('all'.padEnd(20) + sums.map((number) => String(number).padStart(9)).join(''));
