@@ -151,13 +151,13 @@ async function printTimes(page, server, names) {
 }
 
 async function printTransfers(page, server, names) {
-  console.log('\nbytes sent for a display, of a server that sends 1460 bytes each 2 ms');
+  console.log('\nbytes sent for a display, of a server that sends 1460 bytes each 20 ms');
   console.log('picture            bytes      1/8      1/4      1/1');
   for (const name of names) {
     const bytes = readFileSync(encode(name));
     const cells = [];
     for (const part of [8, 4, 1]) {
-      const { route, log } = slow(bytes, { piece: 1460, interval: 2 });
+      const { route, log } = slow(bytes, { piece: 1460, interval: 20 });
       server.routes['/slow.gip'] = route;
       await page.goto(`${server.origin}/page`);
       await page.evaluate(async (part) => {
