@@ -5,7 +5,7 @@
 // Cargo.lock has.
 
 import { execFileSync } from 'node:child_process';
-import { cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -70,3 +70,5 @@ await build({
 for (const file of readdirSync(scripts)) {
   if (file.endsWith('.d.ts')) cpSync(join(scripts, file), join(dist, file));
 }
+// npm packs no links.
+for (const file of ['LICENSE-APACHE', 'LICENSE-MIT']) copyFileSync(join(root, file), join(dist, file));

@@ -32,7 +32,7 @@ function printSizes() {
     console.log(name.padEnd(20) + numbers.map((number) => String(number).padStart(9)).join(''));
     return numbers;
   };
-  const files = readdirSync(join(root, 'dist')).filter((file) => !file.endsWith('.d.ts'));
+  const files = readdirSync(join(root, 'dist')).filter((file) => /\.(js|wasm)$/.test(file));
   const all = files.map((file) => row(file, readFileSync(join(root, 'dist', file))));
   const sums = all.reduce((a, b) => a.map((value, at) => value + b[at]));
   console.log('all'.padEnd(20) + sums.map((number) => String(number).padStart(9)).join(''));
@@ -151,13 +151,13 @@ async function printTimes(page, server, names) {
 }
 
 async function printTransfers(page, server, names) {
-  console.log('\nbytes sent for a display, of a server that sends 1460 bytes each 2 ms');
+  console.log('\nbytes sent for a display, of a server that sends 1460 bytes each 20 ms');
   console.log('picture            bytes      1/8      1/4      1/1');
   for (const name of names) {
     const bytes = readFileSync(encode(name));
     const cells = [];
     for (const part of [8, 4, 1]) {
-      const { route, log } = slow(bytes, { piece: 1460, interval: 2 });
+      const { route, log } = slow(bytes, { piece: 1460, interval: 20 });
       server.routes['/slow.gip'] = route;
       await page.goto(`${server.origin}/page`);
       await page.evaluate(async (part) => {

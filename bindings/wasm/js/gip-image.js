@@ -34,6 +34,8 @@ export class GipImageElement extends ImageAttributes {
   /** The content box in CSS pixels, and in pixels of the screen. */
   #css = { width: 0, height: 0 };
   #device = { width: 0, height: 0 };
+  /** The size in pixels for which the loader was asked last. */
+  #asked = null;
   /** Whether something is being rendered. */
   #busy = false;
 
@@ -195,6 +197,7 @@ export class GipImageElement extends ImageAttributes {
     if (this.#loader !== loader || !loader.header) return;
     if (loader.header !== this.#header) {
       this.#header = loader.header;
+      this.#asked = null;
       this.#layOut();
       this.#measure();
     }
@@ -208,6 +211,8 @@ export class GipImageElement extends ImageAttributes {
   async #want() {
     const loader = this.#loader;
     const { width, height } = this.#plan() ?? { width: 1, height: 1 };
+    if (equal(this.#asked, [width, height])) return;
+    this.#asked = [width, height];
     try {
       const gaussians = await loader.gaussiansFor(width, height);
       if (this.#loader === loader) loader.want(gaussians);

@@ -25,7 +25,7 @@ test('every line of the test vectors, in a worker', async () => {
 const picture = makePicture({ width: 96, height: 64, layers: [40, 160] });
 
 test('every kind of source gives the same picture', async () => {
-  harness.server.routes['/picture.gip'] = file(picture);
+  harness.routes['/picture.gip'] = file(picture);
   const results = await inPage(async ({ decode }) => {
     const buffer = await (await fetch('/picture.gip')).arrayBuffer();
     const sources = {
@@ -115,7 +115,7 @@ test('errors have a class, a kind and a chunk', async () => {
 
 test('an abort ends the download and the wait', async () => {
   const { route, log } = slow(picture, { piece: 500, gate: () => new Promise(() => {}) });
-  harness.server.routes['/never.gip'] = route;
+  harness.routes['/never.gip'] = route;
   const reasons = await inPage(async ({ decode, open }) => {
     const out = [];
     for (const call of [decode, open]) {

@@ -7,10 +7,10 @@ import { serve } from './server.js';
 
 export { slow } from './server.js';
 
-export const harness = { browser: null, server: null };
+export const harness = { browser: null, server: null, routes: {} };
 
 before(async () => {
-  harness.server = await serve();
+  harness.server = await serve(harness.routes);
   harness.browser = await launch();
 });
 
@@ -26,9 +26,9 @@ let pages = 0;
  * error, fail the test, unless `quiet` allows them.
  */
 export async function withPage(html, run, { headers = {}, context: options = {}, quiet = false } = {}) {
-  const { browser, server } = harness;
+  const { browser, server, routes } = harness;
   const path = `/page-${(pages += 1)}`;
-  server.routes[path] = (_, response) => {
+  routes[path] = (_, response) => {
     response.writeHead(200, { 'Content-Type': 'text/html; charset=utf-8', ...headers });
     response.end(`<!doctype html><html lang="en"><title>test</title>${html}`);
   };

@@ -95,7 +95,7 @@ const styles = [
 ];
 
 test('it is laid out like <img>', async () => {
-  harness.server.routes['/layout.gip'] = file(makePicture({ width: 96, height: 64 }));
+  harness.routes['/layout.gip'] = file(makePicture({ width: 96, height: 64 }));
   const svg = encodeURIComponent('<svg xmlns="http://www.w3.org/2000/svg" width="96" height="64"/>');
   const cases = styles.map(([attributes, style], index) => {
     const both = [`<img src="data:image/svg+xml,${svg}"`, '<gip-image src="/layout.gip"'];

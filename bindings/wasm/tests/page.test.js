@@ -11,7 +11,7 @@ const picture = makePicture({ width: 96, height: 64, layers: [40, 160] });
 
 test('fifty elements on a page, and lazy ones far below', async () => {
   let requests = 0;
-  harness.server.routes['/many.gip'] = (request, response) => {
+  harness.routes['/many.gip'] = (request, response) => {
     requests += 1;
     file(picture)(request, response);
   };
@@ -39,7 +39,7 @@ test('fifty elements on a page, and lazy ones far below', async () => {
 
 test('memory after 200 loads', async () => {
   // Three that are kept by mistake would take a megabyte.
-  harness.server.routes['/again.gip'] = file(makePicture({ layers: [1000, 4000] }));
+  harness.routes['/again.gip'] = file(makePicture({ layers: [1000, 4000] }));
   const headers = {
     'Cross-Origin-Opener-Policy': 'same-origin',
     'Cross-Origin-Embedder-Policy': 'require-corp',
@@ -80,7 +80,7 @@ test('memory after 200 loads', async () => {
 });
 
 test('a strict content security policy', async () => {
-  harness.server.routes['/csp.gip'] = file(picture);
+  harness.routes['/csp.gip'] = file(picture);
   const policy = (worker) =>
     `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; worker-src ${worker}`;
   for (const worker of ["'self'", "'none'"]) {
@@ -94,7 +94,7 @@ test('a strict content security policy', async () => {
 });
 
 test('the script may come from another server', async () => {
-  harness.server.routes['/elsewhere.gip'] = file(picture);
+  harness.routes['/elsewhere.gip'] = file(picture);
   const other = harness.server.origin.replace('127.0.0.1', 'localhost');
   const html = `<script type="module" src="${other}/dist/gip-image.js"></script>
     <gip-image src="/elsewhere.gip"></gip-image>`;
@@ -107,8 +107,8 @@ test('the script may come from another server', async () => {
 
 test('an ICC profile is applied', async () => {
   // It takes red for green, and the other way round.
-  harness.server.routes['/plain.gip'] = file(picture);
-  harness.server.routes['/profile.gip'] = file(
+  harness.routes['/plain.gip'] = file(picture);
+  harness.routes['/profile.gip'] = file(
     makePicture({ width: 96, height: 64, layers: [40, 160], chunks: [['iCCP', swappedProfile()]] }),
   );
   const colors = async (src) =>
