@@ -196,6 +196,8 @@ def test_progress_cancels(photo: Picture) -> None:
 
 
 def test_ctrl_c() -> None:
+    # A shell's jobs in the background ignore the signal.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
