@@ -94,8 +94,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          each trained for all iterations, without LIG's own constants. {} Ours is the encoder, \
          tuned for PSNR, at effort {}, its default, and {BEST_EFFORT}. Attributes are 32-bit floats; PSNR is that of \
          the float rendering, as in papers. Memory is the encoder's peak memory without the \
-         source. Means; {}; all threads. Rows marked as printed are from the paper's table 1, for \
-         all of Kodak on an NVIDIA A30, with GPU memory; SIREN is a network and has no Gaussians.\n",
+         source. Means; {}; all threads; other programs that run on the machine make the times \
+         longer. Rows marked as printed are from the paper's table 1, for all of Kodak on an NVIDIA A30, \
+         with GPU memory; SIREN is a network and has no Gaussians.\n",
         methods::description(iterations),
         gip::EFFORT,
         bench.pictures_used(pictures.len()),
