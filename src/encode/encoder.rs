@@ -197,7 +197,9 @@ impl Encoder {
         };
         let mut run = || pipeline::encode(&job, &mut observer);
         let outcome = match self.threads {
-            Threads::Pool => run(),
+            // On one of the pool's threads: handing every parallel loop over to the pool, and waking up
+            // afterwards, would take longer than many of the loops.
+            Threads::Pool => rayon::scope(|_| run()),
             Threads::One => pool_of_one()?.install(run),
         }?;
         Ok(Encoded {
