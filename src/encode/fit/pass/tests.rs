@@ -118,19 +118,26 @@ fn scene(
         .collect()
 }
 
+/// The splats of a scene.
+fn splats_of(
+    rows: &[[f32; MAX_COMPONENTS]],
+    parameterization: Parameterization,
+    channels: usize,
+) -> Vec<Splat> {
+    let splat = |row: &[f32; MAX_COMPONENTS]| {
+        let gaussian = Gaussian::from_components(&row[..5 + channels], parameterization);
+        Splat::new(&gaussian).expect("the scene is valid")
+    };
+    rows.iter().map(splat).collect()
+}
+
 fn gradients(
     rows: &[[f32; MAX_COMPONENTS]],
     parameterization: Parameterization,
     kernel: Kernel,
     raster: &Raster,
 ) -> Vec<[f32; MAX_COMPONENTS]> {
-    let splats: Vec<_> = rows
-        .iter()
-        .map(|row| {
-            let gaussian = Gaussian::from_components(&row[..5 + raster.channels], parameterization);
-            Splat::new(&gaussian).expect("the scene is valid")
-        })
-        .collect();
+    let splats = splats_of(rows, parameterization, raster.channels);
     let mut pass = Pass::new(raster);
     run(&mut pass, raster, &splats, kernel, BASE);
     let by_row = rows.iter().enumerate().map(|(index, row)| {
@@ -195,12 +202,7 @@ fn every_simd_level_gives_the_same_bits() {
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
     let rows = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats: Vec<_> = rows
-        .iter()
-        .filter_map(|row| {
-            Splat::new(&Gaussian::from_components(&row[..8], Parameterization::Cholesky))
-        })
-        .collect();
+    let splats = splats_of(&rows, Parameterization::Cholesky, 3);
     let run = |level, raster: &Raster| {
         let mut pass = Pass { level, ..Pass::new(raster) };
         let error = run(&mut pass, raster, &splats, Kernel::Quartic, BASE);
@@ -251,12 +253,7 @@ fn measured_distortions_are_those_of_the_tiles_rendered_again() {
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
     let rows = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats: Vec<_> = rows
-        .iter()
-        .filter_map(|row| {
-            Splat::new(&Gaussian::from_components(&row[..8], Parameterization::Cholesky))
-        })
-        .collect();
+    let splats = splats_of(&rows, Parameterization::Cholesky, 3);
     for tune in [Tune::Visual, Tune::Psnr] {
         let raster = unobserved(|observer| Raster::new(&source, tune, observer));
         let kernel = Kernel::Quartic;
