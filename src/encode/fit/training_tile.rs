@@ -164,21 +164,25 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         match kernel {
             Kernel::Exponential { cutoff } => {
                 let kernel = simd_kernel::Exponential { cutoff };
-                dispatch!(level, simd => {
-                    let error = self.forward(simd, kernel, states, planes);
-                    self.backward(simd, kernel, states, slots, planes);
-                    error
-                })
+                self.run_with(level, kernel, states, slots, planes)
             }
-            Kernel::Quartic => {
-                let kernel = simd_kernel::Quartic;
-                dispatch!(level, simd => {
-                    let error = self.forward(simd, kernel, states, planes);
-                    self.backward(simd, kernel, states, slots, planes);
-                    error
-                })
-            }
+            Kernel::Quartic => self.run_with(level, simd_kernel::Quartic, states, slots, planes),
         }
+    }
+
+    fn run_with<K: TrainingKernel>(
+        &self,
+        level: Level,
+        kernel: K,
+        states: &mut [TileState],
+        slots: &mut [Slot],
+        planes: &mut [TilePlane; CHANNELS],
+    ) -> RenderingError {
+        dispatch!(level, simd => {
+            let error = self.forward(simd, kernel, states, planes);
+            self.backward(simd, kernel, states, slots, planes);
+            error
+        })
     }
 
     /// The forward pass alone: what [`Self::run`] leaves in `planes`.
