@@ -76,13 +76,12 @@ export interface Picture extends Renderable {
   readonly header: Header;
 }
 
+export interface StreamDecoder extends Renderable {}
 /** Decodes bytes as they arrive, for progressive display. */
-export class StreamDecoder implements Renderable {
+export class StreamDecoder {
   constructor(options?: { limits?: Limits; statistics?: boolean });
   /** The header; `null` until it has arrived. */
   readonly header: Header | null;
-  readonly complete: boolean;
-  readonly arrived: number;
 
   /**
    * Takes the next bytes of the file, in pieces of any size. After a rejection nothing more can be
@@ -91,15 +90,4 @@ export class StreamDecoder implements Renderable {
   feed(bytes: Uint8Array): Promise<Progress>;
   /** Rejects with an `UnexpectedEndError` if the file is not complete. */
   finish(): Promise<void>;
-
-  metadata(): Promise<Metadata>;
-  statistics(): Promise<Statistics>;
-  gaussians(range?: { start?: number; end?: number }): Promise<Gaussian9>;
-  gaussiansFor(width: number, height: number): Promise<number>;
-  gaussiansIn(bytes: number): Promise<number>;
-  render(options?: RenderOptions & { signal?: AbortSignal }): Promise<ImageData>;
-  samples(options?: SampleOptions & { signal?: AbortSignal }): Promise<Samples>;
-  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
-  png(options?: SampleOptions & { signal?: AbortSignal }): Promise<Blob>;
-  close(): void;
 }
