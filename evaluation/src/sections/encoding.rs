@@ -6,6 +6,7 @@ use image_gip::{ColorModel, Source, Target, Threads};
 use super::rate_store::{RateStore, nearest};
 use crate::baselines::{BASELINES, Baseline};
 use crate::bench::{Bench, timing_version};
+use crate::curve::Curve;
 use crate::pictures::TestPicture;
 use crate::store::Store;
 use crate::table::{Table, mean, median};
@@ -66,12 +67,14 @@ fn set(bench: &mut Bench, pictures: &[TestPicture], rate: f64) -> Result<String>
         by_picture.push(encodings.collect::<Result<Vec<_>>>()?);
     }
     let mut text = effort_table(efforts, &by_picture);
+    let (mut files, mut times) = (RateStore::open(bench)?, rival_times(bench)?);
     let mut table = Table::new(&["time to the PSNR of", "over its own time", "from", "to"]);
     for name in RIVALS {
         let rival = BASELINES.iter().find(|baseline| baseline.name == name).context(name)?;
         let mut ratios = Vec::new();
         for (picture, encodings) in pictures.iter().zip(&by_picture) {
-            let (psnr, seconds) = rival_at_rate(bench, rival, picture, rate)?;
+            let (psnr, seconds) =
+                rival_at_rate(&mut files, &mut times, bench, rival, picture, rate)?;
             ratios.push(seconds_to(psnr, encodings).unwrap_or(f64::INFINITY) / seconds);
         }
         let cell = |value: f64| format!("{value:.2}");
@@ -140,16 +143,20 @@ fn effort_table(efforts: &[u8], by_picture: &[Vec<Encoding>]) -> String {
     table.finish()
 }
 
+/// The encoding times of other codecs in seconds, with all threads.
+fn rival_times(bench: &Bench) -> Result<Store<2, 1>> {
+    bench.store("encoding-others.csv", ["codec", "image"], ["encode_seconds"])
+}
+
 /// A codec's PSNR in dB at a rate, and its encoding time at the nearest setting with all threads.
 fn rival_at_rate(
+    files: &mut RateStore,
+    times: &mut Store<2, 1>,
     bench: &mut Bench,
     rival: &Baseline,
     picture: &TestPicture,
     rate: f64,
 ) -> Result<(f64, f64)> {
-    let mut files = RateStore::open(bench)?;
-    let mut times: Store<2, 1> =
-        bench.store("encoding-others.csv", ["codec", "image"], ["encode_seconds"])?;
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let mut curve = Vec::new();
@@ -165,19 +172,8 @@ fn rival_at_rate(
             let trip = worker.round_trip(rival.id, setting, picture, None, [REPEATS, 1])?;
             Ok([trip.encode_seconds])
         })?;
-    Ok((psnr_at(rate, &curve).context("no settings")?, seconds))
-}
-
-/// The PSNR at a rate, linear in the logarithm of the rate between points. Beyond all points it is
-/// that of the nearest.
-fn psnr_at(rate: f64, curve: &[(f64, f64)]) -> Option<f64> {
-    let first = curve.first()?;
-    let Some(above) = curve.iter().position(|point| point.0 >= rate) else {
-        return curve.last().map(|point| point.1);
-    };
-    let Some(below) = above.checked_sub(1) else { return Some(first.1) };
-    let ((low, from), (high, to)) = (curve[below], curve[above]);
-    Some(from + (to - from) * (rate / low).ln() / (high / low).ln())
+    let psnr = Curve::new(curve).quality(rate).context("no file of about this rate")?;
+    Ok((psnr, seconds))
 }
 
 /// Seconds with all threads until a PSNR is reached; `None` if no effort reaches it.
@@ -194,16 +190,6 @@ fn seconds_to(psnr: f64, encodings: &[Encoding]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_psnr_is_interpolated_by_the_logarithm_of_the_rate() {
-        let curve = [(0.25, 30.0), (1.0, 34.0), (2.0, 36.0)];
-        let found = [0.1, 0.25, 0.5, 1.0, 3.0].map(|rate| psnr_at(rate, &curve).expect("a point"));
-        for (found, expected) in found.into_iter().zip([30.0, 30.0, 32.0, 34.0, 36.0]) {
-            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-        }
-        assert_eq!(psnr_at(0.5, &[]), None);
-    }
 
     #[test]
     fn the_time_to_a_psnr_is_that_of_the_first_effort_that_reaches_it() {
