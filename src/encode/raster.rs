@@ -17,7 +17,9 @@ pub(crate) const TILE_WIDTH: usize = 16;
 pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
 /// One channel of the source in a tile, row by row, where a full sample is [`FULL_SCALE`]: as exact
 /// as floats, in half the memory.
-pub(crate) type SamplePlane = [[u16; TILE_WIDTH]; TILE_HEIGHT];
+pub(crate) type SamplePlane = [SampleLine; TILE_HEIGHT];
+/// A row of it.
+pub(crate) type SampleLine = [u16; TILE_WIDTH];
 /// The value of a full sample in a [`SamplePlane`].
 pub(crate) const FULL_SCALE: f32 = 65535.0;
 /// Work for a sample.
@@ -97,14 +99,13 @@ impl Raster {
         sample
     }
 
-    /// A row of one channel, where a full sample is 1.
-    pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = f32> {
+    /// A row of one channel, by tiles.
+    pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = &SampleLine> {
         let columns = self.width.div_ceil(TILE_WIDTH);
         let tiles = self.planes[y / TILE_HEIGHT * columns * self.channels..]
             .chunks_exact(self.channels)
             .take(columns);
-        let samples = tiles.flat_map(move |planes| &planes[channel][y % TILE_HEIGHT]);
-        samples.take(self.width).map(|&sample| f32::from(sample) / FULL_SCALE)
+        tiles.map(move |planes| &planes[channel][y % TILE_HEIGHT])
     }
 
     /// How much a squared error of a pixel counts.

@@ -100,9 +100,10 @@ impl CoordinateDescent<'_> {
                 let shared = &*residuals;
                 let chosen: Vec<Option<Candidate>> = part
                     .par_iter()
-                    .map_init(Window::default, |window, &(index, _)| {
-                        self.choose(shared, window, codes[index], contexts[index])
-                    })
+                    .map_init(
+                        || Window::new(shared),
+                        |window, &(index, _)| self.choose(window, codes[index], contexts[index]),
+                    )
                     .collect();
                 let mut changes = Vec::new();
                 for (&(index, _), choice) in part.iter().zip(chosen) {
@@ -175,26 +176,16 @@ impl CoordinateDescent<'_> {
     /// the Gaussian.
     fn choose(
         &self,
-        residuals: &Residuals,
-        window: &mut Window,
+        window: &mut Window<'_>,
         code: Code,
         context: CodeContext<'_>,
     ) -> Option<Candidate> {
         let gaussian = self.gaussian(&code);
-        window.load(residuals, &gaussian).then_some(())?;
-        let gradient = window.gradient(&gaussian, self.model);
-        let present =
-            Candidate { code, error: gradient.change.error, bits: self.bits(code, context) };
-        let candidates = self.candidates(&gradient, code, &gaussian, context, self.cost(&present));
-        if candidates.is_empty() && self.cost(&present) < 0.0 {
-            return Some(present);
-        }
-        window.remove(&gaussian);
-        // Where nothing is clamped, the gradient tells the exact error.
+        let gradient = window.without(&gaussian, self.model)?;
         let mut best =
-            if window.is_clamped() { self.evaluate(window, code, context) } else { present };
-        for candidate in candidates {
-            if let Some(other) = self.evaluate_recolored(window, candidate, context)
+            Candidate { code, error: gradient.change.error, bits: self.bits(code, context) };
+        for candidate in self.candidates(&gradient, code, &gaussian, context, self.cost(&best)) {
+            if let Some(other) = self.evaluated(window, candidate, context)
                 && self.cost(&other) < self.cost(&best)
             {
                 best = other;
@@ -252,17 +243,11 @@ impl CoordinateDescent<'_> {
         found.into_iter().map(|(_, code)| code).collect()
     }
 
-    /// A code with its exact cost. The Gaussian is not part of the window's rendering.
-    fn evaluate(&self, window: &Window, code: Code, context: CodeContext<'_>) -> Candidate {
-        let change = window.change(&self.gaussian(&code), self.model);
-        Candidate { code, error: change.error, bits: self.bits(code, context) }
-    }
-
-    /// A code, with the best colours for its geometry, and its exact cost. `None` if the Gaussian
-    /// has no weight in the picture.
-    fn evaluate_recolored(
+    /// A code, with the best colours for its geometry, and its exact cost. The Gaussian is not part of the
+    /// window's rendering. `None` if it has no weight in the picture.
+    fn evaluated(
         &self,
-        window: &Window,
+        window: &Window<'_>,
         code: Code,
         context: CodeContext<'_>,
     ) -> Option<Candidate> {
@@ -271,9 +256,6 @@ impl CoordinateDescent<'_> {
             return None;
         }
         let code = self.with_best_colors(&change, code, context.costs);
-        if window.is_clamped() {
-            return Some(self.evaluate(window, code, context));
-        }
         let error = change.with_color(code.color, self.coder.lattice.color_units(&code));
         Some(Candidate { code, error, bits: self.bits(code, context) })
     }

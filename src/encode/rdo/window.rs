@@ -1,32 +1,26 @@
 //! The residuals around one Gaussian, and how the error, the sum of their squares times their
 //! sensitivities, depends on it.
 
-use core::ops::Range;
-
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::kernel_weights::{KernelWeights, LANES, Lanes, kernel_root};
 use super::quadratic_model::{GeometryChange, GeometryErrorSums};
-use super::residuals::{ClampMask, Residuals};
+use super::residuals::Residuals;
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
-/// The residuals of a rectangle around one Gaussian.
-#[derive(Debug, Default)]
-pub(crate) struct Window {
+/// The residuals of a rectangle around one Gaussian, without it.
+#[derive(Debug)]
+pub(crate) struct Window<'a> {
+    all: &'a Residuals,
+    level: Level,
     /// First column and row, in pixels.
     corner: [usize; 2],
     /// Number of vectors in a row, and number of rows.
     size: [usize; 2],
-    channels: usize,
     /// Row by row, in each row vector by vector, and for each vector channel by channel.
     residuals: Vec<Lanes>,
-    /// In the layout of `residuals`; empty if no residuals are ignored.
-    masks: Vec<ClampMask>,
-    /// The sensitivities of pixels, row by row, in each row vector by vector.
-    sensitivities: Vec<Lanes>,
-    level: Option<Level>,
 }
 
 /// How much a Gaussian changes the error of its window, and the derivatives by its colour.
@@ -68,82 +62,112 @@ pub(crate) struct ErrorGradient {
     pub(crate) sensitivity: f32,
 }
 
-impl Window {
-    /// Loads the residuals of the window of a Gaussian. Returns false if the window is outside the
-    /// picture.
-    pub(crate) fn load(&mut self, residuals: &Residuals, gaussian: &Gaussian) -> bool {
-        let Some([columns, rows]) = residuals.window(gaussian) else { return false };
-        let (vectors, channels) = (columns.len().div_ceil(LANES), residuals.channels());
+impl<'a> Window<'a> {
+    /// A window that is still empty.
+    pub(crate) fn new(all: &'a Residuals) -> Self {
+        Self { all, level: all.level(), corner: [0; 2], size: [0; 2], residuals: Vec::new() }
+    }
+
+    /// Takes a Gaussian out of the rendering in its window. Returns the derivatives of the error by the
+    /// Gaussian before; `None` if its window is outside the picture.
+    pub(crate) fn without(
+        &mut self,
+        gaussian: &Gaussian,
+        model: ColorModel,
+    ) -> Option<ErrorGradient> {
+        let [columns, rows] = self.all.window(gaussian)?;
         self.corner = [columns.start, rows.start];
-        self.size = [vectors, rows.len()];
-        self.channels = channels;
-        self.level = Some(residuals.level());
-        // Old values are overwritten, so that they need not be cleared.
-        self.residuals.resize(vectors * rows.len() * channels, [0.0; LANES]);
-        self.sensitivities.clear();
-        self.masks.clear();
-        let lines = self.residuals.chunks_exact_mut(vectors * channels);
-        for (index, (y, line)) in rows.zip(lines).enumerate() {
-            let x = columns.start;
-            self.sensitivities.extend_from_slice(residuals.sensitivities(x, y, vectors));
-            for channel in 0..channels {
-                let values = residuals.vectors(x, y, channel, vectors);
-                let places = line[channel..].iter_mut().step_by(channels);
-                places.zip(values).for_each(|(place, value)| *place = *value);
-                if let Some(masks) = residuals.ignored(x, y, channel, vectors) {
-                    self.masks.resize(self.size[1] * vectors * channels, ClampMask::NONE);
-                    let line = &mut self.masks[index * vectors * channels + channel..];
-                    line.iter_mut()
-                        .step_by(channels)
-                        .zip(masks)
-                        .for_each(|(place, mask)| *place = mask);
-                }
-            }
-        }
-        true
-    }
-
-    /// Whether the source is black or white somewhere in the window, where residuals are clamped.
-    pub(crate) fn is_clamped(&self) -> bool {
-        !self.masks.is_empty()
-    }
-
-    /// Removes a Gaussian from the rendering.
-    pub(crate) fn remove(&mut self, gaussian: &Gaussian) {
-        let level = self.level.unwrap_or_else(Level::new);
-        match self.channels {
-            1 => dispatch!(level, simd => self.remove_with::<_, 1>(simd, gaussian)),
-            2 => dispatch!(level, simd => self.remove_with::<_, 2>(simd, gaussian)),
-            3 => dispatch!(level, simd => self.remove_with::<_, 3>(simd, gaussian)),
-            _ => dispatch!(level, simd => self.remove_with::<_, 4>(simd, gaussian)),
-        }
-    }
-
-    #[inline(always)]
-    fn remove_with<S: Simd, const CHANNELS: usize>(&mut self, simd: S, gaussian: &Gaussian) {
-        let weights = KernelWeights::new(gaussian);
+        self.size = [columns.len().div_ceil(LANES), rows.len()];
         let [vectors, rows] = self.size;
+        // Old values are overwritten, so that they need not be cleared.
+        self.residuals.resize(vectors * rows * self.all.channels(), [0.0; LANES]);
+        let level = self.level;
+        let (sums, by_geometry, sensitivity) = match self.all.channels() {
+            1 => dispatch!(level, simd => self.without_with::<_, 1>(simd, gaussian)),
+            2 => dispatch!(level, simd => self.without_with::<_, 2>(simd, gaussian)),
+            3 => dispatch!(level, simd => self.without_with::<_, 3>(simd, gaussian)),
+            _ => dispatch!(level, simd => self.without_with::<_, 4>(simd, gaussian)),
+        };
+        Some(ErrorGradient { change: sums.change(gaussian, model), by_geometry, sensitivity })
+    }
+
+    /// [`Window::without`] for a number of channels.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
+    fn without_with<S: Simd, const CHANNELS: usize>(
+        &mut self,
+        simd: S,
+        gaussian: &Gaussian,
+    ) -> (WindowSums, GeometryChange, f32) {
+        let weights = KernelWeights::new(gaussian);
+        let ([left, top], [vectors, rows]) = (self.corner, self.size);
+        let places = self.residuals.as_chunks_mut::<CHANNELS>().0;
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut squares, mut products, mut all) = (zero, [zero; CHANNELS], zero);
+        let (mut first, mut second) = ([zero; 2], [zero; 3]);
         for row in 0..rows {
-            let y = self.corner[1] + row;
-            let span = weights.span(self.corner[0], y, vectors);
-            let x = self.corner[0] + span.start * LANES;
-            let line =
-                &mut self.residuals.as_chunks_mut::<CHANNELS>().0[row * vectors..][..vectors];
-            let line = line.get_mut(span).unwrap_or_default();
-            for (index, residuals) in line.iter_mut().enumerate() {
-                let weight = weights.at(simd, x + index * LANES, y);
-                for (residuals, color) in residuals.iter_mut().zip(gaussian.color) {
-                    (f32x16::load_array_ref(simd, residuals) - weight * color)
-                        .store_array(residuals);
+            let y = top + row;
+            let span = weights.span(left, y, vectors);
+            for vector in 0..vectors {
+                let x = left + vector * LANES;
+                let place = &mut places[row * vectors + vector];
+                let mut residuals = [zero; CHANNELS];
+                for channel in 0..CHANNELS {
+                    residuals[channel] = self.all.vector(simd, x, y, channel);
+                }
+                if span.contains(&vector) {
+                    let [u, v] = weights.local(simd, x, y);
+                    let root = kernel_root(simd, [u, v]);
+                    let weight = root * root;
+                    let sensitivity = f32x16::load_array_ref(simd, self.all.sensitivities(x, y));
+                    let counted = weight * sensitivity;
+                    squares = counted.mul_add_precise(weight, squares);
+                    all = weight.mul_add_precise(weight, all);
+                    let mut along = zero;
+                    for channel in 0..CHANNELS {
+                        let (residual, color) = (residuals[channel], gaussian.color[channel]);
+                        products[channel] = counted.mul_add_precise(residual, products[channel]);
+                        along = residual.mul_add_precise(color, along);
+                        residuals[channel] = weight.mul_add_precise(-color, residual);
+                    }
+                    // dweight/dq = -root / 2, and q = u^2 + v^2.
+                    let slope = along * sensitivity * root;
+                    let (by_u, by_v) = (slope * u, slope * v);
+                    first[0] += by_u;
+                    first[1] += by_v;
+                    second[0] = by_u.mul_add_precise(u, second[0]);
+                    second[1] = by_u.mul_add_precise(v, second[1]);
+                    second[2] = by_v.mul_add_precise(v, second[2]);
+                }
+                for channel in 0..CHANNELS {
+                    residuals[channel].store_array(&mut place[channel]);
                 }
             }
         }
+        let squared_weights = lane_sum(squares);
+        let mut sums = WindowSums { error: 0.0, by_channel: [0.0; 4], squared_weights };
+        let mut weighted = 0.0;
+        for channel in 0..CHANNELS {
+            let (color, product) = (gaussian.color[channel], lane_sum(products[channel]));
+            sums.error += color * (2.0 * product - color * squared_weights);
+            sums.by_channel[channel] = product;
+            weighted += color * product;
+        }
+        let geometry = GeometryErrorSums {
+            first: [lane_sum(first[0]), lane_sum(first[1])],
+            second: [lane_sum(second[0]), lane_sum(second[1]), lane_sum(second[2])],
+            weighted,
+        };
+        // Without any weight in the picture, nothing depends on it.
+        let all = lane_sum(all);
+        let sensitivity = if all > 0.0 { squared_weights / all } else { 1.0 };
+        (sums, geometry.gradient(gaussian), sensitivity)
     }
 
     /// The change of error by a Gaussian that is not part of the rendering.
     pub(crate) fn change(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
-        let level = self.level.unwrap_or_else(Level::new);
-        let sums = match self.channels {
+        let level = self.level;
+        let sums = match self.all.channels() {
             1 => dispatch!(level, simd => self.sums::<_, 1>(simd, gaussian)),
             2 => dispatch!(level, simd => self.sums::<_, 2>(simd, gaussian)),
             3 => dispatch!(level, simd => self.sums::<_, 3>(simd, gaussian)),
@@ -154,191 +178,36 @@ impl Window {
 
     /// [`Window::change`] for a number of channels.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
     fn sums<S: Simd, const CHANNELS: usize>(&self, simd: S, gaussian: &Gaussian) -> WindowSums {
-        if self.is_clamped() {
-            return self.clamped_sums::<S, CHANNELS>(simd, gaussian);
-        }
         let weights = KernelWeights::new(gaussian);
-        let [vectors, rows] = self.size;
-        let mut squares = f32x16::splat(simd, 0.0);
-        let mut products = [squares; CHANNELS];
+        let ([left, top], [vectors, rows]) = (self.corner, self.size);
+        let places = self.residuals.as_chunks::<CHANNELS>().0;
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut squares, mut products) = (zero, [zero; CHANNELS]);
         for row in 0..rows {
-            let y = self.corner[1] + row;
-            let span = weights.span(self.corner[0], y, vectors);
-            let x = self.corner[0] + span.start * LANES;
-            let lines =
-                self.line::<CHANNELS>(row, &span).iter().zip(self.sensitivities(row, &span));
-            for (index, (residuals, sensitivities)) in lines.enumerate() {
-                let weight = weights.at(simd, x + index * LANES, y);
-                let counted = weight * f32x16::load_array_ref(simd, sensitivities);
-                squares += counted * weight;
-                for (product, residuals) in products.iter_mut().zip(residuals) {
-                    *product += counted * f32x16::load_array_ref(simd, residuals);
+            let y = top + row;
+            for vector in weights.span(left, y, vectors) {
+                let x = left + vector * LANES;
+                let weight = weights.at(simd, x, y);
+                let sensitivity = f32x16::load_array_ref(simd, self.all.sensitivities(x, y));
+                let counted = weight * sensitivity;
+                squares = counted.mul_add_precise(weight, squares);
+                let residuals = &places[row * vectors + vector];
+                for channel in 0..CHANNELS {
+                    let residual = f32x16::load_array_ref(simd, &residuals[channel]);
+                    products[channel] = counted.mul_add_precise(residual, products[channel]);
                 }
             }
         }
         let squared_weights = lane_sum(squares);
         let mut sums = WindowSums { error: 0.0, by_channel: [0.0; 4], squared_weights };
-        for (channel, &product) in products.iter().enumerate() {
-            let (color, product) = (gaussian.color[channel], lane_sum(product));
+        for channel in 0..CHANNELS {
+            let (color, product) = (gaussian.color[channel], lane_sum(products[channel]));
             sums.error += color * (color * squared_weights + 2.0 * product);
             sums.by_channel[channel] = color * squared_weights + product;
         }
         sums
-    }
-
-    /// [`Window::sums`] where residuals are clamped.
-    #[inline(always)]
-    fn clamped_sums<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        gaussian: &Gaussian,
-    ) -> WindowSums {
-        let weights = KernelWeights::new(gaussian);
-        let [vectors, rows] = self.size;
-        let zero = f32x16::splat(simd, 0.0);
-        let (mut change, mut squares, mut products) = (zero, zero, [zero; CHANNELS]);
-        for row in 0..rows {
-            let y = self.corner[1] + row;
-            let span = weights.span(self.corner[0], y, vectors);
-            let x = self.corner[0] + span.start * LANES;
-            let lines =
-                self.line::<CHANNELS>(row, &span).iter().zip(self.masks::<CHANNELS>(row, &span));
-            let lines = lines.zip(self.sensitivities(row, &span));
-            for (index, ((residuals, masks), sensitivities)) in lines.enumerate() {
-                let weight = weights.at(simd, x + index * LANES, y);
-                let sensitivity = f32x16::load_array_ref(simd, sensitivities);
-                for channel in 0..CHANNELS {
-                    let without = f32x16::load_array_ref(simd, &residuals[channel]);
-                    let with = without + weight * gaussian.color[channel];
-                    let clamped = masks[channel].clamped(simd, with);
-                    let before = masks[channel].clamped(simd, without);
-                    change += (clamped * clamped - before * before) * sensitivity;
-                    products[channel] += weight * sensitivity * clamped;
-                    let counts = clamped.simd_eq(with);
-                    squares += counts.select(weight * sensitivity * weight, zero);
-                }
-            }
-        }
-        let mut by_channel = [0.0; 4];
-        for (sum, &product) in by_channel.iter_mut().zip(&products) {
-            *sum = lane_sum(product);
-        }
-        WindowSums {
-            error: lane_sum(change),
-            by_channel,
-            squared_weights: lane_sum(squares) / CHANNELS as f32,
-        }
-    }
-
-    /// The derivatives of the error by a Gaussian that is part of the rendering.
-    pub(crate) fn gradient(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorGradient {
-        let level = self.level.unwrap_or_else(Level::new);
-        let (sums, by_geometry, sensitivity) = match self.channels {
-            1 => dispatch!(level, simd => self.gradient_with::<_, 1>(simd, gaussian)),
-            2 => dispatch!(level, simd => self.gradient_with::<_, 2>(simd, gaussian)),
-            3 => dispatch!(level, simd => self.gradient_with::<_, 3>(simd, gaussian)),
-            _ => dispatch!(level, simd => self.gradient_with::<_, 4>(simd, gaussian)),
-        };
-        ErrorGradient { change: sums.change(gaussian, model), by_geometry, sensitivity }
-    }
-
-    /// [`Window::gradient`] for a number of channels.
-    #[inline(always)]
-    fn gradient_with<S: Simd, const CHANNELS: usize>(
-        &self,
-        simd: S,
-        gaussian: &Gaussian,
-    ) -> (WindowSums, GeometryChange, f32) {
-        let weights = KernelWeights::new(gaussian);
-        let [vectors, rows] = self.size;
-        let zero = f32x16::splat(simd, 0.0);
-        let (mut squares, mut products) = (zero, [zero; CHANNELS]);
-        let (mut first, mut second) = ([zero; 2], [zero; 3]);
-        let (mut all, mut all_counted) = (zero, zero);
-        for row in 0..rows {
-            let y = self.corner[1] + row;
-            let span = weights.span(self.corner[0], y, vectors);
-            let x = self.corner[0] + span.start * LANES;
-            let masks = self.masks::<CHANNELS>(row, &span);
-            let lines =
-                self.line::<CHANNELS>(row, &span).iter().zip(self.sensitivities(row, &span));
-            for (index, (residuals, sensitivities)) in lines.enumerate() {
-                let [u, v] = weights.local(simd, x + index * LANES, y);
-                let root = kernel_root(simd, [u, v]);
-                let weight = root * root;
-                let sensitivity = f32x16::load_array_ref(simd, sensitivities);
-                let counted = weight * sensitivity;
-                let mut square = counted * weight;
-                all += weight * weight;
-                all_counted += square;
-                let mut along = zero;
-                for channel in 0..CHANNELS {
-                    let mut residual = f32x16::load_array_ref(simd, &residuals[channel]);
-                    if let Some(masks) = masks.get(index) {
-                        let clamped = masks[channel].clamped(simd, residual);
-                        let counts = clamped.simd_eq(residual);
-                        square -= counts.select(zero, counted * weight * (1.0 / CHANNELS as f32));
-                        residual = clamped;
-                    }
-                    products[channel] += counted * residual;
-                    along += residual * gaussian.color[channel];
-                }
-                squares += square;
-                // dweight/dq = -root / 2, and q = u^2 + v^2.
-                let slope = along * sensitivity * root;
-                let (by_u, by_v) = (slope * u, slope * v);
-                first[0] += by_u;
-                first[1] += by_v;
-                second[0] += by_u * u;
-                second[1] += by_u * v;
-                second[2] += by_v * v;
-            }
-        }
-        let squared_weights = lane_sum(squares);
-        let mut sums = WindowSums { error: 0.0, by_channel: [0.0; 4], squared_weights };
-        for (channel, &product) in products.iter().enumerate() {
-            let (color, product) = (gaussian.color[channel], lane_sum(product));
-            sums.error += color * (2.0 * product - color * squared_weights);
-            sums.by_channel[channel] = product;
-        }
-        let weighted: f32 = sums.by_channel.iter().zip(gaussian.color).map(|(b, c)| b * c).sum();
-        let geometry = GeometryErrorSums {
-            first: first.map(lane_sum),
-            second: second.map(lane_sum),
-            weighted,
-        };
-        // Without any weight in the picture, nothing depends on it.
-        let all = lane_sum(all);
-        let sensitivity = if all > 0.0 { lane_sum(all_counted) / all } else { 1.0 };
-        (sums, geometry.gradient(gaussian), sensitivity)
-    }
-
-    /// The sensitivities of a span of a row.
-    #[inline(always)]
-    fn sensitivities(&self, row: usize, span: &Range<usize>) -> &[Lanes] {
-        self.sensitivities[row * self.size[0]..][..self.size[0]]
-            .get(span.clone())
-            .unwrap_or_default()
-    }
-
-    /// The residuals of a span of a row.
-    #[inline(always)]
-    fn line<const CHANNELS: usize>(&self, row: usize, span: &Range<usize>) -> &[[Lanes; CHANNELS]] {
-        let line = self.residuals.as_chunks::<CHANNELS>().0;
-        line[row * self.size[0]..][..self.size[0]].get(span.clone()).unwrap_or_default()
-    }
-
-    /// The masks of a span of a row; empty if no residuals are clamped.
-    #[inline(always)]
-    fn masks<const CHANNELS: usize>(
-        &self,
-        row: usize,
-        span: &Range<usize>,
-    ) -> &[[ClampMask; CHANNELS]] {
-        let lines = self.masks.as_chunks::<CHANNELS>().0;
-        let start = row * self.size[0];
-        lines.get(start + span.start..start + span.end).unwrap_or_default()
     }
 }
 
