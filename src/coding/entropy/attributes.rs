@@ -23,30 +23,49 @@ pub(super) fn attributes(
     level: u32,
     known: Code,
 ) -> Code {
-    coder.begin(Attribute::Precision);
-    let mut class = coder.symbol(contexts::CLASS, known.class);
-    if class > MAX_CLASS {
-        coder.refuse();
-        class = MAX_CLASS;
-    }
+    let class = precision(coder, known.class);
     coder.begin(Attribute::Color);
     let color = color(coder, channels, class as usize, known.color);
     coder.begin(Attribute::Shape);
+    let [size, ratio, slant] =
+        shape(coder, lattice, level, class, [known.size, known.ratio, known.slant]);
+    Code { class, color, size, ratio, slant, center: known.center }
+}
 
+/// Codes the precision class.
+#[inline(always)]
+pub(super) fn precision(coder: &mut impl SymbolCoder, known: u32) -> u32 {
+    coder.begin(Attribute::Precision);
+    let class = coder.symbol(contexts::CLASS, known);
+    if class > MAX_CLASS {
+        coder.refuse();
+        return MAX_CLASS;
+    }
+    class
+}
+
+/// Codes size, ratio and slant for a precision class.
+#[inline(always)]
+pub(super) fn shape(
+    coder: &mut impl SymbolCoder,
+    lattice: &Lattice,
+    level: u32,
+    class: u32,
+    [size, ratio, slant]: [i32; 3],
+) -> [i32; 3] {
     let shift = class.saturating_sub(SHAPE_CLASSES as u32 - 1);
     let rank = (class as usize).min(SHAPE_CLASSES - 1);
     let step = lattice.size.step() * class_scale(class);
     let expected = EXPECTED_SIZE[0] + EXPECTED_SIZE[1] * level as f32;
     let expected = (expected / step) as i32;
-    let size = known.size.wrapping_sub(expected);
+    let size = size.wrapping_sub(expected);
     let size = signed(coder, contexts::SIZE + rank, shift, size).wrapping_add(expected);
-    let ratio = signed(coder, contexts::RATIO + rank, shift, known.ratio);
+    let ratio = signed(coder, contexts::RATIO + rank, shift, ratio);
     // In steps of class 2, whatever the class.
     let coarse = if class < 2 { ratio << (2 - class) } else { ratio >> shift };
     let range = (coarse.div_euclid(3) + RATIOS as i32 / 2).clamp(0, RATIOS as i32 - 1);
     let context = contexts::SLANT + rank * RATIOS + range as usize;
-    let slant = signed(coder, context, shift, known.slant);
-    Code { class, color, size, ratio, slant, center: known.center }
+    [size, ratio, signed(coder, context, shift, slant)]
 }
 
 /// Codes the amplitudes along the colour axes: the first with its sign, the others relative to that

@@ -281,6 +281,16 @@ impl Lattice {
         [column, row]
     }
 
+    /// The logarithms of size and ratio that a code stands for, and the slant.
+    pub(crate) fn shape_values(&self, code: &Code) -> [f32; 3] {
+        let scale = class_scale(code.class);
+        [
+            code.size as f32 * (self.size.step * scale),
+            code.ratio as f32 * (self.ratio.step * scale),
+            code.slant as f32 * (self.slant * scale),
+        ]
+    }
+
     /// The amplitude along each colour axis of one step, for the size that a code has.
     pub(crate) fn color_units(&self, code: &Code) -> [f32; 4] {
         let Shape { size, .. } = self.shape(code);

@@ -137,7 +137,8 @@ impl<'a> LayerCoder<'a> {
         let mut payload = (codes.len() as u32).to_le_bytes().to_vec();
         let mut encoder = RansEncoder::new(&mut models);
         let count = codes.len();
-        let mut gaussians = KnownGaussians { layer: self, codes, levels: &mut levels };
+        let (levels_of, scratch) = (&mut levels, Vec::new());
+        let mut gaussians = KnownGaussians { layer: self, codes, levels: levels_of, scratch };
         tree_walk::walk(&mut encoder, &self.grid, count, &mut gaussians);
         payload.extend(encoder.finish());
         let costs = models.iter().map(Model::costs).collect();
@@ -147,10 +148,11 @@ impl<'a> LayerCoder<'a> {
     /// Moves the `first` codes in the order of the tree to the front, in any order.
     #[cfg(feature = "encode")]
     pub(crate) fn cut(&self, codes: &mut [Code], first: usize) {
-        let mut range = 0..codes.len();
+        let (mut range, mut scratch) = (0..codes.len(), Vec::new());
         // Down the tree to the cell that the cut goes through.
         let mut narrow = |axis, middle| {
-            let middle = range.start + partition(&mut codes[range.clone()], axis, middle);
+            let middle =
+                range.start + partition(&mut codes[range.clone()], axis, middle, &mut scratch);
             let second = usize::from(middle <= first);
             range = if middle <= first { middle..range.end } else { range.start..middle };
             (second, range.start == first)
@@ -177,12 +179,20 @@ impl<'a> LayerCoder<'a> {
         }
     }
 
-    /// The cost in bits of a code with this shape in a cell of a level: its attributes and its
-    /// position within the cell, without the counts of the tree.
+    /// The cost in bits of a code with this shape in a cell of a level, without its amplitudes, which
+    /// [`LayerCoder::color_cost`] tells, and without the counts of the tree.
     #[cfg(feature = "encode")]
-    pub(crate) fn cost(&self, code: Code, shape: &Shape, level: u32, costs: &SymbolCosts) -> f32 {
+    pub(crate) fn geometry_cost(
+        &self,
+        code: &Code,
+        shape: &Shape,
+        level: u32,
+        costs: &SymbolCosts,
+    ) -> f32 {
         let mut cost = CostCounter { costs, bits: 0.0 };
-        self.attributes(&mut cost, level, code);
+        attributes::precision(&mut cost, code.class);
+        let values = [code.size, code.ratio, code.slant];
+        attributes::shape(&mut cost, self.lattice, level, code.class, values);
         let fraction_bits = self.lattice.fraction_bits(code.class, shape);
         // Cells are square, or twice as high as wide.
         let sides = [level / 2, level.div_ceil(2)].map(|side| side as i32);
@@ -254,12 +264,14 @@ struct KnownGaussians<'a> {
     codes: &'a mut [Code],
     /// The level of the cell of each Gaussian that was written.
     levels: &'a mut Vec<u32>,
+    /// Memory for [`partition`].
+    scratch: Vec<Code>,
 }
 
 #[cfg(feature = "encode")]
 impl TreeGaussians for KnownGaussians<'_> {
     fn partition(&mut self, range: Range<usize>, axis: usize, middle: u32) -> usize {
-        partition(&mut self.codes[range], axis, middle)
+        partition(&mut self.codes[range], axis, middle, &mut self.scratch)
     }
 
     #[inline(always)]
@@ -270,11 +282,22 @@ impl TreeGaussians for KnownGaussians<'_> {
 }
 
 /// Moves the codes whose centre lies before `middle` along an axis to the front, without another
-/// change of the order. Returns how many they are.
+/// change of the order. Returns how many they are. `scratch` is memory that calls share.
 #[cfg(feature = "encode")]
-fn partition(codes: &mut [Code], axis: usize, middle: u32) -> usize {
-    codes.sort_by_key(|code| code.center[axis] >= middle);
-    codes.partition_point(|code| code.center[axis] < middle)
+fn partition(codes: &mut [Code], axis: usize, middle: u32, scratch: &mut Vec<Code>) -> usize {
+    scratch.clear();
+    let mut first = 0;
+    for index in 0..codes.len() {
+        let code = codes[index];
+        if code.center[axis] < middle {
+            codes[first] = code;
+            first += 1;
+        } else {
+            scratch.push(code);
+        }
+    }
+    codes[first..].copy_from_slice(scratch);
+    first
 }
 
 #[cfg(all(test, feature = "encode"))]

@@ -119,7 +119,8 @@ impl<'a> CodeOptimizer<'a> {
             let (mut bits, mut tiles) = (0.0, 0.0);
             for (code, context) in codes.iter().zip(contexts) {
                 let shape = lattice.shape(code);
-                bits += coder.cost(*code, &shape, context.level, context.costs);
+                bits += coder.geometry_cost(code, &shape, context.level, context.costs);
+                bits += coder.color_cost(code, context.costs);
                 tiles += touched_tiles(shape.cholesky);
             }
             [bits, tiles]

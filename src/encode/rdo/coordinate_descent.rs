@@ -71,6 +71,39 @@ impl Candidate {
     }
 }
 
+/// The cheapest codes out of those that cost less than a given one, cheapest first.
+#[derive(Debug)]
+struct Cheapest {
+    costs: [f32; MAX_CANDIDATES],
+    codes: [Code; MAX_CANDIDATES],
+    count: usize,
+    limit: f32,
+}
+
+impl Cheapest {
+    /// None yet of those that cost less than `limit`.
+    fn below(limit: f32) -> Self {
+        let codes = [Code::default(); MAX_CANDIDATES];
+        Self { costs: [0.0; MAX_CANDIDATES], codes, count: 0, limit }
+    }
+
+    fn add(&mut self, cost: f32, code: Code) {
+        let later = self.costs[..self.count].iter().position(|&other| cost < other);
+        let place = later.unwrap_or(self.count);
+        if !(cost < self.limit) || place == MAX_CANDIDATES {
+            return;
+        }
+        self.count = (self.count + 1).min(MAX_CANDIDATES);
+        self.costs[place..self.count].rotate_right(1);
+        self.codes[place..self.count].rotate_right(1);
+        (self.costs[place], self.codes[place]) = (cost, code);
+    }
+
+    fn codes(&self) -> impl Iterator<Item = Code> {
+        self.codes[..self.count].iter().copied()
+    }
+}
+
 impl CoordinateDescent<'_> {
     /// One pass: improves or removes every Gaussian. `contexts` are those of the codes, and
     /// `residuals` those of their rendering, which are updated. Returns the codes; the less one lowers
@@ -183,8 +216,9 @@ impl CoordinateDescent<'_> {
         let gaussian = self.gaussian(&code);
         let gradient = window.without(&gaussian, self.model)?;
         let mut best =
-            Candidate { code, error: gradient.change.error, bits: self.bits(code, context) };
-        for candidate in self.candidates(&gradient, code, &gaussian, context, self.cost(&best)) {
+            Candidate { code, error: gradient.change.error, bits: self.bits(&code, context) };
+        let candidates = self.candidates(&gradient, code, &gaussian, context, self.cost(&best));
+        for candidate in candidates.codes() {
             if let Some(other) = self.evaluated(window, candidate, context)
                 && self.cost(&other) < self.cost(&best)
             {
@@ -208,39 +242,53 @@ impl CoordinateDescent<'_> {
         gaussian: &Gaussian,
         context: CodeContext<'_>,
         present_cost: f32,
-    ) -> Vec<Code> {
+    ) -> Cheapest {
         let (lattice, model) = (self.coder.lattice, self.model);
-        let [_, l21, l22] = gaussian.cholesky;
-        let slant = l21 / l22;
+        let slant = gaussian.cholesky[1] / gaussian.cholesky[2];
         let amplitudes = code.color.iter().zip(&lattice.color);
         let squared_strength: f32 =
             amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
         let squared_strength = squared_strength * gradient.sensitivity;
         let recolored = self.with_best_colors(&gradient.change, code, context.costs);
         let error = gradient.change.with_color(recolored.color, lattice.color_units(&recolored));
-        let mut found = Vec::new();
+        let mut found = Cheapest::below(present_cost);
+        let color_bits = self.coder.color_cost(&recolored, context.costs);
         if recolored != code {
-            found.push((error + self.lambda * self.bits(recolored, context), recolored));
+            let bits = self.geometry_bits(&recolored, context) + color_bits;
+            found.add(error + self.lambda * bits, recolored);
         }
         if squared_strength > 0.0 {
+            let mut add = |candidate: Code, color_bits: f32| {
+                let step = self.change(gaussian, &code, &candidate);
+                let change = gradient.by_geometry.error_change(&step, slant, squared_strength);
+                let bits = self.geometry_bits(&candidate, context) + color_bits;
+                found.add(error + change + self.lambda * bits, candidate);
+            };
+            for candidate in self.neighbours(recolored) {
+                add(candidate, color_bits);
+            }
             let step = gradient.by_geometry.minimizer(slant, squared_strength, TRUST_REGION);
             let target = step.applied(&self.gaussian(&recolored));
-            let classes = code.class.saturating_sub(1)..=(code.class + 1).min(MAX_CLASS);
-            let rounded =
-                classes.map(|class| lattice.code(&target, class, &self.coder.grid, model));
-            for candidate in self.neighbours(recolored).chain(rounded) {
-                let step = GeometryChange::between(gaussian, &self.gaussian(&candidate));
-                let change = gradient.by_geometry.error_change(&step, slant, squared_strength);
-                found.push((
-                    error + change + self.lambda * self.bits(candidate, context),
-                    candidate,
-                ));
+            for class in code.class.saturating_sub(1)..=(code.class + 1).min(MAX_CLASS) {
+                let candidate = lattice.code(&target, class, &self.coder.grid, model);
+                add(candidate, self.coder.color_cost(&candidate, context.costs));
             }
         }
-        found.retain(|(cost, _)| *cost < present_cost);
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found.truncate(MAX_CANDIDATES);
-        found.into_iter().map(|(_, code)| code).collect()
+        found
+    }
+
+    /// The change of geometry from a Gaussian with its code to another code.
+    fn change(&self, gaussian: &Gaussian, from: &Code, to: &Code) -> GeometryChange {
+        let [l11, l21, l22] = gaussian.cholesky;
+        let [x, y] = self.coder.grid.center(to.center);
+        let u = (x - gaussian.center[0]) / l11;
+        let [before, after] = [from, to].map(|code| self.coder.lattice.shape_values(code));
+        GeometryChange {
+            center: [u, (y - gaussian.center[1] - l21 * u) / l22],
+            size: after[0] - before[0],
+            ratio: after[1] - before[1],
+            slant: after[2] - before[2],
+        }
     }
 
     /// A code, with the best colours for its geometry, and its exact cost. The Gaussian is not part of the
@@ -257,7 +305,7 @@ impl CoordinateDescent<'_> {
         }
         let code = self.with_best_colors(&change, code, context.costs);
         let error = change.with_color(code.color, self.coder.lattice.color_units(&code));
-        Some(Candidate { code, error, bits: self.bits(code, context) })
+        Some(Candidate { code, error, bits: self.bits(&code, context) })
     }
 
     /// A code with the colours of least cost for its geometry, chosen for one colour axis after the
@@ -276,23 +324,34 @@ impl CoordinateDescent<'_> {
             let rounded = best.round() as i32;
             let towards_zero = rounded - rounded.signum();
             let candidates = [rounded, towards_zero, rounded + 1, rounded - 1, present, 0];
-            let lagrangian = candidates.map(|candidate| {
+            let (mut least, mut cheapest) = (f32::INFINITY, present);
+            for (index, &candidate) in candidates.iter().enumerate() {
+                if candidates[..index].contains(&candidate) {
+                    continue;
+                }
                 code.color[axis] = candidate;
                 let distance = candidate as f32 - best;
-                curvature * distance * distance + self.lambda * self.coder.color_cost(&code, costs)
-            });
-            let least =
-                (0..lagrangian.len()).min_by(|&a, &b| lagrangian[a].total_cmp(&lagrangian[b]));
-            code.color[axis] = candidates[least.expect("there are candidates")];
+                let bits = self.coder.color_cost(&code, costs);
+                let cost = curvature * distance * distance + self.lambda * bits;
+                if cost < least {
+                    (least, cheapest) = (cost, candidate);
+                }
+            }
+            code.color[axis] = cheapest;
         }
         code
     }
 
     /// The rate of a code in bits, with the penalty for the tiles that it touches.
-    fn bits(&self, code: Code, context: CodeContext<'_>) -> f32 {
-        let shape = self.coder.lattice.shape(&code);
-        let attribute_bits = self.coder.cost(code, &shape, context.level, context.costs);
-        self.tree_bits + attribute_bits + self.tile_bits * touched_tiles(shape.cholesky)
+    fn bits(&self, code: &Code, context: CodeContext<'_>) -> f32 {
+        self.geometry_bits(code, context) + self.coder.color_cost(code, context.costs)
+    }
+
+    /// The part of the rate that does not depend on the amplitudes.
+    fn geometry_bits(&self, code: &Code, context: CodeContext<'_>) -> f32 {
+        let shape = self.coder.lattice.shape(code);
+        let bits = self.coder.geometry_cost(code, &shape, context.level, context.costs);
+        self.tree_bits + bits + self.tile_bits * touched_tiles(shape.cholesky)
     }
 
     /// The codes that are one step up or down in one component of the geometry.

@@ -18,21 +18,6 @@ pub(crate) struct GeometryChange {
 }
 
 impl GeometryChange {
-    /// The change from one Gaussian's geometry to that of another.
-    pub(crate) fn between(from: &Gaussian, to: &Gaussian) -> Self {
-        let [l11, l21, l22] = from.cholesky;
-        let [m11, m21, m22] = to.cholesky;
-        let [dx, dy] = [to.center[0] - from.center[0], to.center[1] - from.center[1]];
-        let u = dx / l11;
-        let (log1, log2) = ((m11 / l11).ln(), (m22 / l22).ln());
-        Self {
-            center: [u, (dy - l21 * u) / l22],
-            size: 0.5 * (log1 + log2),
-            ratio: 0.5 * (log1 - log2),
-            slant: m21 / m22 - l21 / l22,
-        }
-    }
-
     /// A Gaussian after this change, with the same strength.
     pub(crate) fn applied(&self, gaussian: &Gaussian) -> Gaussian {
         let [l11, l21, l22] = gaussian.cholesky;
@@ -111,6 +96,21 @@ impl GeometryErrorSums {
 mod tests {
     use super::*;
 
+    /// The change from one Gaussian's geometry to that of another.
+    fn between(from: &Gaussian, to: &Gaussian) -> GeometryChange {
+        let [l11, l21, l22] = from.cholesky;
+        let [m11, m21, m22] = to.cholesky;
+        let [dx, dy] = [to.center[0] - from.center[0], to.center[1] - from.center[1]];
+        let u = dx / l11;
+        let (log1, log2) = ((m11 / l11).ln(), (m22 / l22).ln());
+        GeometryChange {
+            center: [u, (dy - l21 * u) / l22],
+            size: 0.5 * (log1 + log2),
+            ratio: 0.5 * (log1 - log2),
+            slant: m21 / m22 - l21 / l22,
+        }
+    }
+
     /// What a Gaussian adds to the first channel at a point.
     fn value(gaussian: &Gaussian, x: f64, y: f64) -> f64 {
         let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn an_applied_change_is_found_again() {
         for change in changes() {
-            let found = GeometryChange::between(&gaussian(), &change.applied(&gaussian()));
+            let found = between(&gaussian(), &change.applied(&gaussian()));
             assert!((found.size - change.size).abs() < 1e-6, "{found:?}");
             assert!((found.ratio - change.ratio).abs() < 1e-6, "{found:?}");
             assert!((found.slant - change.slant).abs() < 1e-6, "{found:?}");
