@@ -14,6 +14,8 @@ use crate::layers::plan;
 
 /// Work to code a Gaussian.
 const WORK: f64 = 800.0;
+/// Work to move a code to its half of a part.
+const WORK_OF_CUT: f64 = 20.0;
 /// Work for the bounds of a Gaussian.
 const WORK_OF_BOUNDS: f64 = 100.0;
 
@@ -93,36 +95,43 @@ fn divide<'a>(
     observer.poll()?;
     codes.par_sort_by_key(|code| core::cmp::Reverse(code.strength()));
     observer.poll()?;
-    let mut layers = Vec::new();
+    let mut parts = Vec::new();
     let mut rest = codes;
     for first in plan::first_entropy_layers(count) {
         let (part, later) = rest.split_at_mut(first);
-        divide_by_position(coder, part, most, &mut layers, observer)?;
+        parts.push(part);
         rest = later;
     }
-    divide_by_position(coder, rest, most, &mut layers, observer)?;
-    Ok(layers)
+    parts.push(rest);
+    parts.retain(|part| !part.is_empty());
+    divide_by_position(coder, parts, most, observer)
 }
 
-/// Divides codes by position into layers of `most` codes; the last layer may have fewer.
+/// Divides each of the parts by position into layers of `most` codes; the last layer of a part may have
+/// fewer.
 fn divide_by_position<'a>(
     coder: &LayerCoder<'_>,
-    mut rest: &'a mut [Code],
+    mut parts: Vec<&'a mut [Code]>,
     most: usize,
-    layers: &mut Vec<&'a mut [Code]>,
     observer: &mut Observer<'_>,
-) -> Result<(), EncodeError> {
-    while rest.len() > most {
-        observer.poll()?;
-        coder.cut(rest, most);
-        let (layer, later) = rest.split_at_mut(most);
-        layers.push(layer);
-        rest = later;
+) -> Result<Vec<&'a mut [Code]>, EncodeError> {
+    // In halves, so that every code is moved a few times only.
+    while let Some(largest) = parts.iter().map(|part| part.len()).max()
+        && largest > most
+    {
+        let work = WORK_OF_CUT * largest as f64;
+        let halves = observer.map(work, parts.into_iter(), |part| {
+            let layers = part.len().div_ceil(most);
+            let first = part.len().min(layers.div_ceil(2) * most);
+            if first < part.len() {
+                coder.cut(part, first);
+            }
+            part.split_at_mut(first)
+        })?;
+        parts = halves.into_iter().flat_map(<[_; 2]>::from).collect();
+        parts.retain(|part| !part.is_empty());
     }
-    if !rest.is_empty() {
-        layers.push(rest);
-    }
-    Ok(())
+    Ok(parts)
 }
 
 #[cfg(test)]
