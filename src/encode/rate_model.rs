@@ -7,6 +7,8 @@
 //! times the square root of its area l11 l22: the squared strength is proportional to the sum of
 //! the squares that it adds to the picture.
 
+use fearless_simd::{Simd, f32x16};
+
 use super::options::Tune;
 use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
 use crate::color::ColorModel;
@@ -112,6 +114,13 @@ impl RateTerm {
         let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
         let factor = self.weight * area / (self.squared_step + squared * area);
         gaussian.color.map(|color| factor * color)
+    }
+
+    /// What the colours are multiplied by in [`Self::gradient`], for sixteen Gaussians of these areas
+    /// and squared lengths of colour.
+    #[inline(always)]
+    pub(crate) fn factors<S: Simd>(&self, area: f32x16<S>, squared: f32x16<S>) -> f32x16<S> {
+        area * self.weight / (squared * area + self.squared_step)
     }
 }
 

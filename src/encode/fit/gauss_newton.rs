@@ -5,6 +5,8 @@
 //! a pace of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
 //! falls when they turn round (as in Rprop; Riedmiller and Braun, 1993).
 
+pub(super) mod blocks;
+
 use glam::{Vec2, Vec3};
 
 use super::parameterization::OwnFrame;
@@ -12,6 +14,7 @@ use super::row::{Row, RowBounds, Slope, shape_of};
 use super::training::GaussNewton;
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;
+use crate::math;
 
 /// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
 /// all of them would take the same step, and never come to rest.
@@ -29,12 +32,13 @@ pub(super) struct State {
     mean: Row,
     /// The factor on steps.
     pace: f32,
-    /// Steps since the Gaussian was added, for the bias correction.
-    age: i32,
+    /// The sum of the weights in the moving average, for the bias correction: 0 before the first step.
+    weight: f32,
 }
 
 impl State {
-    pub(super) const NEW: Self = Self { mean: [0.0; MAX_COMPONENTS], pace: FIRST_PACE, age: 0 };
+    pub(super) const NEW: Self =
+        Self { mean: [0.0; MAX_COMPONENTS], pace: FIRST_PACE, weight: 0.0 };
 }
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
@@ -77,12 +81,12 @@ pub(super) fn step(
         .map(|index| state.mean[index] * gradient[index] / curvatures[index])
         .sum();
     // Before the first step there is nothing to agree with.
-    if state.age > 0 {
+    if state.weight > 0.0 {
         let change = if agreement < 0.0 { SLOWER } else { FASTER };
         state.pace = (state.pace * change).clamp(LEAST_PACE, MOST_PACE);
     }
-    state.age = state.age.saturating_add(1);
-    let rate = options.rate * state.pace * factor / (1.0 - momentum.powi(state.age));
+    state.weight = momentum * state.weight + (1.0 - momentum);
+    let rate = state.pace * (options.rate * factor) / state.weight;
     let mut steps = [0.0; MAX_COMPONENTS];
     for index in 0..MAX_COMPONENTS {
         let mean = &mut state.mean[index];
@@ -96,7 +100,7 @@ pub(super) fn step(
     row[0] -= center.x;
     row[1] -= center.y;
     row[2..5].copy_from_slice(&shape.to_array());
-    let faded = by_shape.x.exp();
+    let faded = math::exp(by_shape.x);
     for (value, step) in row[5..].iter_mut().zip(&steps[5..]) {
         *value = *value * faded - step;
     }

@@ -319,6 +319,15 @@ impl<'a> Fit<'a> {
         let raster = self.raster;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
+        if quantizers.is_none() {
+            let slope = |index: usize, row: &Row| {
+                (pass.gradient(index, channels), raster.sensitivity_near([row[0], row[1]]))
+            };
+            let (bounds, parameters) = (self.bounds, &mut self.parameters);
+            if parameters.step_in_blocks(bounds, factor, rate_term, observer, slope)? {
+                return Ok(());
+            }
+        }
         let by_chunk: Vec<QuantizerGradients> =
             self.parameters.step(self.bounds, factor, observer, |index, row, sum| {
                 let decoded = decoded(quantizers, row);

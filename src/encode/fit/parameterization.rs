@@ -157,7 +157,7 @@ pub(crate) fn clamped(parameterization: Parameterization, values: Vec3, max: f32
             let l21 = values.y.clamp(-max, max);
             // The smaller deviation is l11 l22 divided by the larger one, and that is about the
             // length of (l11, l21).
-            let least = MIN_DEVIATION * (l11.hypot(l21) / l11).max(1.0);
+            let least = MIN_DEVIATION * ((l11 * l11 + l21 * l21).sqrt() / l11).max(1.0);
             Vec3::new(l11, l21, values.z.clamp(MIN_DEVIATION, max).max(least))
         }
         Parameterization::Covariance => {

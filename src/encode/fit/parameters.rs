@@ -1,18 +1,24 @@
 //! The trained values of all Gaussians, and the state of the optimizer that trains them.
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
+use super::gauss_newton::blocks::BlockStep;
+use super::pass::SplatGradient;
 use super::row::{Row, RowBounds, Slope};
 use super::state::{States, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
+use crate::encode::rate_model::RateTerm;
+use crate::gaussian::Parameterization;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
-/// Work to step a Gaussian.
+/// Work to step a Gaussian, alone and in a block.
 const WORK: f64 = 200.0;
+const WORK_IN_BLOCK: f64 = 40.0;
 
 /// Trained values with their optimizer.
 #[derive(Debug)]
@@ -100,6 +106,34 @@ impl Parameters {
                 })
             }
         }
+    }
+
+    /// Takes the steps of [`Self::step`] in blocks, if there is code for that. `slope` returns, for an
+    /// index and its row, the gradient of the pass and how much a squared error counts there. Returns
+    /// whether the steps were taken.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn step_in_blocks(
+        &mut self,
+        bounds: RowBounds,
+        factor: f32,
+        rate_term: Option<RateTerm>,
+        observer: &mut Observer<'_>,
+        slope: impl Fn(usize, &Row) -> (SplatGradient, f32) + Send + Sync,
+    ) -> Result<bool, EncodeError> {
+        let (States::GaussNewton(options, states), Parameterization::Cholesky) =
+            (&mut self.states, bounds.parameterization)
+        else {
+            return Ok(false);
+        };
+        let step = BlockStep { options, bounds, factor, rate_term };
+        let level = Level::new();
+        let chunks = self.values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
+        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(chunk, (rows, states))| {
+            step.run(level, rows, states, |index, row| slope(chunk * CHUNK + index, row));
+        })?;
+        Ok(true)
     }
 
     /// Size in bytes.

@@ -11,7 +11,7 @@ pub(crate) type Row = [f32; MAX_COMPONENTS];
 
 /// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
 /// depends on rounding errors.
-const MAX_COLOR: f32 = 8.0;
+pub(super) const MAX_COLOR: f32 = 8.0;
 
 /// The shape components of a row.
 #[inline]
@@ -38,7 +38,8 @@ pub(crate) struct RowBounds {
 
 impl RowBounds {
     /// Largest standard deviation that is trained, in pixels: twice the longer side of the picture.
-    fn max_deviation(self) -> f32 {
+    #[inline]
+    pub(super) fn max_deviation(self) -> f32 {
         2.0 * self.size.max_element()
     }
 
@@ -52,16 +53,18 @@ impl RowBounds {
         row
     }
 
+    /// The ranges of x and y of a centre. Farther outside, it would widen the range over which positions
+    /// are quantized, for a Gaussian of which little is visible.
+    #[inline]
+    pub(super) fn center_ranges(self) -> [(f32, f32); 2] {
+        let margin = 8.0 + 0.05 * self.size;
+        [(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)]
+    }
+
     /// Clamps everything but the shape.
     #[inline]
     pub(crate) fn clamp_position_and_color(self, row: &mut Row) {
-        // A centre farther outside would widen the range over which positions are quantized, for a
-        // Gaussian of which little is visible.
-        let margin = 8.0 + 0.05 * self.size;
-        for (value, (low, high)) in row[..2]
-            .iter_mut()
-            .zip([(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)])
-        {
+        for (value, (low, high)) in row[..2].iter_mut().zip(self.center_ranges()) {
             *value = value.clamp(low, high);
         }
         for value in &mut row[5..] {

@@ -1,0 +1,381 @@
+//! Gauss-Newton steps of trained Cholesky factors, sixteen Gaussians at a time.
+//!
+//! The gradients in a Gaussian's own frame follow directly from the sums of the pass: with the inverse
+//! M of the factor L, that by the centre is M (sum of s d), and where L becomes L (I + D), that by the
+//! shape is the sum of the products of the entries of D and of Z^T, with Z = M (sum of s d d^T) M^T.
+//!
+//! Loops are over indices, as in `fit/training_tile.rs`. There are no fused multiplications, so all
+//! machines get the same bits.
+
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+
+use super::{FASTER, LEAST_PACE, MOST_PACE, SLOWER, State};
+use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
+use crate::encode::fit::parameterization::MIN_DEVIATION;
+use crate::encode::fit::pass::SplatGradient;
+use crate::encode::fit::row::{MAX_COLOR, Row, RowBounds};
+use crate::encode::fit::training::GaussNewton;
+use crate::encode::rate_model::RateTerm;
+use crate::gaussian::MAX_COMPONENTS;
+use crate::render::simd_kernel;
+use crate::simd::LANES;
+
+/// The reciprocals of the curvatures for a strength or an area of 1.
+const RECIPROCALS: Row = [
+    1.0 / POSITION,
+    1.0 / POSITION,
+    1.0 / SIZE,
+    1.0 / RATIO,
+    1.0 / SLANT,
+    1.0 / COLOR,
+    1.0 / COLOR,
+    1.0 / COLOR,
+    1.0 / COLOR,
+];
+
+/// What the steps of all Gaussians have in common.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::encode::fit) struct BlockStep<'a> {
+    pub(in crate::encode::fit) options: &'a GaussNewton,
+    /// The parameterization is that by Cholesky factors.
+    pub(in crate::encode::fit) bounds: RowBounds,
+    /// The factor on the learning rate.
+    pub(in crate::encode::fit) factor: f32,
+    pub(in crate::encode::fit) rate_term: Option<RateTerm>,
+}
+
+impl BlockStep<'_> {
+    /// One step for each of `rows`. `slope` returns, for an index and its row, the gradient of the pass
+    /// and how much a squared error counts there.
+    pub(in crate::encode::fit) fn run(
+        &self,
+        level: Level,
+        rows: &mut [Row],
+        states: &mut [State],
+        slope: impl Fn(usize, &Row) -> (SplatGradient, f32),
+    ) {
+        dispatch!(level, simd => {
+            let (blocks, rest) = rows.as_chunks_mut::<LANES>();
+            let (state_blocks, rest_states) = states.as_chunks_mut::<LANES>();
+            for block in 0..blocks.len() {
+                let rows = &mut blocks[block];
+                let mut slopes = [(SplatGradient::default(), 1.0); LANES];
+                for lane in 0..LANES {
+                    slopes[lane] = slope(block * LANES + lane, &rows[lane]);
+                }
+                self.step(simd, rows, &mut state_blocks[block], &slopes);
+            }
+            if let Some(&any) = rest.first() {
+                let mut rows = [any; LANES];
+                let mut states = [State::NEW; LANES];
+                let mut slopes = [(SplatGradient::default(), 1.0); LANES];
+                for lane in 0..rest.len() {
+                    rows[lane] = rest[lane];
+                    states[lane] = rest_states[lane];
+                    slopes[lane] = slope(blocks.len() * LANES + lane, &rows[lane]);
+                }
+                self.step(simd, &mut rows, &mut states, &slopes);
+                rest.copy_from_slice(&rows[..rest.len()]);
+                rest_states.copy_from_slice(&states[..rest.len()]);
+            }
+        });
+    }
+
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn step<S: Simd>(
+        &self,
+        simd: S,
+        rows: &mut [Row; LANES],
+        states: &mut [State; LANES],
+        slopes: &[(SplatGradient, f32); LANES],
+    ) {
+        let zero = f32x16::splat(simd, 0.0);
+        let one = f32x16::splat(simd, 1.0);
+        let mut row = [zero; MAX_COMPONENTS];
+        let mut mean = [zero; MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            row[index] = f32x16::from_fn(simd, |lane| rows[lane][index]);
+            mean[index] = f32x16::from_fn(simd, |lane| states[lane].mean[index]);
+        }
+        let pace = f32x16::from_fn(simd, |lane| states[lane].pace);
+        let weight = f32x16::from_fn(simd, |lane| states[lane].weight);
+        let sensitivity = f32x16::from_fn(simd, |lane| slopes[lane].1);
+
+        let [_, _, l11, l21, l22, ..] = row;
+        let area = l11 * l22;
+        let color = [row[5], row[6], row[7], row[8]];
+        let squared_color =
+            color[0] * color[0] + color[1] * color[1] + color[2] * color[2] + color[3] * color[3];
+        let gradient = self.gradient(simd, [l11, l21, l22], color, area, squared_color, slopes);
+
+        let area = area * sensitivity;
+        let damping = self.options.damping * self.options.damping;
+        let by_strength = one / ((squared_color + damping) * area);
+        let by_area = one / area;
+        let mut reciprocals = [zero; MAX_COMPONENTS];
+        // 0 if all are finite, else NaN.
+        let (mut agreement, mut finite) = (zero, zero);
+        for index in 0..MAX_COMPONENTS {
+            let part = if index < 5 { by_strength } else { by_area };
+            reciprocals[index] = part * RECIPROCALS[index];
+            agreement += mean[index] * gradient[index] * reciprocals[index];
+            finite += gradient[index] * 0.0;
+        }
+        // A Gaussian whose gradient is not finite stays as it is until it is pruned.
+        let stepped = finite.simd_eq(zero);
+
+        // Before the first step there is nothing to agree with.
+        let change = agreement
+            .simd_lt(zero)
+            .select(f32x16::splat(simd, SLOWER), f32x16::splat(simd, FASTER));
+        let changed = (pace * change).max(LEAST_PACE).min(MOST_PACE);
+        let new_pace = weight.simd_gt(zero).select(changed, pace);
+        let momentum = self.options.momentum;
+        let new_weight = weight * momentum + (1.0 - momentum);
+        let rate = new_pace * (self.options.rate * self.factor) / new_weight;
+        let mut new_mean = [zero; MAX_COMPONENTS];
+        let mut steps = [zero; MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            new_mean[index] = mean[index] * momentum + gradient[index] * (1.0 - momentum);
+            steps[index] = rate * new_mean[index] * reciprocals[index];
+        }
+        let trusted = self.options.trust_region;
+        for index in 0..5 {
+            steps[index] = steps[index].max(-trusted).min(trusted);
+        }
+
+        let [u, v, size, ratio, slant, ..] = steps;
+        let mut new = [zero; MAX_COMPONENTS];
+        new[0] = row[0] - l11 * u;
+        new[1] = row[1] - (l21 * u + l22 * v);
+        new[2] = l11 - l11 * (size + ratio);
+        new[3] = l21 - (l21 * (size + ratio) + l22 * slant);
+        new[4] = l22 - l22 * (size - ratio);
+        let faded = simd_kernel::exp(simd, size);
+        for index in 5..MAX_COMPONENTS {
+            new[index] = row[index] * faded - steps[index];
+        }
+        self.clamp(simd, &mut new);
+
+        for index in 0..MAX_COMPONENTS {
+            let value = stepped.select(new[index], row[index]).to_array();
+            let average = stepped.select(new_mean[index], mean[index]).to_array();
+            for lane in 0..LANES {
+                rows[lane][index] = value[lane];
+                states[lane].mean[index] = average[lane];
+            }
+        }
+        let pace = stepped.select(new_pace, pace).to_array();
+        let weight = stepped.select(new_weight, weight).to_array();
+        for lane in 0..LANES {
+            states[lane].pace = pace[lane];
+            states[lane].weight = weight[lane];
+        }
+    }
+
+    /// The gradients in the own frames.
+    #[inline(always)]
+    fn gradient<S: Simd>(
+        &self,
+        simd: S,
+        [l11, l21, l22]: [f32x16<S>; 3],
+        color: [f32x16<S>; 4],
+        area: f32x16<S>,
+        squared_color: f32x16<S>,
+        slopes: &[(SplatGradient, f32); LANES],
+    ) -> [f32x16<S>; MAX_COMPONENTS] {
+        let [i11, i22] = [1.0 / l11, 1.0 / l22];
+        let w = -(l21 * i11) * i22;
+        let x = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[0]);
+        let y = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[1]);
+        let xx = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[0]);
+        let xy = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[1]);
+        let yy = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[2]);
+        let across = w * xx + i22 * xy;
+        let z11 = i11 * i11 * xx;
+        let z21 = i11 * across;
+        let z22 = w * across + i22 * (w * xy + i22 * yy);
+
+        let by_rate = match self.rate_term {
+            Some(rate_term) => rate_term.factors(area, squared_color),
+            None => f32x16::splat(simd, 0.0),
+        };
+        // The colour falls as the size grows.
+        let mut size = z11 + z22;
+        let mut by_color = color;
+        for channel in 0..color.len() {
+            let gradient = f32x16::from_fn(simd, |lane| slopes[lane].0.color[channel]);
+            by_color[channel] = gradient + by_rate * color[channel];
+            size -= color[channel] * by_color[channel];
+        }
+        let [c0, c1, c2, c3] = by_color;
+        [i11 * x, w * x + i22 * y, size, z11 - z22, z21, c0, c1, c2, c3]
+    }
+
+    /// [`RowBounds::clamped`] for finite rows.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn clamp<S: Simd>(&self, simd: S, row: &mut [f32x16<S>; MAX_COMPONENTS]) {
+        let max = self.bounds.max_deviation();
+        for (index, (low, high)) in self.bounds.center_ranges().into_iter().enumerate() {
+            row[index] = row[index].max(low).min(high);
+        }
+        let l11 = row[2].max(MIN_DEVIATION).min(max);
+        let l21 = row[3].max(-max).min(max);
+        let long = (l11 * l11 + l21 * l21).sqrt() / l11;
+        let least = long.max(1.0) * f32x16::splat(simd, MIN_DEVIATION);
+        row[2] = l11;
+        row[3] = l21;
+        row[4] = row[4].max(MIN_DEVIATION).min(max).max(least);
+        for index in 5..MAX_COMPONENTS {
+            row[index] = row[index].max(-MAX_COLOR).min(MAX_COLOR);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::fit::parameterization::GeometrySums;
+    use crate::encode::fit::row::{Slope, shape_of};
+    use crate::gaussian::{Gaussian, Parameterization};
+    use crate::testing::simd_levels;
+    use glam::Vec2;
+
+    const OPTIONS: GaussNewton =
+        GaussNewton { rate: 1.3, momentum: 0.7, damping: 0.02, trust_region: 0.3 };
+    const PARAMETERIZATION: Parameterization = Parameterization::Cholesky;
+
+    fn block_step(rate_term: Option<RateTerm>, channels: usize) -> BlockStep<'static> {
+        let bounds =
+            RowBounds { parameterization: PARAMETERIZATION, channels, size: Vec2::new(90.0, 60.0) };
+        BlockStep { options: &OPTIONS, bounds, factor: 0.8, rate_term }
+    }
+
+    /// Gaussians of all shapes, a part of which the step clamps.
+    fn rows(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
+        let row = |_| {
+            let mut row = [0.0; MAX_COMPONENTS];
+            row[0] = 110.0 * rng.f32() - 10.0;
+            row[1] = 80.0 * rng.f32() - 10.0;
+            row[2] = 0.4 + 9.0 * rng.f32() * rng.f32();
+            row[3] = 8.0 * rng.f32() - 4.0;
+            row[4] = 0.4 + 9.0 * rng.f32() * rng.f32();
+            for value in &mut row[5..5 + channels] {
+                *value = 2.0 * rng.f32() - 1.0;
+            }
+            row
+        };
+        (0..count).map(row).collect()
+    }
+
+    fn slopes(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<(SplatGradient, f32)> {
+        let slope = |_| {
+            let strength = 10_f32.powf(3.0 * rng.f32() - 2.0);
+            let mut value = || strength * (rng.f32() - 0.5);
+            let geometry =
+                GeometrySums { first: [value(), value()], second: [value(), value(), value()] };
+            let mut color = [0.0; 4];
+            color[..channels].fill_with(value);
+            (SplatGradient { geometry, color }, 0.5 + rng.f32())
+        };
+        (0..count).map(slope).collect()
+    }
+
+    /// The steps of Gaussians one by one, through the gradients of the parameterization.
+    fn step_each(
+        step: &BlockStep<'_>,
+        rows: &mut [Row],
+        states: &mut [State],
+        slopes: &[(SplatGradient, f32)],
+    ) {
+        for ((row, state), (by_splat, sensitivity)) in rows.iter_mut().zip(states).zip(slopes) {
+            let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, shape_of(row));
+            let by_rate = step.rate_term.map_or([0.0; 4], |rate_term| {
+                rate_term.gradient(&Gaussian::from_components(&row[..], PARAMETERIZATION))
+            });
+            let mut gradient = [center.x, center.y, shape.x, shape.y, shape.z, 0.0, 0.0, 0.0, 0.0];
+            for channel in 0..4 {
+                gradient[5 + channel] = by_splat.color[channel] + by_rate[channel];
+            }
+            let slope = Slope { gradient, sensitivity: *sensitivity };
+            super::super::step(row, state, &slope, step.options, step.bounds, step.factor);
+        }
+    }
+
+    #[test]
+    fn blocks_take_the_steps_of_single_gaussians() {
+        let mut rng = fastrand::Rng::with_seed(5);
+        for channels in [1, 3, 4] {
+            for rate_term in [None, Some(RateTerm::new(0.3, 40, channels))] {
+                // Two blocks and a part of one.
+                let count = 2 * LANES + 5;
+                let step = block_step(rate_term, channels);
+                let mut found = rows(count, channels, &mut rng);
+                let mut states = vec![State::NEW; count];
+                for _ in 0..4 {
+                    let slopes = slopes(count, channels, &mut rng);
+                    let (mut expected, mut expected_states) = (found.clone(), states.clone());
+                    step_each(&step, &mut expected, &mut expected_states, &slopes);
+                    let before = found.clone();
+                    step.run(Level::new(), &mut found, &mut states, |index, row| {
+                        assert_eq!(*row, before[index]);
+                        slopes[index]
+                    });
+                    assert_ne!(found, before);
+                    for index in 0..count {
+                        let scale = 1e-4 * (1.0 + found[index][4].max(found[index][2]));
+                        for (found, expected) in found[index].iter().zip(expected[index]) {
+                            assert!(
+                                (found - expected).abs() <= scale,
+                                "{channels} {index}: {found}, {expected}"
+                            );
+                        }
+                        let (state, expected) = (states[index], expected_states[index]);
+                        assert_eq!([state.pace, state.weight], [expected.pace, expected.weight]);
+                        let size = expected.mean.iter().fold(1.0, |most: f32, x| most.max(x.abs()));
+                        for (found, expected) in state.mean.iter().zip(expected.mean) {
+                            assert!((found - expected).abs() <= 1e-4 * size, "{found}, {expected}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_gaussian_whose_gradient_is_not_finite_stays() {
+        let mut rng = fastrand::Rng::with_seed(6);
+        let mut slopes = slopes(LANES, 3, &mut rng);
+        slopes[3].0.geometry.second[1] = f32::NAN;
+        slopes[8].0.color[2] = f32::INFINITY;
+        let before = rows(LANES, 3, &mut rng);
+        let (mut after, mut states) = (before.clone(), vec![State::NEW; LANES]);
+        block_step(None, 3).run(Level::new(), &mut after, &mut states, |index, _| slopes[index]);
+        for index in 0..LANES {
+            assert_eq!(after[index] == before[index], [3, 8].contains(&index), "{index}");
+            assert_eq!(states[index].weight == 0.0, [3, 8].contains(&index), "{index}");
+        }
+    }
+
+    #[test]
+    fn every_simd_level_gives_the_same_bits() {
+        let run = |level| {
+            let mut rng = fastrand::Rng::with_seed(7);
+            let count = 3 * LANES + 1;
+            let step = block_step(Some(RateTerm::new(0.3, 40, 3)), 3);
+            let (mut rows, mut states) = (rows(count, 3, &mut rng), vec![State::NEW; count]);
+            for _ in 0..3 {
+                let slopes = slopes(count, 3, &mut rng);
+                step.run(level, &mut rows, &mut states, |index, _| slopes[index]);
+            }
+            let states = states.iter().flat_map(|state| state.mean);
+            rows.iter().copied().flatten().chain(states).map(f32::to_bits).collect::<Vec<_>>()
+        };
+        let expected = run(Level::baseline());
+        for (name, level) in simd_levels() {
+            assert_eq!(run(level), expected, "{name}");
+        }
+    }
+}
