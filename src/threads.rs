@@ -90,22 +90,32 @@ fn on_pool<M: Default, T: Send>(items: Vec<T>, work: impl Fn(&mut M, T) + Send +
     let others = Threads::Pool.count().min(items.len()).saturating_sub(1);
     let items = std::sync::Mutex::new(items.into_iter());
     let next = || items.lock().expect("taking an item does not panic").next();
-    let expected = AtomicUsize::new(others + 1);
     let run = || {
-        let _expected = Expected(&expected);
         let mut memory = M::default();
         while let Some(item) = next() {
             work(&mut memory, item);
         }
     };
+    together(others, run, run);
+}
+
+/// Calls `help` on at most so many other threads of the current pool while `work` runs on this one. Both
+/// share what there is to do, so when `work` is done, nothing is left for a thread that starts late.
+#[cfg(feature = "rayon")]
+pub(crate) fn together(others: usize, help: impl Fn() + Send + Sync, work: impl FnOnce()) {
+    let expected = AtomicUsize::new(others);
+    let help = || {
+        let _expected = Expected(&expected);
+        help();
+    };
     // The threads of the pool may have to wake up first. This thread does not wait for them.
     rayon::in_place_scope(|scope| {
         for _ in 0..others {
-            scope.spawn(|_| run());
+            scope.spawn(|_| help());
         }
-        run();
-        // All items are taken by now, and the other threads will finish soon. Going to sleep until
-        // then would take longer, and so would waking up for what comes next.
+        work();
+        // The other threads will finish soon. Going to sleep until then would take longer, and so would
+        // waking up for what comes next.
         for _ in 0..MAX_CHECKS {
             if expected.load(Ordering::Relaxed) == 0 {
                 break;

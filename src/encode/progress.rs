@@ -2,10 +2,11 @@
 
 use core::fmt;
 use core::ops::ControlFlow;
-
-use rayon::prelude::*;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::error::EncodeError;
+use crate::threads;
 
 /// The progress of an encoding.
 #[derive(Clone, Copy, Debug)]
@@ -24,8 +25,12 @@ pub struct Progress {
     pub psnr: f64,
 }
 
-/// Work of each thread from one poll of the observer to the next: a few milliseconds.
+/// Work of a thread from one poll of the observer to the next: a few milliseconds.
 const WORK_PER_POLL: f64 = 4e6;
+/// The least work that a thread takes from what all of them share: taking it costs a hundredth.
+const LEAST_WORK: f64 = 1e4;
+/// A thread takes this part of its share of what is left, so that all are done at about the same time.
+const PART_OF_SHARE: usize = 3;
 /// At least so much work is taken to be left, as a share of what is done: an estimate may be too low.
 const LEAST_LEFT: f64 = 0.03;
 
@@ -106,19 +111,72 @@ impl<'a> Observer<'a> {
     pub(crate) fn map<T: Send, R: Send>(
         &mut self,
         work: f64,
-        mut items: impl ExactSizeIterator<Item = T>,
+        items: impl ExactSizeIterator<Item = T> + Send,
         task: impl Fn(T) -> R + Send + Sync,
     ) -> Result<Vec<R>, EncodeError> {
+        self.map_with(work, items, |(): &mut (), item| task(item))
+    }
+
+    /// [`Observer::map`], where each thread has memory of its own, which it passes to all of its tasks.
+    ///
+    /// # Errors
+    /// As [`Observer::poll`].
+    pub(crate) fn map_with<M: Default, T: Send, R: Send>(
+        &mut self,
+        work: f64,
+        items: impl ExactSizeIterator<Item = T> + Send,
+        task: impl Fn(&mut M, T) -> R + Send + Sync,
+    ) -> Result<Vec<R>, EncodeError> {
+        let total = items.len();
         let threads = rayon::current_num_threads();
-        // The cast saturates.
-        let portion = ((WORK_PER_POLL * threads as f64 / work) as usize).max(threads);
-        let mut results = Vec::with_capacity(items.len());
-        while items.len() > 0 {
-            self.poll()?;
-            let items: Vec<T> = items.by_ref().take(portion).collect();
-            results.par_extend(items.into_par_iter().map(&task));
+        // The casts saturate.
+        let most = ((WORK_PER_POLL / work) as usize).max(1);
+        let least = if threads > 1 { ((LEAST_WORK / work) as usize).clamp(1, most) } else { most };
+        let items = Mutex::new(items);
+        let is_cancelled = AtomicBool::new(false);
+        // Moves the next items to `portion`, and returns the index of the first.
+        let take = |portion: &mut Vec<T>| {
+            let mut items = items.lock().expect("items do not panic");
+            let left = items.len();
+            if !is_cancelled.load(Ordering::Relaxed) {
+                let count = (left / (PART_OF_SHARE * threads)).clamp(least, most);
+                portion.extend(items.by_ref().take(count));
+            }
+            total - left
+        };
+        let results = Mutex::new(Vec::new());
+        let run = |mut poll: Option<&mut dyn FnMut() -> Result<(), EncodeError>>| {
+            let (mut memory, mut portion) = (M::default(), Vec::new());
+            let mut since_poll = most;
+            loop {
+                let first = take(&mut portion);
+                if portion.is_empty() {
+                    return Ok(());
+                }
+                if let Some(poll) = &mut poll
+                    && since_poll >= most
+                {
+                    since_poll = 0;
+                    poll().inspect_err(|_| is_cancelled.store(true, Ordering::Relaxed))?;
+                }
+                since_poll += portion.len();
+                let found: Vec<R> = portion.drain(..).map(|item| task(&mut memory, item)).collect();
+                results.lock().expect("no task runs meanwhile").push((first, found));
+            }
+        };
+        let others = total.div_ceil(least).min(threads).saturating_sub(1);
+        let mut outcome: Result<(), EncodeError> = Ok(());
+        let help = || run(None).expect("only polls fail");
+        threads::together(others, help, || outcome = run(Some(&mut || self.poll())));
+        outcome?;
+        let mut results = results.into_inner().expect("no task runs meanwhile");
+        if let [(_, all)] = &mut results[..] {
+            return Ok(core::mem::take(all));
         }
-        Ok(results)
+        results.sort_unstable_by_key(|&(first, _)| first);
+        let mut all = Vec::with_capacity(total);
+        results.into_iter().for_each(|(_, mut found)| all.append(&mut found));
+        Ok(all)
     }
 }
 
