@@ -7,37 +7,115 @@ use crate::encode::progress::Observer;
 use crate::encode::raster::TILE_WIDTH;
 use crate::region::Region;
 use crate::render::splat::Splat;
-use crate::render::tile_grid::TileGrid;
+use crate::render::tile_grid::{Columns, TileGrid};
+use crate::simd::LANES;
 
 /// Splats that one task bins.
 const CHUNK: usize = 256;
-/// Work to bin a splat.
-const WORK: f64 = 100.0;
+/// Nanoseconds of work to bin a splat, to number a span, and to sort it by tile.
+const WORK: f64 = 80.0;
+const WORK_TO_NUMBER: f64 = 2.0;
+const WORK_TO_SORT: f64 = 30.0;
 
-/// For every row of tiles of a picture, the splats that may touch it, in their order.
+/// For every row of tiles of a picture, the splats that may touch it, in their order; and for every
+/// splat, where these are.
 #[derive(Debug)]
 pub(crate) struct RowBins {
     grid: TileGrid<TILE_WIDTH>,
     /// `spans[starts[r]..starts[r + 1]]` are the spans of row r.
     starts: Vec<usize>,
     spans: Vec<TileSpan>,
+    /// The spans of every row, sorted by tile.
+    tile_rows: Vec<TileRow>,
+    /// `span_indices[span_ends[s - 1]..span_ends[s]]` are the indices in `spans` of splat s.
+    span_indices: Vec<u32>,
+    span_ends: Vec<u32>,
 }
 
-/// A span with its row of tiles, before the spans are sorted by row.
-#[derive(Clone, Copy, Debug)]
-struct UnsortedSpan {
-    row: u32,
-    span: TileSpan,
+/// The spans of the splats of a task.
+struct ChunkSpans {
+    /// The row of every span: splat by splat, and row by row for each.
+    rows: Vec<u32>,
+    /// The end of each splat in `rows`.
+    ends: Vec<u32>,
+    /// The spans, sorted by row.
+    sorted: Vec<TileSpan>,
+    /// The first row with spans, and the end of each row from there on in `sorted`.
+    first_row: usize,
+    row_ends: Vec<u32>,
+}
+
+impl ChunkSpans {
+    /// Sorts what the grid finds for a chunk, block by block: for each row of tiles, the tiles that the
+    /// splats of the block touch. `blocks` has the end of each block in `found`.
+    fn new(first_splat: u32, splats: usize, found: &[(u32, Columns)], blocks: &[usize]) -> Self {
+        let first_row = found.iter().map(|&(row, _)| row).min().unwrap_or(0) as usize;
+        let end_row = found.iter().map(|&(row, _)| row + 1).max().unwrap_or(0) as usize;
+        let mut row_ends = vec![0; end_row - first_row];
+        let (mut rows, mut ends) = (Vec::new(), Vec::with_capacity(splats));
+        let mut start = 0;
+        for &end in blocks {
+            let found = &found[start..end];
+            for lane in 0..LANES.min(splats - ends.len()) {
+                for (row, [first, end]) in found {
+                    if first[lane] < end[lane] {
+                        rows.push(*row);
+                        row_ends[*row as usize - first_row] += 1;
+                    }
+                }
+                ends.push(rows.len() as u32);
+            }
+            start = end;
+        }
+        // The counts become starts, which move to the ends while spans are written.
+        let mut total = 0;
+        for count in &mut row_ends {
+            total += core::mem::replace(count, total);
+        }
+        let mut sorted = vec![TileSpan { splat: 0, first: 0, end: 0 }; rows.len()];
+        let mut start = 0;
+        for (block, &end) in (0..).zip(blocks) {
+            for (row, [first, end]) in &found[start..end] {
+                let at = &mut row_ends[*row as usize - first_row];
+                for lane in 0..LANES {
+                    if first[lane] < end[lane] {
+                        let splat = first_splat + block * LANES as u32 + lane as u32;
+                        sorted[*at as usize] =
+                            TileSpan { splat, first: first[lane], end: end[lane] };
+                        *at += 1;
+                    }
+                }
+            }
+            start = end;
+        }
+        Self { rows, ends, sorted, first_row, row_ends }
+    }
+
+    /// The spans of a row.
+    fn row(&self, row: usize) -> &[TileSpan] {
+        let Some(row) = row.checked_sub(self.first_row).filter(|&row| row < self.row_ends.len())
+        else {
+            return &[];
+        };
+        let start = row.checked_sub(1).map_or(0, |before| self.row_ends[before]);
+        &self.sorted[start as usize..self.row_ends[row] as usize]
+    }
 }
 
 impl RowBins {
     /// Bins without splats.
     pub(crate) fn new(region: Region) -> Self {
-        Self { grid: TileGrid::new(region), starts: Vec::new(), spans: Vec::new() }
+        Self {
+            grid: TileGrid::new(region),
+            starts: Vec::new(),
+            spans: Vec::new(),
+            tile_rows: Vec::new(),
+            span_indices: Vec::new(),
+            span_ends: Vec::new(),
+        }
     }
 
-    /// Bins `splats` on all threads, in the memory of the previous bins. For every span, splat by
-    /// splat, `on_span` gets the splat and the index of the span among those of all rows.
+    /// Bins `splats` on all threads, in the memory of the previous bins.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -46,57 +124,114 @@ impl RowBins {
         splats: &[Splat],
         cutoff: f32,
         observer: &mut Observer<'_>,
-        on_span: impl FnMut(u32, usize),
     ) -> Result<(), EncodeError> {
-        let grid = self.grid;
+        let (grid, level) = (self.grid, Level::new());
+        self.tile_rows = Vec::new();
         let chunks = splats.chunks(CHUNK).enumerate();
-        let chunks = observer.map(WORK * CHUNK as f64, chunks, |(chunk, splats)| {
-            let mut spans = Vec::new();
-            let (level, rows) = (Level::new(), 0..grid.rows);
-            grid.columns_of(level, splats, cutoff, rows, |block, row, [first, end]| {
-                let first_splat = (chunk * CHUNK + block) as u32;
-                for (splat, (&first, &end)) in (first_splat..).zip(first.iter().zip(end)) {
-                    if first < end {
-                        let span = TileSpan { splat, first, end };
-                        spans.push(UnsortedSpan { row: row as u32, span });
-                    }
-                }
+        type Scratch = (Vec<(u32, Columns)>, Vec<usize>);
+        let bin = |(found, blocks): &mut Scratch, (chunk, splats): (usize, &[Splat])| {
+            found.clear();
+            blocks.clear();
+            grid.columns_of(level, splats, cutoff, 0..grid.rows, |first, row, columns| {
+                // Blocks that touch no row are passed over.
+                blocks.resize(first / LANES, found.len());
+                found.push((row as u32, *columns));
             });
-            // The grid visits a block of splats row by row.
-            spans.sort_by_key(|unsorted| unsorted.span.splat);
-            spans
+            blocks.resize(splats.len().div_ceil(LANES), found.len());
+            ChunkSpans::new((chunk * CHUNK) as u32, splats.len(), found, blocks)
+        };
+        let chunks = observer.map_with(WORK * CHUNK as f64, chunks, bin)?;
+        let offsets = self.count_rows(&chunks);
+        self.number_spans(splats.len(), &chunks, offsets, observer)?;
+        self.sort_rows(&chunks, observer)
+    }
+
+    /// Sets where rows start. Returns for each chunk, and each row from its first one on, the index of its
+    /// first span.
+    fn count_rows(&mut self, chunks: &[ChunkSpans]) -> Vec<Vec<u32>> {
+        self.starts.clear();
+        self.starts.resize(self.grid.rows + 1, 0);
+        let mut offsets: Vec<Vec<u32>> = (chunks.iter())
+            .map(|chunk| {
+                let mut start = 0;
+                let counts = &mut self.starts[chunk.first_row + 1..];
+                let row = |(&end, count): (&u32, &mut usize)| {
+                    let before = *count as u32;
+                    *count += (end - core::mem::replace(&mut start, end)) as usize;
+                    before
+                };
+                chunk.row_ends.iter().zip(counts).map(row).collect()
+            })
+            .collect();
+        for row in 0..self.grid.rows {
+            self.starts[row + 1] += self.starts[row];
+        }
+        for (offsets, chunk) in offsets.iter_mut().zip(chunks) {
+            for (offset, &start) in offsets.iter_mut().zip(&self.starts[chunk.first_row..]) {
+                *offset += start as u32;
+            }
+        }
+        offsets
+    }
+
+    /// Sets the indices of the spans of every splat. `offsets` are those of [`Self::count_rows`].
+    fn number_spans(
+        &mut self,
+        splats: usize,
+        chunks: &[ChunkSpans],
+        offsets: Vec<Vec<u32>>,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let total = self.starts[self.grid.rows];
+        reset(&mut self.span_indices, total, 0);
+        reset(&mut self.span_ends, splats, 0);
+        let (mut indices, mut ends) = (&mut self.span_indices[..], &mut self.span_ends[..]);
+        let mut start = 0;
+        let parts = chunks.iter().zip(offsets).map(|(chunk, offsets)| {
+            let indices = indices.split_off_mut(..chunk.rows.len()).expect("all are counted");
+            let ends = ends.split_off_mut(..chunk.ends.len()).expect("each has an end");
+            let first = start;
+            start += chunk.rows.len() as u32;
+            (chunk, offsets, indices, ends, first)
+        });
+        let work = WORK_TO_NUMBER * total as f64 / chunks.len() as f64;
+        observer.map(work, parts, |(chunk, mut offsets, indices, ends, first)| {
+            for (index, row) in indices.iter_mut().zip(&chunk.rows) {
+                let next = &mut offsets[*row as usize - chunk.first_row];
+                *index = *next;
+                *next += 1;
+            }
+            for (end, of_chunk) in ends.iter_mut().zip(&chunk.ends) {
+                *end = first + of_chunk;
+            }
         })?;
-        observer.poll()?;
-        self.sort_by_row(&chunks, on_span);
         Ok(())
     }
 
-    /// Counting sort of the spans by row.
-    fn sort_by_row(&mut self, chunks: &[Vec<UnsortedSpan>], mut on_span: impl FnMut(u32, usize)) {
-        self.starts.clear();
-        self.starts.resize(self.grid.rows + 1, 0);
-        for unsorted in chunks.iter().flatten() {
-            self.starts[unsorted.row as usize] += 1;
-        }
-        let mut total = 0;
-        for start in &mut self.starts {
-            let count = *start;
-            *start = total;
-            total += count;
-        }
-        self.spans.clear();
-        self.spans.reserve_exact(total);
-        self.spans.resize(total, TileSpan { splat: 0, first: 0, end: 0 });
-        // While spans are written, `starts[r]` moves from the start of its row to the start of the
-        // next row. The rotation below moves each back to its own place.
-        for unsorted in chunks.iter().flatten() {
-            let start = &mut self.starts[unsorted.row as usize];
-            self.spans[*start] = unsorted.span;
-            on_span(unsorted.span.splat, *start);
-            *start += 1;
-        }
-        self.starts.rotate_right(1);
-        self.starts[0] = 0;
+    /// Sorts the spans of all chunks by row, and those of each row by tile.
+    fn sort_rows(
+        &mut self,
+        chunks: &[ChunkSpans],
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let (rows, columns) = (self.grid.rows, self.grid.columns);
+        let total = self.starts[rows];
+        reset(&mut self.spans, total, TileSpan { splat: 0, first: 0, end: 0 });
+        let (mut spans, starts) = (&mut self.spans[..], &self.starts);
+        let parts = (0..rows).map(|row| {
+            let count = starts[row + 1] - starts[row];
+            (row, spans.split_off_mut(..count).expect("all are counted"))
+        });
+        let work = WORK_TO_SORT * total as f64 / rows as f64;
+        self.tile_rows = observer.map(work, parts, |(row, spans)| {
+            let mut rest = &mut *spans;
+            for chunk in chunks {
+                let found = chunk.row(row);
+                rest.split_off_mut(..found.len()).expect("all are counted").copy_from_slice(found);
+            }
+            TileRow::new(columns, spans)
+        })?;
+        Ok(())
     }
 
     pub(crate) fn columns(&self) -> usize {
@@ -112,23 +247,44 @@ impl RowBins {
         &self.spans[self.starts[row]..self.starts[row + 1]]
     }
 
-    /// For each tile of a row, the spans that contain it, by their indices in the row.
-    pub(crate) fn row(&self, row: usize) -> TileRow {
-        let mut sorted = TileRow::default();
-        let spans = (0..).zip(self.spans(row));
-        sorted.sort(self.grid.columns, spans.map(|(splat, span)| TileSpan { splat, ..*span }));
-        sorted
+    /// The spans of every row, sorted by tile.
+    pub(crate) fn tile_rows(&self) -> &[TileRow] {
+        &self.tile_rows
     }
 
-    /// The splat of every span of a row, out of the `splats` that were binned.
-    pub(crate) fn splats(&self, row: usize, splats: &[Splat]) -> Vec<Splat> {
-        self.spans(row).iter().map(|span| splats[span.splat as usize]).collect()
+    /// The indices of the spans of a splat among those of all rows, in the order of the rows.
+    #[inline(always)]
+    pub(crate) fn spans_of(&self, splat: usize) -> &[u32] {
+        let start = splat.checked_sub(1).map_or(0, |before| self.span_ends[before]);
+        &self.span_indices[start as usize..self.span_ends[splat] as usize]
+    }
+
+    /// The number of all spans.
+    pub(crate) fn span_count(&self) -> usize {
+        self.span_indices.len()
+    }
+
+    /// Frees most of the memory. There are no bins until they are rebuilt.
+    pub(crate) fn free(&mut self) {
+        self.tile_rows = Vec::new();
+        self.span_indices = Vec::new();
+        self.span_ends = Vec::new();
     }
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        self.starts.capacity() * size_of::<usize>() + self.spans.capacity() * size_of::<TileSpan>()
+        self.starts.capacity() * size_of::<usize>()
+            + self.spans.capacity() * size_of::<TileSpan>()
+            + self.tile_rows.iter().map(TileRow::memory).sum::<usize>()
+            + (self.span_ends.capacity() + self.span_indices.capacity()) * size_of::<u32>()
     }
+}
+
+/// Makes `items` so many copies of a value, without more memory than that.
+pub(super) fn reset<T: Copy>(items: &mut Vec<T>, count: usize, value: T) {
+    items.clear();
+    items.reserve_exact(count);
+    items.resize(count, value);
 }
 
 /// The tiles of a row that a splat may touch.
@@ -141,59 +297,110 @@ pub(crate) struct TileSpan {
     pub(crate) end: u32,
 }
 
-/// For each tile of a row, the splats that may touch it.
+/// For each tile of a row, the spans that contain it, by their indices in the row.
 #[derive(Debug, Default)]
 pub(crate) struct TileRow {
-    /// `splats[starts[t]..starts[t + 1]]` touch tile t.
+    /// `spans[starts[t]..starts[t + 1]]` contain tile t.
     starts: Vec<usize>,
-    splats: Vec<u32>,
+    spans: Vec<u32>,
 }
 
 impl TileRow {
-    /// Sorts the splats of `spans` by tile, in the memory of the previous row.
-    pub(crate) fn sort(&mut self, columns: usize, spans: impl Iterator<Item = TileSpan> + Clone) {
-        // First, `starts[t]` is the number of splats in tile t minus that in the tile before; its
-        // prefix sum is the number in tile t, and the prefix sum of those is the start.
-        let starts = &mut self.starts;
-        starts.clear();
-        starts.resize(columns + 1, 0);
-        for TileSpan { first, end, .. } in spans.clone() {
+    /// Sorts the spans of a row by tile.
+    fn new(columns: usize, row: &[TileSpan]) -> Self {
+        // First, `starts[t]` is the number of spans with tile t minus that with the tile before; its
+        // prefix sum is the number with tile t, and the prefix sum of those is the start.
+        let mut starts = vec![0_usize; columns + 1];
+        for &TileSpan { first, end, .. } in row {
             starts[end as usize] = starts[end as usize].wrapping_sub(1);
             starts[first as usize] = starts[first as usize].wrapping_add(1);
         }
         let (mut count, mut total) = (0_usize, 0);
-        for start in &mut *starts {
+        for start in &mut starts {
             count = count.wrapping_add(*start);
             *start = total;
             total += count;
         }
-        self.splats.clear();
-        self.splats.reserve_exact(total);
-        self.splats.resize(total, 0);
-        // While splats are written, `starts[t]` moves from the start of its tile to the start of
-        // the next tile. The rotation below moves each back to its own place.
-        for TileSpan { splat, first, end } in spans {
+        let mut spans = vec![0; total];
+        // While spans are written, `starts[t]` moves from the start of its tile to the start of the next
+        // tile. The rotation below moves each back to its own place.
+        for (span, &TileSpan { first, end, .. }) in (0..).zip(row) {
             for start in &mut starts[first as usize..end as usize] {
-                self.splats[*start] = splat;
+                spans[*start] = span;
                 *start += 1;
             }
         }
         starts.rotate_right(1);
         starts[0] = 0;
+        Self { starts, spans }
     }
 
     /// Number of pairs of a tile and a splat.
     pub(crate) fn entries(&self) -> usize {
-        self.splats.len()
+        self.spans.len()
     }
 
-    /// The splats of a tile, in order.
-    pub(crate) fn splats(&self, column: usize) -> &[u32] {
-        &self.splats[self.starts[column]..self.starts[column + 1]]
+    /// The spans that contain a tile, in order.
+    pub(crate) fn spans(&self, column: usize) -> &[u32] {
+        &self.spans[self.starts[column]..self.starts[column + 1]]
     }
 
     /// Size in bytes.
-    pub(crate) fn memory(&self) -> usize {
-        self.starts.capacity() * size_of::<usize>() + self.splats.capacity() * size_of::<u32>()
+    fn memory(&self) -> usize {
+        self.starts.capacity() * size_of::<usize>() + self.spans.capacity() * size_of::<u32>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::progress::unobserved;
+    use crate::kernel::QUARTIC_CUTOFF;
+
+    #[test]
+    fn rows_and_splats_have_all_spans_in_order() {
+        let mut rng = fastrand::Rng::with_seed(8);
+        // Several chunks, and splats that touch nothing, in between and at the end.
+        let count = 2 * CHUNK + 37;
+        let splats: Vec<Splat> = (0..count)
+            .map(|index| {
+                if index % 50 >= 46 || index + 3 > count {
+                    return Splat::NOWHERE;
+                }
+                let [i11, i22] = [(); 2].map(|()| 0.05 + 0.5 * rng.f32());
+                let (x, y) = (340.0 * rng.f32() - 20.0, 240.0 * rng.f32() - 20.0);
+                Splat { x, y, i11, w: 0.2 * rng.f32() - 0.1, i22, color: [1.0; 4] }
+            })
+            .collect();
+        let region = Region { x: 0, y: 0, width: 300, height: 200 };
+        let mut bins = RowBins::new(region);
+        unobserved(|observer| bins.rebuild(&splats, QUARTIC_CUTOFF, observer));
+        let grid = TileGrid::<TILE_WIDTH>::new(region);
+        let mut expected = Vec::new();
+        for (index, splat) in splats.iter().enumerate() {
+            let of_splat = core::slice::from_ref(splat);
+            grid.columns_of(Level::new(), of_splat, QUARTIC_CUTOFF, 0..grid.rows, |_, row, at| {
+                if at[0][0] < at[1][0] {
+                    expected.push((index as u32, row, at[0][0], at[1][0]));
+                }
+            });
+        }
+        assert!(expected.len() > count && bins.span_count() == expected.len());
+
+        let row_of = |span: usize| bins.starts.partition_point(|&start| start <= span) - 1;
+        let by_splat = (0..count).flat_map(|splat| bins.spans_of(splat)).map(|&index| {
+            let TileSpan { splat, first, end } = bins.spans[index as usize];
+            (splat, row_of(index as usize), first, end)
+        });
+        assert!(by_splat.eq(expected.iter().copied()));
+        for (row, tiles) in bins.tile_rows().iter().enumerate() {
+            let spans = bins.spans(row);
+            assert!(spans.is_sorted_by_key(|span| span.splat));
+            for column in 0..bins.columns() {
+                let with_tile = |span: &TileSpan| (span.first..span.end).contains(&(column as u32));
+                let with_tile = (0..).zip(spans).filter(|(_, span)| with_tile(span));
+                assert!(with_tile.map(|(index, _)| index).eq(tiles.spans(column).iter().copied()));
+            }
+        }
     }
 }

@@ -8,9 +8,8 @@
 //! threads.
 
 use fearless_simd::Level;
-use rayon::prelude::*;
 
-use super::bins::{RowBins, TileRow};
+use super::bins::{RowBins, TileRow, reset};
 use super::distortion_map;
 use super::parameterization::GeometrySums;
 use super::training::Distortion;
@@ -23,12 +22,9 @@ use crate::region::Region;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Pairs of a tile and a splat from one poll of the observer to the next: a few milliseconds.
-const WORK_PER_POLL: usize = 1 << 16;
-/// The cost of a tile without splats, in such pairs.
-const WORK_PER_TILE: usize = 16;
-/// Nanoseconds of work to sort a span by tile.
-const WORK_PER_SPAN: f64 = 50.0;
+/// Nanoseconds of work for a pair of a tile and a splat, and for a tile.
+const WORK_PER_PAIR: f64 = 60.0;
+const WORK_PER_TILE: f64 = 400.0;
 
 /// The gradient of the loss, half the distortion, by one splat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,13 +40,8 @@ pub(crate) struct SplatGradient {
 pub(crate) struct Pass {
     level: Level,
     bins: RowBins,
-    tile_rows: Vec<TileRow>,
     /// The slots of all spans, in the order of the bins: row by row, then splat by splat.
     slots: Vec<Slot>,
-    /// `span_indices[span_ends[s - 1]..span_ends[s]]` are the indices of the spans of splat s among
-    /// the spans of all rows.
-    span_indices: Vec<u32>,
-    span_ends: Vec<u32>,
     /// The distortion of every tile, if the last pass measured it.
     distortions: Vec<f32>,
     /// The error of every row of tiles.
@@ -65,10 +56,7 @@ impl Pass {
         Self {
             level: Level::new(),
             bins: RowBins::new(region),
-            tile_rows: Vec::new(),
             slots: Vec::new(),
-            span_indices: Vec::new(),
-            span_ends: Vec::new(),
             distortions: Vec::new(),
             row_errors: vec![RenderingError::default(); rows],
         }
@@ -88,41 +76,26 @@ impl Pass {
     ) -> Result<(), EncodeError> {
         // The slots take most of the memory. They are freed while binning needs memory of its own.
         self.slots = Vec::new();
-        self.span_ends.clear();
-        self.span_ends.resize(splats.len(), 0);
-        self.span_indices.clear();
-        let (ends, indices) = (&mut self.span_ends, &mut self.span_indices);
-        self.bins.rebuild(splats, kernel.cutoff(), observer, |splat, span| {
-            indices.push(span as u32);
-            ends[splat as usize] = indices.len() as u32;
-        })?;
-        let bins = &self.bins;
-        self.tile_rows = Vec::new();
-        let work = WORK_PER_SPAN * self.span_indices.len() as f64 / bins.rows() as f64;
-        self.tile_rows = observer.map(work, 0..bins.rows(), |row| bins.row(row))?;
-        // A splat outside the picture has no spans: its end is that of the splat before.
-        let mut last = 0;
-        for end in ends {
-            last = last.max(*end);
-            *end = last;
-        }
-        self.slots =
-            vec![Slot::default(); self.span_indices.len() * slots_per_span(raster.channels)];
+        self.bins.rebuild(splats, kernel.cutoff(), observer)?;
+        let slots = self.bins.span_count() * slots_per_span(raster.channels);
+        reset(&mut self.slots, slots, Slot::default());
         Ok(())
     }
 
     /// Kernel evaluations of a pass with these bins.
     pub(crate) fn evaluations(&self) -> u64 {
-        let pairs = self.tile_rows.iter().map(TileRow::entries).sum::<usize>();
-        (pairs * TILE_WIDTH * TILE_HEIGHT) as u64
+        (self.pairs() * TILE_WIDTH * TILE_HEIGHT) as u64
+    }
+
+    /// Pairs of a tile and a splat.
+    fn pairs(&self) -> usize {
+        self.bins.tile_rows().iter().map(TileRow::entries).sum()
     }
 
     /// Frees the memory of the bins.
     pub(crate) fn free_bins(&mut self) {
-        self.tile_rows = Vec::new();
+        self.bins.free();
         self.slots = Vec::new();
-        self.span_indices = Vec::new();
-        self.span_ends = Vec::new();
     }
 
     /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
@@ -151,20 +124,22 @@ impl Pass {
     }
 
     /// The gradient of the last pass by a splat: the sum of its slots, in the order of the rows.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn gradient(&self, splat: usize, channels: usize) -> SplatGradient {
         let per_span = slots_per_span(channels);
-        let mut sum = [Slot::default(); 2];
-        for &span in self.spans_of(splat) {
+        let (mut sum, mut last) = (Slot::default(), 0.0);
+        for &span in self.bins.spans_of(splat) {
             let slots = &self.slots[span as usize * per_span..][..per_span];
-            for (sum, slot) in sum.iter_mut().zip(slots) {
-                *sum = core::array::from_fn(|lane| sum[lane] + slot[lane]);
+            for lane in 0..sum.len() {
+                sum[lane] += slots[0][lane];
+            }
+            if let Some(second) = slots.get(1) {
+                last += second[0];
             }
         }
-        let sum = sum.as_flattened();
         SplatGradient {
             geometry: GeometrySums { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
-            color: [sum[5], sum[6], sum[7], sum[8]],
+            color: [sum[5], sum[6], sum[7], last],
         }
     }
 
@@ -175,23 +150,14 @@ impl Pass {
 
     /// Whether a splat touches the picture, by the present bins.
     pub(crate) fn touches(&self, splat: usize) -> bool {
-        !self.spans_of(splat).is_empty()
+        !self.bins.spans_of(splat).is_empty()
     }
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
         self.bins.memory()
-            + self.tile_rows.iter().map(TileRow::memory).sum::<usize>()
             + self.slots.capacity() * size_of::<Slot>()
-            + (self.span_ends.capacity() + self.span_indices.capacity()) * size_of::<u32>()
             + self.distortions.capacity() * size_of::<f32>()
-    }
-
-    /// The indices of the spans of a splat, in the order of the rows.
-    #[inline]
-    fn spans_of(&self, splat: usize) -> &[u32] {
-        let start = splat.checked_sub(1).map_or(0, |before| self.span_ends[before]);
-        &self.span_indices[start as usize..self.span_ends[splat] as usize]
     }
 
     fn run_of<const CHANNELS: usize>(
@@ -203,55 +169,48 @@ impl Pass {
         measure: Option<Distortion>,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
+        let tiles = self.bins.columns() * self.bins.rows();
+        let work = WORK_PER_PAIR * self.pairs() as f64 + WORK_PER_TILE * tiles as f64;
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);
-        let tiles = if measure.is_some() { bins.columns() * bins.rows() } else { 0 };
-        self.distortions.resize(tiles, 0.0);
+        self.distortions.resize(if measure.is_some() { tiles } else { 0 }, 0.0);
         let mut slots = &mut self.slots[..];
         let mut distortions = &mut self.distortions[..];
-        let rows = self.tile_rows.iter().zip(&mut self.row_errors);
-        let mut jobs: Vec<_> = (rows.enumerate())
-            .map(|(row, (tiles, error))| {
-                let slots = slots
-                    .split_off_mut(..bins.spans(row).len() * per_span)
-                    .expect("there are slots for all rows");
-                let of_row = if measure.is_some() { bins.columns() } else { 0 };
-                let distortions =
-                    distortions.split_off_mut(..of_row).expect("there is one for each tile");
-                (row, tiles, slots, distortions, error)
-            })
-            .collect();
+        let rows = bins.tile_rows().iter().zip(&mut self.row_errors).enumerate();
+        let rows = rows.map(|(row, (tiles, error))| {
+            let slots = slots
+                .split_off_mut(..bins.spans(row).len() * per_span)
+                .expect("there are slots for all rows");
+            let of_row = if measure.is_some() { bins.columns() } else { 0 };
+            let distortions =
+                distortions.split_off_mut(..of_row).expect("there is one for each tile");
+            (row, tiles, slots, distortions, error)
+        });
         let level = self.level;
-        while !jobs.is_empty() {
-            observer.poll()?;
-            let mut work = 0;
-            let count = jobs.iter().take_while(|(_, tiles, ..)| {
-                let more = work < WORK_PER_POLL;
-                work += tiles.entries() + WORK_PER_TILE * bins.columns();
-                more
-            });
-            let count = count.count();
-            // One row per task, so that the last rows are shared by all threads.
-            let band = jobs.par_drain(..count).with_max_len(1);
-            band.for_each(|(row, tiles, slots, distortions, error)| {
-                let splats = &bins.splats(row, splats);
-                let mut states = Vec::new();
-                let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-                slots.fill(Slot::default());
-                *error = RenderingError::default();
-                for column in 0..bins.columns() {
-                    let indices = tiles.splats(column);
-                    let tile = TrainingTile::new(raster, [column, row], base, splats, indices);
+        type Scratch = (Vec<Splat>, Vec<TileState>);
+        let work = work / bins.rows() as f64;
+        observer.map_with(work, rows, |(of_row, states): &mut Scratch, item| {
+            let (row, tiles, slots, distortions, error) = item;
+            of_row.clear();
+            of_row.extend(bins.spans(row).iter().map(|span| splats[span.splat as usize]));
+            let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
+            slots.fill(Slot::default());
+            *error = RenderingError::default();
+            for column in 0..bins.columns() {
+                let indices = tiles.spans(column);
+                let tile = TrainingTile::new(raster, [column, row], base, of_row, indices);
+                if states.len() < indices.len() {
                     states.resize(indices.len(), TileState::ZERO);
-                    *error = *error + tile.run(level, kernel, &mut states, slots, &mut planes);
-                    if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
-                        let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
-                        let plane = distortion_map::of_tile(raster, corner, &planes, measure);
-                        *sum = plane.as_flattened().iter().sum();
-                    }
                 }
-            });
-        }
+                let states = &mut states[..indices.len()];
+                *error = *error + tile.run(level, kernel, states, slots, &mut planes);
+                if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
+                    let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
+                    let plane = distortion_map::of_tile(raster, corner, &planes, measure);
+                    *sum = plane.as_flattened().iter().sum();
+                }
+            }
+        })?;
         Ok(())
     }
 }
@@ -281,10 +240,10 @@ impl Rendered<'_> {
     }
 
     fn residuals_of<const CHANNELS: usize>(&self, tile: usize) -> Vec<TilePlane> {
-        let Pass { level, bins, tile_rows, .. } = self.pass;
+        let Pass { level, bins, .. } = self.pass;
         let (row, column) = (tile / bins.columns(), tile % bins.columns());
         let spans = bins.spans(row);
-        let of_tile = tile_rows[row].splats(column);
+        let of_tile = bins.tile_rows()[row].spans(column);
         let splat = |&span: &u32| self.splats[spans[span as usize].splat as usize];
         let splats: Vec<Splat> = of_tile.iter().map(splat).collect();
         let indices: Vec<u32> = (0..splats.len() as u32).collect();
