@@ -19,6 +19,7 @@ pub(crate) mod vector_quantizer;
 
 use glam::Vec2;
 
+use bins::reset;
 use budget::Budget;
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
@@ -45,7 +46,9 @@ const FORESEEN: f64 = 0.75;
 /// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
 /// Work to turn a Gaussian into a splat, or to look at it.
-const WORK: f64 = 40.0;
+const WORK: f64 = 20.0;
+/// Gaussians that one task turns into splats.
+const CHUNK: usize = 256;
 
 /// What fits have cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,7 +77,10 @@ pub(crate) struct Fit<'a> {
     pass: Pass,
     /// Passes for which the present bins remain valid.
     binned_for: u32,
+    /// Those of the last pass, or of the next one.
     splats: Vec<Splat>,
+    /// Whether `splats` are those of the present values.
+    has_splats: bool,
     /// The error of the last pass.
     error: RenderingError,
     work: Work,
@@ -116,6 +122,7 @@ impl<'a> Fit<'a> {
             pass: Pass::new(raster),
             binned_for: 0,
             splats: Vec::new(),
+            has_splats: false,
             error: RenderingError::default(),
             work,
             rng: fastrand::Rng::with_seed(seed),
@@ -178,6 +185,7 @@ impl<'a> Fit<'a> {
             self.parameters.replace(best.rows);
             self.quantizers = best.quantizers;
             self.binned_for = 0;
+            self.has_splats = false;
         }
         self.forward(true, observer)?;
         self.cull(self.len().saturating_sub(count), observer)?;
@@ -281,7 +289,7 @@ impl<'a> Fit<'a> {
         }
         observer.report(self.work.iterations, iterations, self.len(), self.psnr())?;
         self.work.iterations += 1;
-        self.step(factor, observer)?;
+        self.step(factor, grows, observer)?;
         let memory = self.memory();
         self.work.peak_memory = self.work.peak_memory.max(memory);
         Ok(())
@@ -291,14 +299,9 @@ impl<'a> Fit<'a> {
     /// Measures the distortions if Gaussians are to be added.
     fn forward(&mut self, grows: bool, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let measure = grows.then_some(self.training.densification.distortion);
-        let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
-        let components = 5 + self.raster.channels;
-        self.splats = Vec::new();
-        self.splats = observer.map(WORK, self.parameters.values.iter(), |row| {
-            let row = decoded(quantizers.as_ref(), row);
-            let gaussian = Gaussian::from_components(&row[..components], parameterization);
-            Splat::new(&gaussian).unwrap_or(Splat::NOWHERE)
-        })?;
+        if !self.has_splats {
+            self.make_splats(observer)?;
+        }
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
             self.pass.bin(self.raster, &self.splats, kernel, observer)?;
@@ -311,20 +314,55 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
+    /// Sets the splats to those of the present values.
+    fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+        let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
+        reset(&mut self.splats, self.parameters.len(), Splat::NOWHERE);
+        let rows = self.parameters.values.chunks(CHUNK);
+        let chunks = rows.zip(self.splats.chunks_mut(CHUNK));
+        observer.map(WORK * CHUNK as f64, chunks, |(rows, splats)| {
+            for (row, splat) in rows.iter().zip(splats) {
+                let row = decoded(quantizers.as_ref(), row);
+                let gaussian = Gaussian::from_components(&row[..], parameterization);
+                *splat = Splat::new(&gaussian).unwrap_or(Splat::NOWHERE);
+            }
+        })?;
+        self.has_splats = true;
+        Ok(())
+    }
+
     /// The rest of the backward pass, from the gradients by splats to those by trained values and
-    /// quantizers, and a step of the optimizer against both.
-    fn step(&mut self, factor: f32, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    /// quantizers, and a step of the optimizer against both. The splats of the last pass are kept if
+    /// Gaussians are to be added where it went wrong.
+    fn step(
+        &mut self,
+        factor: f32,
+        grows: bool,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        self.has_splats = false;
         let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
         let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
         let raster = self.raster;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         if quantizers.is_none() {
-            let slope = |index: usize, row: &Row| {
-                (pass.gradient(index, channels), raster.sensitivity_near([row[0], row[1]]))
-            };
             let (bounds, parameters) = (self.bounds, &mut self.parameters);
-            if parameters.step_in_blocks(bounds, factor, rate_term, observer, slope)? {
+            let splats = if grows { &mut [] } else { &mut self.splats[..] };
+            let is_done = parameters.step_in_blocks(
+                bounds,
+                factor,
+                rate_term,
+                splats,
+                observer,
+                #[inline(always)]
+                |index, row| {
+                    let sensitivity = raster.sensitivity_near([row[0], row[1]]);
+                    (pass.gradient(index, channels), sensitivity)
+                },
+            )?;
+            if is_done {
+                self.has_splats = !grows;
                 return Ok(());
             }
         }
@@ -393,6 +431,7 @@ impl<'a> Fit<'a> {
     fn invalidate(&mut self) {
         self.best = None;
         self.binned_for = 0;
+        self.has_splats = false;
     }
 
     /// Culling: removes the `count` Gaussians of least importance.
@@ -401,10 +440,9 @@ impl<'a> Fit<'a> {
         if count == 0 {
             return Ok(());
         }
-        let (parameterization, components) =
-            (self.bounds.parameterization, 5 + self.raster.channels);
+        let parameterization = self.bounds.parameterization;
         let importances = observer.map(WORK, self.parameters.values.iter(), |row| {
-            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            let gaussian = Gaussian::from_components(&row[..], parameterization);
             gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
         })?;
         observer.poll()?;
@@ -425,12 +463,11 @@ impl<'a> Fit<'a> {
     /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
     fn prune(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let values = &self.parameters.values;
-        let (parameterization, components) =
-            (self.bounds.parameterization, 5 + self.raster.channels);
+        let parameterization = self.bounds.parameterization;
         let quantizers = self.quantizers.as_ref();
         let is_visible = |index: usize| {
             let row = decoded(quantizers, &values[index]);
-            let gaussian = Gaussian::from_components(&row[..components], parameterization);
+            let gaussian = Gaussian::from_components(&row[..], parameterization);
             let has_color = gaussian.color.iter().any(|color| color.abs() >= MIN_COLOR);
             let is_inside = self.pass.touches(index);
             gaussian.is_drawable() && has_color && is_inside
@@ -471,6 +508,7 @@ impl<'a> Fit<'a> {
     fn free_bins(&mut self) {
         self.pass.free_bins();
         self.splats = Vec::new();
+        self.has_splats = false;
     }
 
     /// Keeps a copy of the values of the last pass if their error is the least so far.

@@ -6,19 +6,22 @@ use rayon::prelude::*;
 use super::gauss_newton::blocks::BlockStep;
 use super::pass::SplatGradient;
 use super::row::{Row, RowBounds, Slope};
-use super::state::{States, retain};
+use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::rate_model::RateTerm;
 use crate::gaussian::Parameterization;
+use crate::render::splat::Splat;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
 /// Work to step a Gaussian, alone and in a block.
 const WORK: f64 = 200.0;
 const WORK_IN_BLOCK: f64 = 40.0;
+/// Work to find the place of a Gaussian on the Z curve.
+const WORK_TO_SORT: f64 = 3.0;
 
 /// Trained values with their optimizer.
 #[derive(Debug)]
@@ -63,20 +66,18 @@ impl Parameters {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let spread = |value: f32| {
-            // The bits of the other coordinate go between those of this one.
-            (0..16).fold(0, |sum, bit| sum | (value.max(0.0) as u32 >> bit & 1) << (2 * bit))
-        };
-        let mut order: Vec<(u32, u32)> = (0..)
-            .zip(&self.values)
-            .map(|(index, row)| (spread(row[0] / 4.0) | spread(row[1] / 4.0) << 1, index))
-            .collect();
-        observer.poll()?;
+        let keys =
+            observer.map(WORK_TO_SORT * CHUNK as f64, self.values.chunks(CHUNK), |rows| {
+                let key = |row: &Row| spread(row[0]) | spread(row[1]) << 1;
+                rows.iter().map(key).collect::<Vec<u32>>()
+            })?;
+        let mut order: Vec<(u32, u32)> = keys.into_iter().flatten().zip(0..).collect();
         order.par_sort_unstable();
         observer.poll()?;
-        self.values = order.iter().map(|&(_, index)| self.values[index as usize]).collect();
+        let order: Vec<u32> = order.into_iter().map(|(_, index)| index).collect();
+        self.values = reordered(&self.values, &order);
         observer.poll()?;
-        self.states.reorder(order.iter().map(|&(_, index)| index as usize));
+        self.states.reorder(&order);
         Ok(())
     }
 
@@ -109,8 +110,8 @@ impl Parameters {
     }
 
     /// Takes the steps of [`Self::step`] in blocks, if there is code for that. `slope` returns, for an
-    /// index and its row, the gradient of the pass and how much a squared error counts there. Returns
-    /// whether the steps were taken.
+    /// index and its row, the gradient of the pass and how much a squared error counts there. `splats`,
+    /// unless it is empty, becomes those of the new values. Returns whether the steps were taken.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -119,6 +120,7 @@ impl Parameters {
         bounds: RowBounds,
         factor: f32,
         rate_term: Option<RateTerm>,
+        mut splats: &mut [Splat],
         observer: &mut Observer<'_>,
         slope: impl Fn(usize, &Row) -> (SplatGradient, f32) + Send + Sync,
     ) -> Result<bool, EncodeError> {
@@ -130,8 +132,20 @@ impl Parameters {
         let step = BlockStep { options, bounds, factor, rate_term };
         let level = Level::new();
         let chunks = self.values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
-        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(chunk, (rows, states))| {
-            step.run(level, rows, states, |index, row| slope(chunk * CHUNK + index, row));
+        let chunks = chunks.map(|(chunk, (rows, states))| {
+            let count = splats.len().min(rows.len());
+            let splats = splats.split_off_mut(..count).expect("there are so many");
+            (chunk * CHUNK, rows, states, splats)
+        });
+        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(first, rows, states, splats)| {
+            step.run(
+                level,
+                rows,
+                states,
+                splats,
+                #[inline(always)]
+                |index, row| slope(first + index, row),
+            );
         })?;
         Ok(true)
     }
@@ -140,6 +154,16 @@ impl Parameters {
     pub(crate) fn memory(&self) -> usize {
         self.values.capacity() * size_of::<Row>() + self.states.memory()
     }
+}
+
+/// A coordinate in units of four pixels, with a bit of 0 before each of its 16 bits.
+fn spread(value: f32) -> u32 {
+    // The cast saturates.
+    let mut bits = (value / 4.0) as u32 & 0xffff;
+    for (shift, mask) in [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
+        bits = (bits | bits << shift) & mask;
+    }
+    bits
 }
 
 /// Takes a step for every Gaussian, and returns the sums in order.

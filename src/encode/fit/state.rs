@@ -1,7 +1,12 @@
 //! What the optimizers keep for the Gaussians.
 
+use rayon::prelude::*;
+
 use super::training::{Adam, GaussNewton, Optimizer};
 use super::{adam, gauss_newton};
+
+/// The fewest items that another thread is asked to copy.
+const LEAST_COPIES: usize = 1 << 11;
 
 /// An optimizer with its states, one for each Gaussian.
 #[derive(Debug)]
@@ -43,10 +48,10 @@ impl States {
     }
 
     /// Puts the states at these indices in this order.
-    pub(super) fn reorder(&mut self, order: impl Iterator<Item = usize>) {
+    pub(super) fn reorder(&mut self, order: &[u32]) {
         match self {
-            Self::Adam(_, states) => *states = order.map(|index| states[index]).collect(),
-            Self::GaussNewton(_, states) => *states = order.map(|index| states[index]).collect(),
+            Self::Adam(_, states) => *states = reordered(states, order),
+            Self::GaussNewton(_, states) => *states = reordered(states, order),
         }
     }
 
@@ -62,6 +67,12 @@ impl States {
 fn extend<T: Copy>(states: &mut Vec<T>, count: usize, new: T) {
     states.reserve_exact(count.saturating_sub(states.len()));
     states.resize(count, new);
+}
+
+/// The items at these indices in this order.
+pub(super) fn reordered<T: Copy + Send + Sync>(items: &[T], order: &[u32]) -> Vec<T> {
+    let items = order.par_iter().with_min_len(LEAST_COPIES).map(|&index| items[index as usize]);
+    items.collect()
 }
 
 /// Removes the items for whose index `keep` is false.

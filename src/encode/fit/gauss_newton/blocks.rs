@@ -18,6 +18,7 @@ use crate::encode::fit::training::GaussNewton;
 use crate::encode::rate_model::RateTerm;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::render::simd_kernel;
+use crate::render::splat::Splat;
 use crate::simd::LANES;
 
 /// The reciprocals of the curvatures for a strength or an area of 1.
@@ -46,12 +47,14 @@ pub(in crate::encode::fit) struct BlockStep<'a> {
 
 impl BlockStep<'_> {
     /// One step for each of `rows`. `slope` returns, for an index and its row, the gradient of the pass
-    /// and how much a squared error counts there.
+    /// and how much a squared error counts there. `splats`, if there are as many as rows, become those
+    /// of the new rows.
     pub(in crate::encode::fit) fn run(
         &self,
         level: Level,
         rows: &mut [Row],
         states: &mut [State],
+        splats: &mut [Splat],
         slope: impl Fn(usize, &Row) -> (SplatGradient, f32),
     ) {
         dispatch!(level, simd => {
@@ -63,7 +66,8 @@ impl BlockStep<'_> {
                 for lane in 0..LANES {
                     slopes[lane] = slope(block * LANES + lane, &rows[lane]);
                 }
-                self.step(simd, rows, &mut state_blocks[block], &slopes);
+                let made = self.step(simd, rows, &mut state_blocks[block], &slopes);
+                write(splats, block * LANES, &made);
             }
             if let Some(&any) = rest.first() {
                 let mut rows = [any; LANES];
@@ -74,13 +78,15 @@ impl BlockStep<'_> {
                     states[lane] = rest_states[lane];
                     slopes[lane] = slope(blocks.len() * LANES + lane, &rows[lane]);
                 }
-                self.step(simd, &mut rows, &mut states, &slopes);
+                let made = self.step(simd, &mut rows, &mut states, &slopes);
+                write(splats, blocks.len() * LANES, &made);
                 rest.copy_from_slice(&rows[..rest.len()]);
                 rest_states.copy_from_slice(&states[..rest.len()]);
             }
         });
     }
 
+    /// Steps of sixteen Gaussians. Returns the splats of the new rows.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
     fn step<S: Simd>(
@@ -89,7 +95,7 @@ impl BlockStep<'_> {
         rows: &mut [Row; LANES],
         states: &mut [State; LANES],
         slopes: &[(SplatGradient, f32); LANES],
-    ) {
+    ) -> [Splat; LANES] {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
         let mut row = [zero; MAX_COMPONENTS];
@@ -159,7 +165,8 @@ impl BlockStep<'_> {
         self.clamp(simd, &mut new);
 
         for index in 0..MAX_COMPONENTS {
-            let value = stepped.select(new[index], row[index]).to_array();
+            row[index] = stepped.select(new[index], row[index]);
+            let value = row[index].to_array();
             let average = stepped.select(new_mean[index], mean[index]).to_array();
             for lane in 0..LANES {
                 rows[lane][index] = value[lane];
@@ -172,6 +179,21 @@ impl BlockStep<'_> {
             states[lane].pace = pace[lane];
             states[lane].weight = weight[lane];
         }
+
+        let inverse = inverse([row[2], row[3], row[4]]).map(f32x16::to_array);
+        let row = row.map(f32x16::to_array);
+        let mut splats = [Splat::NOWHERE; LANES];
+        for lane in 0..LANES {
+            splats[lane] = Splat {
+                x: row[0][lane],
+                y: row[1][lane],
+                i11: inverse[0][lane],
+                w: inverse[1][lane],
+                i22: inverse[2][lane],
+                color: [row[5][lane], row[6][lane], row[7][lane], row[8][lane]],
+            };
+        }
+        splats
     }
 
     /// The gradients in the own frames.
@@ -179,14 +201,13 @@ impl BlockStep<'_> {
     fn gradient<S: Simd>(
         &self,
         simd: S,
-        [l11, l21, l22]: [f32x16<S>; 3],
+        cholesky: [f32x16<S>; 3],
         color: [f32x16<S>; 4],
         area: f32x16<S>,
         squared_color: f32x16<S>,
         slopes: &[(SplatGradient, f32); LANES],
     ) -> [f32x16<S>; MAX_COMPONENTS] {
-        let [i11, i22] = [1.0 / l11, 1.0 / l22];
-        let w = -(l21 * i11) * i22;
+        let [i11, w, i22] = inverse(cholesky);
         let x = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[0]);
         let y = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[1]);
         let xx = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[0]);
@@ -231,6 +252,22 @@ impl BlockStep<'_> {
         for index in 5..MAX_COMPONENTS {
             row[index] = row[index].max(-MAX_COLOR).min(MAX_COLOR);
         }
+    }
+}
+
+/// The inverses of Cholesky factors, as [`crate::gaussian::inverse_cholesky`] has them.
+#[inline(always)]
+fn inverse<S: Simd>([l11, l21, l22]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let (i11, i22) = (1.0 / l11, 1.0 / l22);
+    [i11, -(l21 * i11) * i22, i22]
+}
+
+/// Writes a block of splats from an index on, as far as there is room.
+#[inline(always)]
+fn write(splats: &mut [Splat], first: usize, block: &[Splat; LANES]) {
+    let end = splats.len().min(first + LANES);
+    if first < end {
+        splats[first..end].copy_from_slice(&block[..end - first]);
     }
 }
 
@@ -319,11 +356,17 @@ mod tests {
                     let (mut expected, mut expected_states) = (found.clone(), states.clone());
                     step_each(&step, &mut expected, &mut expected_states, &slopes);
                     let before = found.clone();
-                    step.run(Level::new(), &mut found, &mut states, |index, row| {
+                    let mut splats = vec![Splat::NOWHERE; count];
+                    step.run(Level::new(), &mut found, &mut states, &mut splats, |index, row| {
                         assert_eq!(*row, before[index]);
                         slopes[index]
                     });
                     assert_ne!(found, before);
+                    let splat = |row: &Row| {
+                        Splat::new(&Gaussian::from_components(&row[..], PARAMETERIZATION))
+                    };
+                    let of_rows: Vec<_> = found.iter().filter_map(splat).collect();
+                    assert_eq!(format!("{splats:?}"), format!("{of_rows:?}"));
                     for index in 0..count {
                         let scale = 1e-4 * (1.0 + found[index][4].max(found[index][2]));
                         for (found, expected) in found[index].iter().zip(expected[index]) {
@@ -352,7 +395,8 @@ mod tests {
         slopes[8].0.color[2] = f32::INFINITY;
         let before = rows(LANES, 3, &mut rng);
         let (mut after, mut states) = (before.clone(), vec![State::NEW; LANES]);
-        block_step(None, 3).run(Level::new(), &mut after, &mut states, |index, _| slopes[index]);
+        block_step(None, 3)
+            .run(Level::new(), &mut after, &mut states, &mut [], |index, _| slopes[index]);
         for index in 0..LANES {
             assert_eq!(after[index] == before[index], [3, 8].contains(&index), "{index}");
             assert_eq!(states[index].weight == 0.0, [3, 8].contains(&index), "{index}");
@@ -368,7 +412,7 @@ mod tests {
             let (mut rows, mut states) = (rows(count, 3, &mut rng), vec![State::NEW; count]);
             for _ in 0..3 {
                 let slopes = slopes(count, 3, &mut rng);
-                step.run(level, &mut rows, &mut states, |index, _| slopes[index]);
+                step.run(level, &mut rows, &mut states, &mut [], |index, _| slopes[index]);
             }
             let states = states.iter().flat_map(|state| state.mean);
             rows.iter().copied().flatten().chain(states).map(f32::to_bits).collect::<Vec<_>>()
