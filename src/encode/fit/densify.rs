@@ -32,6 +32,27 @@ struct NewPosition {
     /// nearly all of the distortion, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
+    /// What the rendering lacks there in each channel, minus the residual ([`Rendered::residuals`]), if the
+    /// colour depends on that.
+    missing: [f32; 4],
+}
+
+/// What new Gaussians are placed by in a tile.
+struct TileErrors {
+    distortions: TilePlane,
+    /// One plane per channel.
+    residuals: Vec<TilePlane>,
+}
+
+impl TileErrors {
+    /// What the rendering lacks at a pixel of the tile; 0 for absent channels.
+    fn missing(&self, x: usize, y: usize) -> [f32; 4] {
+        let mut missing = [0.0; 4];
+        for (value, plane) in missing.iter_mut().zip(&self.residuals) {
+            *value = -plane[y][x];
+        }
+        missing
+    }
 }
 
 /// What the positions, shapes and colours of new Gaussians depend on.
@@ -60,10 +81,16 @@ impl Densifier<'_> {
     ) -> Result<Vec<Row>, EncodeError> {
         let raster = self.pass.raster;
         let positions = match self.options.placement {
-            Placement::Top => top(count, &self.distortion_map(observer)?),
+            Placement::Top => {
+                let mut positions = top(count, &self.distortion_map(observer)?);
+                if let NewColor::Residual(_) = self.options.color {
+                    self.find_missing(&mut positions, observer)?;
+                }
+                positions
+            }
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.pass.distortions());
-                let tiles = |tile| self.distortions(tile);
+                let tiles = |tile| self.errors(tile);
                 spread(count, raster.width, grid, rng.f64(), sums, tiles, observer)?
             }
         };
@@ -72,69 +99,59 @@ impl Densifier<'_> {
             .filter
             .variance(raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        let colors = self.colors(&positions, observer)?;
         let mut rows = Vec::with_capacity(positions.len());
-        for (positions, colors) in positions.chunks(PART).zip(colors.chunks(PART)) {
+        for positions in positions.chunks(PART) {
             observer.poll()?;
-            let new = positions.iter().zip(colors);
-            rows.extend(new.map(|(at, &color)| self.new_gaussian(at, color, variance, rng)));
+            rows.extend(positions.iter().map(|at| self.new_gaussian(at, variance, rng)));
         }
         Ok(rows)
     }
 
-    /// The colours of new Gaussians.
-    fn colors(
+    /// Sets what the rendering lacks at positions.
+    fn find_missing(
         &self,
-        positions: &[NewPosition],
+        positions: &mut [NewPosition],
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<[f32; 4]>, EncodeError> {
-        let raster = self.pass.raster;
-        let at = |position: &NewPosition| {
-            let pixel = position.pixel as usize;
-            (pixel % raster.width, pixel / raster.width)
-        };
-        let of_source = |position: &NewPosition| {
-            let (x, y) = at(position);
-            raster.sample(x, y)
-        };
-        let share = match self.options.color {
-            NewColor::Zero => return Ok(vec![[0.0; 4]; positions.len()]),
-            NewColor::Source => return Ok(positions.iter().map(of_source).collect()),
-            NewColor::Residual(share) => share,
-        };
+    ) -> Result<(), EncodeError> {
         let [columns, _] = self.tile_grid();
         let tile_of = |position: &NewPosition| {
-            let (x, y) = at(position);
+            let (x, y) = self.pixel(position);
             y / TILE_HEIGHT * columns + x / TILE_WIDTH
         };
-        let by_tile: Vec<_> = positions.chunk_by(|a, b| tile_of(a) == tile_of(b)).collect();
-        let colors = observer.map(WORK, by_tile.into_iter(), |positions| -> Vec<[f32; 4]> {
-            let planes = self.pass.residuals(tile_of(&positions[0]));
-            let color = |position| {
-                let (x, y) = at(position);
-                let mut color = [0.0; 4];
-                for (value, plane) in color.iter_mut().zip(&planes) {
-                    let residual = plane[y % TILE_HEIGHT][x % TILE_WIDTH];
-                    *value = -share * residual / raster.sensitivity(x, y);
-                }
-                color
-            };
-            positions.iter().map(color).collect()
+        let by_tile: Vec<_> = positions.chunk_by_mut(|a, b| tile_of(a) == tile_of(b)).collect();
+        observer.map(WORK, by_tile.into_iter(), |positions| {
+            let errors = self.errors(tile_of(&positions[0]));
+            for position in positions {
+                let (x, y) = self.pixel(position);
+                position.missing = errors.missing(x % TILE_WIDTH, y % TILE_HEIGHT);
+            }
         })?;
-        Ok(colors.concat())
+        Ok(())
+    }
+
+    /// Column and row of the pixel at a position.
+    fn pixel(&self, position: &NewPosition) -> (usize, usize) {
+        let (pixel, width) = (position.pixel as usize, self.pass.raster.width);
+        (pixel % width, pixel / width)
+    }
+
+    /// The colour of a new Gaussian.
+    fn color(&self, position: &NewPosition) -> [f32; 4] {
+        let (x, y) = self.pixel(position);
+        match self.options.color {
+            NewColor::Zero => [0.0; 4],
+            NewColor::Source => self.pass.raster.sample(x, y),
+            NewColor::Residual(share) => {
+                let sensitivity = self.pass.raster.sensitivity(x, y);
+                position.missing.map(|missing| share * missing / sensitivity)
+            }
+        }
     }
 
     /// A new Gaussian, where `variance` is the filter's.
-    fn new_gaussian(
-        &self,
-        position: &NewPosition,
-        color: [f32; 4],
-        variance: f32,
-        rng: &mut fastrand::Rng,
-    ) -> Row {
-        let raster = self.pass.raster;
-        let (pixel, variance) = (position.pixel as usize, variance * position.variance_share);
-        let (x, y) = (pixel % raster.width, pixel / raster.width);
+    fn new_gaussian(&self, position: &NewPosition, variance: f32, rng: &mut fastrand::Rng) -> Row {
+        let variance = variance * position.variance_share;
+        let (x, y) = self.pixel(position);
         let mut row = [0.0; MAX_COMPONENTS];
         row[0] = x as f32 + 0.5;
         row[1] = y as f32 + 0.5;
@@ -147,7 +164,7 @@ impl Densifier<'_> {
             NewShape::Random => random_shape(parameterization, variance, rng),
         };
         row[2..5].copy_from_slice(&shape.to_array());
-        row[5..].copy_from_slice(&color);
+        row[5..].copy_from_slice(&self.color(position));
         self.bounds.clamped(row)
     }
 
@@ -157,12 +174,14 @@ impl Densifier<'_> {
         [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
     }
 
-    /// The distortion of every pixel of a tile.
-    fn distortions(&self, tile: usize) -> TilePlane {
+    /// The distortion of every pixel of a tile, and the residuals.
+    fn errors(&self, tile: usize) -> TileErrors {
         let [columns, _] = self.tile_grid();
         let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
-        let planes = self.pass.residuals(tile);
-        distortion_map::of_tile(self.pass.raster, corner, &planes, self.options.distortion)
+        let residuals = self.pass.residuals(tile);
+        let (raster, measure) = (self.pass.raster, self.options.distortion);
+        let distortions = distortion_map::of_tile(raster, corner, &residuals, measure);
+        TileErrors { distortions, residuals }
     }
 
     /// The distortion of every pixel, row by row.
@@ -173,7 +192,7 @@ impl Densifier<'_> {
         let rows = map.chunks_mut(raster.width * TILE_HEIGHT).enumerate();
         observer.map(WORK * columns as f64, rows, |(row, lines)| {
             for column in 0..columns {
-                let distortions = self.distortions(row * columns + column);
+                let distortions = self.errors(row * columns + column).distortions;
                 let lines = lines.chunks_exact_mut(raster.width).zip(&distortions);
                 for (line, values) in lines {
                     let line = &mut line[column * TILE_WIDTH..];
@@ -197,7 +216,10 @@ fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
         order.truncate(count);
     }
     order.sort_unstable_by(descending);
-    order.into_iter().map(|pixel| NewPosition { pixel, variance_share: 1.0 }).collect()
+    order
+        .into_iter()
+        .map(|pixel| NewPosition { pixel, variance_share: 1.0, missing: [0.0; 4] })
+        .collect()
 }
 
 /// [`Placement::Spread`]: up to `count` pixels, whose density is proportional to the distortion.
@@ -214,7 +236,7 @@ fn spread(
     [columns, rows]: [usize; 2],
     phase: f64,
     sums: &[f32],
-    distortions: impl Fn(usize) -> TilePlane + Send + Sync,
+    errors: impl Fn(usize) -> TileErrors + Send + Sync,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<NewPosition>, EncodeError> {
     let total: f64 = sums.iter().copied().map(f64::from).sum();
@@ -235,13 +257,15 @@ fn spread(
         let variance_share = (mean / f64::from(sums[tile])).sqrt().min(1.0) as f32;
         let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;
         let mut positions = Vec::new();
-        for (y, line) in distortions(tile).iter().enumerate() {
+        let errors = errors(tile);
+        for (y, line) in errors.distortions.iter().enumerate() {
             for (x, &value) in line.iter().enumerate() {
                 sum += f64::from(value);
                 // Pixels that are exact or outside the picture have no distortion.
                 if sum > next && value > 0.0 {
                     let pixel = (first + y * width + x) as u32;
-                    positions.push(NewPosition { pixel, variance_share });
+                    let missing = errors.missing(x, y);
+                    positions.push(NewPosition { pixel, variance_share, missing });
                     // A pixel that contains several steps gets one Gaussian.
                     next += step * ((sum - next) / step).ceil();
                 }
@@ -321,7 +345,8 @@ mod tests {
     ) -> Vec<NewPosition> {
         let sum_of = |tile| tiles(tile).as_flattened().iter().sum();
         let sums: Vec<f32> = (0..grid[0] * grid[1]).map(sum_of).collect();
-        unobserved(|observer| super::spread(count, width, grid, phase, &sums, tiles, observer))
+        let errors = |tile| TileErrors { distortions: tiles(tile), residuals: Vec::new() };
+        unobserved(|observer| super::spread(count, width, grid, phase, &sums, errors, observer))
     }
 
     /// A tile whose distortions depend on the picture's column alone.
