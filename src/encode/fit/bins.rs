@@ -45,49 +45,60 @@ struct ChunkSpans {
     row_ends: Vec<u32>,
 }
 
+/// What a thread needs memory for while it bins chunks.
+#[derive(Default)]
+struct Scratch {
+    /// Block by block, and for each row of tiles, the tiles that the splats of the block touch.
+    found: Vec<(u32, Columns)>,
+    /// The end of each block in `found`.
+    blocks: Vec<usize>,
+    /// Spans with their rows, splat by splat.
+    spans: Vec<(u32, TileSpan)>,
+}
+
 impl ChunkSpans {
-    /// Sorts what the grid finds for a chunk, block by block: for each row of tiles, the tiles that the
-    /// splats of the block touch. `blocks` has the end of each block in `found`.
-    fn new(first_splat: u32, splats: usize, found: &[(u32, Columns)], blocks: &[usize]) -> Self {
-        let first_row = found.iter().map(|&(row, _)| row).min().unwrap_or(0) as usize;
-        let end_row = found.iter().map(|&(row, _)| row + 1).max().unwrap_or(0) as usize;
-        let mut row_ends = vec![0; end_row - first_row];
-        let (mut rows, mut ends) = (Vec::new(), Vec::with_capacity(splats));
-        let mut start = 0;
-        for &end in blocks {
-            let found = &found[start..end];
+    /// Sorts what the grid found for a chunk.
+    fn new(first_splat: u32, splats: usize, scratch: &mut Scratch) -> Self {
+        let Scratch { found, blocks, spans } = scratch;
+        // Every candidate is written, and stays if it is a span: a branch would often be mispredicted.
+        let candidates = found.len() * LANES + 1;
+        if spans.len() < candidates {
+            spans.resize(candidates, (0, TileSpan::NONE));
+        }
+        let mut ends = Vec::with_capacity(splats);
+        let (mut count, mut start) = (0, 0);
+        for &end in &*blocks {
             for lane in 0..LANES.min(splats - ends.len()) {
-                for (row, [first, end]) in found {
-                    if first[lane] < end[lane] {
-                        rows.push(*row);
-                        row_ends[*row as usize - first_row] += 1;
-                    }
+                let splat = first_splat + ends.len() as u32;
+                for (row, [firsts, ends]) in &found[start..end] {
+                    let (first, end) = (firsts[lane], ends[lane]);
+                    spans[count] = (*row, TileSpan { splat, first, end });
+                    count += usize::from(first < end);
                 }
-                ends.push(rows.len() as u32);
+                ends.push(count as u32);
             }
             start = end;
+        }
+        let spans = &spans[..count];
+
+        let first_row = spans.iter().map(|&(row, _)| row).min().unwrap_or(0) as usize;
+        let end_row = spans.iter().map(|&(row, _)| row + 1).max().unwrap_or(0) as usize;
+        let mut row_ends = vec![0; end_row - first_row];
+        for (row, _) in spans {
+            row_ends[*row as usize - first_row] += 1;
         }
         // The counts become starts, which move to the ends while spans are written.
         let mut total = 0;
         for count in &mut row_ends {
             total += core::mem::replace(count, total);
         }
-        let mut sorted = vec![TileSpan { splat: 0, first: 0, end: 0 }; rows.len()];
-        let mut start = 0;
-        for (block, &end) in (0..).zip(blocks) {
-            for (row, [first, end]) in &found[start..end] {
-                let at = &mut row_ends[*row as usize - first_row];
-                for lane in 0..LANES {
-                    if first[lane] < end[lane] {
-                        let splat = first_splat + block * LANES as u32 + lane as u32;
-                        sorted[*at as usize] =
-                            TileSpan { splat, first: first[lane], end: end[lane] };
-                        *at += 1;
-                    }
-                }
-            }
-            start = end;
+        let mut sorted = vec![TileSpan::NONE; spans.len()];
+        for (row, span) in spans {
+            let at = &mut row_ends[*row as usize - first_row];
+            sorted[*at as usize] = *span;
+            *at += 1;
         }
+        let rows = spans.iter().map(|&(row, _)| row).collect();
         Self { rows, ends, sorted, first_row, row_ends }
     }
 
@@ -128,8 +139,8 @@ impl RowBins {
         let (grid, level) = (self.grid, Level::new());
         self.tile_rows = Vec::new();
         let chunks = splats.chunks(CHUNK).enumerate();
-        type Scratch = (Vec<(u32, Columns)>, Vec<usize>);
-        let bin = |(found, blocks): &mut Scratch, (chunk, splats): (usize, &[Splat])| {
+        let bin = |scratch: &mut Scratch, (chunk, splats): (usize, &[Splat])| {
+            let Scratch { found, blocks, .. } = scratch;
             found.clear();
             blocks.clear();
             grid.columns_of(level, splats, cutoff, 0..grid.rows, |first, row, columns| {
@@ -138,7 +149,7 @@ impl RowBins {
                 found.push((row as u32, *columns));
             });
             blocks.resize(splats.len().div_ceil(LANES), found.len());
-            ChunkSpans::new((chunk * CHUNK) as u32, splats.len(), found, blocks)
+            ChunkSpans::new((chunk * CHUNK) as u32, splats.len(), scratch)
         };
         let chunks = observer.map_with(WORK * CHUNK as f64, chunks, bin)?;
         let offsets = self.count_rows(&chunks);
@@ -216,7 +227,7 @@ impl RowBins {
     ) -> Result<(), EncodeError> {
         let (rows, columns) = (self.grid.rows, self.grid.columns);
         let total = self.starts[rows];
-        reset(&mut self.spans, total, TileSpan { splat: 0, first: 0, end: 0 });
+        reset(&mut self.spans, total, TileSpan::NONE);
         let (mut spans, starts) = (&mut self.spans[..], &self.starts);
         let parts = (0..rows).map(|row| {
             let count = starts[row + 1] - starts[row];
@@ -295,6 +306,10 @@ pub(crate) struct TileSpan {
     /// Columns of the first tile, and of the one after the last.
     pub(crate) first: u32,
     pub(crate) end: u32,
+}
+
+impl TileSpan {
+    const NONE: Self = Self { splat: 0, first: 0, end: 0 };
 }
 
 /// For each tile of a row, the spans that contain it, by their indices in the row.
