@@ -259,21 +259,37 @@ fn spread(
         let mut positions = Vec::new();
         let errors = errors(tile);
         for (y, line) in errors.distortions.iter().enumerate() {
-            for (x, &value) in line.iter().enumerate() {
-                sum += f64::from(value);
-                // Pixels that are exact or outside the picture have no distortion.
-                if sum > next && value > 0.0 {
-                    let pixel = (first + y * width + x) as u32;
-                    let missing = errors.missing(x, y);
-                    positions.push(NewPosition { pixel, variance_share, missing });
-                    // A pixel that contains several steps gets one Gaussian.
-                    next += step * ((sum - next) / step).ceil();
+            let end = sum + sum_of(line);
+            // Few lines contain a step.
+            if end > next {
+                for (x, &value) in line.iter().enumerate() {
+                    sum += f64::from(value);
+                    // Pixels that are exact or outside the picture have no distortion.
+                    if sum > next && value > 0.0 {
+                        let pixel = (first + y * width + x) as u32;
+                        let missing = errors.missing(x, y);
+                        positions.push(NewPosition { pixel, variance_share, missing });
+                        // A pixel that contains several steps gets one Gaussian.
+                        next += step * ((sum - next) / step).ceil();
+                    }
                 }
             }
+            sum = end;
         }
         positions
     })?;
     Ok(positions.concat())
+}
+
+/// The sum of a line of a tile, in four parts that are added up at the same time.
+fn sum_of(line: &[f32; TILE_WIDTH]) -> f64 {
+    let mut parts = [0.0; 4];
+    for values in line.as_chunks::<4>().0 {
+        for (part, &value) in parts.iter_mut().zip(values) {
+            *part += f64::from(value);
+        }
+    }
+    (parts[0] + parts[1]) + (parts[2] + parts[3])
 }
 
 /// Visits the points of a rectangle along a Z curve, on which neighbours follow each other closely.
