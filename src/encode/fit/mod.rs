@@ -441,18 +441,23 @@ impl<'a> Fit<'a> {
             return Ok(());
         }
         let parameterization = self.bounds.parameterization;
-        let importances = observer.map(WORK, self.parameters.values.iter(), |row| {
-            let gaussian = Gaussian::from_components(&row[..], parameterization);
-            gaussian.importance() * self.raster.sensitivity_near(gaussian.center)
+        let chunks = self.parameters.values.chunks(CHUNK).enumerate();
+        // In the order of importance, and of equal ones in that of the Gaussians.
+        let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, rows)| {
+            let key = |(index, row): (usize, &Row)| {
+                let gaussian = Gaussian::from_components(&row[..], parameterization);
+                let sensitivity = self.raster.sensitivity_near(gaussian.center);
+                u64::from(ordered(gaussian.importance() * sensitivity)) << 32 | index as u64
+            };
+            (chunk * CHUNK..).zip(rows).map(key).collect::<Vec<u64>>()
         })?;
+        let mut keys = keys.concat();
         observer.poll()?;
-        let mut order: Vec<u32> = (0..importances.len() as u32).collect();
-        order.select_nth_unstable_by(count - 1, |a, b| {
-            importances[*a as usize].total_cmp(&importances[*b as usize]).then_with(|| a.cmp(b))
-        });
-        let mut keep = vec![true; importances.len()];
-        for &index in &order[..count] {
-            keep[index as usize] = false;
+        keys.select_nth_unstable(count - 1);
+        let mut keep = vec![true; keys.len()];
+        for key in &keys[..count] {
+            // The cast leaves the index.
+            keep[*key as u32 as usize] = false;
         }
         observer.poll()?;
         self.parameters.retain(|index| keep[index]);
@@ -551,8 +556,27 @@ fn decoded(quantizers: Option<&LsqQuantizers>, row: &Row) -> Row {
     quantizers.map_or(*row, |quantizers| quantizers.decoded(&quantizers.codes(row)))
 }
 
+/// A number that is larger for larger values, in the order of [`f32::total_cmp`].
+fn ordered(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
 fn add(sum: &mut QuantizerGradients, values: &QuantizerGradients) {
     for (sum, value) in sum.as_flattened_mut().iter_mut().zip(values.as_flattened()) {
         *sum += value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ordered;
+
+    #[test]
+    fn ordered_numbers_are_in_total_order() {
+        let values =
+            [-f32::NAN, f32::NEG_INFINITY, -2.0, -0.0, 0.0, 1e-40, 1.0, f32::INFINITY, f32::NAN];
+        assert!(values.is_sorted_by(|a, b| a.total_cmp(b).is_lt()));
+        assert!(values.is_sorted_by(|a, b| ordered(*a) < ordered(*b)));
     }
 }

@@ -66,15 +66,19 @@ impl Parameters {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let keys =
-            observer.map(WORK_TO_SORT * CHUNK as f64, self.values.chunks(CHUNK), |rows| {
-                let key = |row: &Row| spread(row[0]) | spread(row[1]) << 1;
-                rows.iter().map(key).collect::<Vec<u32>>()
-            })?;
-        let mut order: Vec<(u32, u32)> = keys.into_iter().flatten().zip(0..).collect();
-        order.par_sort_unstable();
+        let chunks = self.values.chunks(CHUNK).enumerate();
+        // A key with the index below it is compared at once.
+        let keys = observer.map(WORK_TO_SORT * CHUNK as f64, chunks, |(chunk, rows)| {
+            let key = |(index, row): (usize, &Row)| {
+                u64::from(spread(row[0]) | spread(row[1]) << 1) << 32 | index as u64
+            };
+            (chunk * CHUNK..).zip(rows).map(key).collect::<Vec<u64>>()
+        })?;
+        let mut keys = keys.concat();
+        keys.par_sort_unstable();
         observer.poll()?;
-        let order: Vec<u32> = order.into_iter().map(|(_, index)| index).collect();
+        // The cast leaves the index.
+        let order: Vec<u32> = keys.into_iter().map(|key| key as u32).collect();
         self.values = reordered(&self.values, &order);
         observer.poll()?;
         self.states.reorder(&order);
