@@ -229,7 +229,13 @@ impl Encoder {
         let fewest = if self.target.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
         let iterations = iterations.max(fewest);
         self.metadata.check().map_err(OptionError::Metadata)?;
-        let training = self.training.clone().unwrap_or_else(|| Training::fast(iterations));
+        let training = match &self.training {
+            Some(training) => training.clone(),
+            None if self.precision == Precision::Packed => {
+                Training::fast(iterations).with_time_for_quantization()
+            }
+            None => Training::fast(iterations),
+        };
         training.check().map_err(OptionError::Training)?;
         if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {
             return Err(OptionError::Training("entropy coding needs the quartic kernel").into());

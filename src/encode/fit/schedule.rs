@@ -114,8 +114,8 @@ mod tests {
 
     #[test]
     fn only_the_packed_precision_is_trained_with_quantization() {
-        let quantized_from =
-            |precision| TrainingSchedule::new(&Training::fast(600), precision).quantized_from;
+        let training = Training::fast(600).with_time_for_quantization();
+        let quantized_from = |precision| TrainingSchedule::new(&training, precision).quantized_from;
         assert_eq!(quantized_from(Precision::Packed), 360);
         assert_eq!(quantized_from(Precision::Float), u32::MAX);
         assert_eq!(quantized_from(Precision::Entropy), u32::MAX);
@@ -124,9 +124,9 @@ mod tests {
     #[test]
     fn growth_steps_are_at_equal_intervals() {
         let schedule = TrainingSchedule::new(&Training::fast(600), Precision::Entropy);
-        let expected: Vec<_> = (1..=42).map(|growth| (7 * growth, 42 - growth)).collect();
+        let expected: Vec<_> = (1..=42).map(|growth| (10 * growth, 42 - growth)).collect();
         assert_eq!(growths(&schedule, 600), expected);
-        let expected: Vec<_> = (0..=6).map(|cull| (300 + 10 * cull, 6 - cull)).collect();
+        let expected: Vec<_> = (0..=6).map(|cull| (420 + 10 * cull, 6 - cull)).collect();
         assert_eq!(culls(&schedule, 600), expected);
     }
 }

@@ -248,20 +248,19 @@ impl Training {
         let steps = (iterations / 15).clamp(10, 160);
         // The longer a run, the more it gains from iterations after growth.
         let (end, culled) = match iterations {
-            ..50 => (0.7, 0.8),
-            50..150 => (0.6, 0.7),
-            150..=1_200 => (0.5, 0.6),
+            ..=800 => (0.7, 0.8),
+            801..=2_000 => (0.5, 0.6),
             _ => (0.4, 0.5),
         };
         // In a short run there is no time to be careful, and little to correct.
-        let hurry = 1.0 / iterations as f32;
+        let hurry = 1.0 / iterations.max(30) as f32;
         let replaced = (4.0 / steps as f32).clamp(0.05, 0.2);
         Self {
             iterations,
             kernel: Kernel::Quartic,
             parameterization: Parameterization::Cholesky,
             densification: Densification {
-                initial: 0.03,
+                initial: 0.02,
                 steps,
                 end,
                 portion: Portion::Even,
@@ -276,10 +275,10 @@ impl Training {
             },
             filter: GaussianFilter::PAPER,
             optimizer: Optimizer::GaussNewton(GaussNewton {
-                rate: 1.0 + 12.0 * hurry.min(0.1),
-                momentum: 0.7,
+                rate: 1.2 + 6.0 * hurry,
+                momentum: 0.8 - 6.0 * hurry,
                 damping: 0.02,
-                trust_region: 0.2 + 3.0 * hurry.min(0.1),
+                trust_region: 0.2 + 3.0 * hurry,
             }),
             schedule: LearningRateSchedule::Linear(0.7),
             quantization: Quantization {
@@ -292,6 +291,16 @@ impl Training {
                 color: None,
             },
         }
+    }
+
+    /// These constants with growth and culling compressed such that they are over when quantization
+    /// starts.
+    pub(crate) fn with_time_for_quantization(mut self) -> Self {
+        let Densification { end, culled, .. } = &mut self.densification;
+        let share = (self.quantization.warm_up / *culled).min(1.0);
+        *end *= share;
+        *culled *= share;
+        self
     }
 
     /// GaussianImage++ as published. Where the text and the released code differ, these are the
