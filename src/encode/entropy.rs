@@ -9,7 +9,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{Target, Tune};
 use super::progress::Observer;
-use super::quality::{self, Judge};
+use super::quality;
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, SearchWork, TargetSearch};
@@ -50,7 +50,6 @@ pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
     raster: &Raster,
-    judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
@@ -59,7 +58,7 @@ pub(crate) fn finish(
     }
     if let Some(quality) = job.target.quality() {
         let dissimilarity = rate_model::SHARE_OF_FIT * quality::dissimilarity_at(quality);
-        correct(&mut fit, dissimilarity, job, judge, layout, observer)?;
+        correct(&mut fit, dissimilarity, job, layout, observer)?;
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -73,7 +72,7 @@ pub(crate) fn finish(
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
-    let mut search = TargetSearch::new(job.source, raster, judge, layout, search_work, observer)?;
+    let mut search = TargetSearch::new(job.source, raster, layout, search_work, observer)?;
     let coded = search.run(&gaussians, distortion, job.target, observer)?;
     Ok((layout.write_entropy(&coded, observer)?, work))
 }
@@ -109,7 +108,6 @@ fn correct(
     fit: &mut Fit<'_>,
     dissimilarity: f64,
     job: &Job<'_>,
-    judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(), EncodeError> {
@@ -120,7 +118,7 @@ fn correct(
         let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
         // The dissimilarity is about inversely proportional to the number of Gaussians, but not where
         // a few of them make the picture. There, too many are better than too few.
-        let factor = judge.dissimilarity(&picture, observer)? / dissimilarity;
+        let factor = quality::dissimilarity(job.source, &picture, observer)? / dissimilarity;
         let is_close = factor < CLOSE.end && (factor > CLOSE.start || round > 0);
         let wanted = before.max(1) as f64 * factor.max(LEAST_FACTOR);
         let wanted = (wanted.ceil() as usize).min(fit.most());

@@ -7,7 +7,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{Precision, Target};
 use super::progress::Observer;
-use super::quality::{self, Judge};
+use super::quality;
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::SearchWork;
@@ -76,7 +76,6 @@ fn encode_for_target(
     let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
     let budget = budget(job, &raster, &layout, observer)?;
-    let judge = Judge::new(source);
     let expected = match budget {
         Budget::Count(count) => count,
         _ => job.pixels() / USUAL_PIXELS,
@@ -89,22 +88,19 @@ fn encode_for_target(
     fit.run(job.workload(expected), observer)?;
 
     let (file, mut work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, &raster, &judge, &layout, observer),
+        Precision::Entropy => entropy::finish(fit, job, &raster, &layout, observer),
         Precision::Packed | Precision::Float => packed::finish(fit, job, budget, &layout, observer),
     }?;
 
-    let with_judge = work.peak_memory + judge.memory();
     // The decoder needs memory, too.
     drop(raster);
     let verified = Verified::new(&file, source, observer)?;
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());
-    let distortion = verified.distortion(gaussians, observer)?;
-    observer.advance(workload.error())?;
-    let dissimilarity = judge.dissimilarity(&verified.picture(), observer)?;
-    let peaks = [with_judge, judge.memory_at_work(), peak_before];
-    work.peak_memory = peaks.into_iter().max().unwrap_or(0);
+    let (distortion, dissimilarity) = verified.judged(observer)?;
+    let judging = quality::memory(source);
+    work.peak_memory = work.peak_memory.max(judging).max(peak_before);
     let quality = quality::quality(dissimilarity).max(0.0);
     let reached = Reached { bytes: file.len(), psnr: distortion.psnr, quality, gaussians };
     let shortfall = Shortfall::of(target, job.pixels(), reached);

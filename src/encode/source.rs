@@ -13,9 +13,12 @@ pub struct Source<'a> {
     samples: SourceSamples<'a>,
 }
 
+/// Most pixels of a row that are read at a time.
+pub(crate) const SPAN: usize = 128;
+
 /// Samples of either depth.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum SourceSamples<'a> {
+enum SourceSamples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
@@ -78,9 +81,20 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// All samples.
-    pub(crate) fn samples(&self) -> SourceSamples<'a> {
-        self.samples
+    /// Copies the samples of the pixels of row y from column x on, [`SPAN`] of them or as many as there
+    /// are, to one plane for each channel. Returns how many pixels there are.
+    ///
+    /// The compiler turns the loops into code of the SIMD level that the caller is dispatched to.
+    #[inline(always)]
+    pub(crate) fn read(&self, x: usize, y: usize, planes: &mut [[f32; SPAN]; 4]) -> usize {
+        let (width, channels) = (self.width as usize, self.color.channels());
+        let (at, count) = ((y * width + x) * channels, SPAN.min(width - x));
+        let range = at..at + count * channels;
+        match self.samples {
+            SourceSamples::Eight(samples) => deinterleave(&samples[range], channels, planes),
+            SourceSamples::Sixteen(samples) => deinterleave(&samples[range], channels, planes),
+        }
+        count
     }
 
     /// The sample at an index in interleaved order, scaled to 16 bits.
@@ -102,4 +116,33 @@ fn check(width: u32, height: u32, color: ColorModel, samples: usize) -> Result<(
         return Err(SourceError::SampleCount { found: samples, wanted, width, height, color });
     }
     Ok(())
+}
+
+/// Divides samples among planes.
+#[inline(always)]
+fn deinterleave<T: Copy + Into<f32>>(
+    samples: &[T],
+    channels: usize,
+    planes: &mut [[f32; SPAN]; 4],
+) {
+    match channels {
+        1 => deinterleave_of::<_, 1>(samples, planes),
+        2 => deinterleave_of::<_, 2>(samples, planes),
+        3 => deinterleave_of::<_, 3>(samples, planes),
+        _ => deinterleave_of::<_, 4>(samples, planes),
+    }
+}
+
+#[inline(always)]
+fn deinterleave_of<T: Copy + Into<f32>, const CHANNELS: usize>(
+    samples: &[T],
+    planes: &mut [[f32; SPAN]; 4],
+) {
+    let pixels = samples.as_chunks::<CHANNELS>().0;
+    for channel in 0..CHANNELS {
+        let plane = &mut planes[channel][..pixels.len()];
+        for x in 0..plane.len() {
+            plane[x] = pixels[x][channel].into();
+        }
+    }
 }

@@ -3,15 +3,19 @@
 use super::error::EncodeError;
 use super::progress::Observer;
 use crate::region::Region;
-use crate::render::{Picture, RenderOptions};
+use crate::render::{BAND_HEIGHT, Picture, RenderOptions};
 
-/// Pixels of a strip for each thread. They bound the time from one poll of the observer to the next.
-const STRIP_PIXELS: u32 = 1 << 17;
-/// Most pixels of a strip. They bound the memory of a rendering to floats.
-const MOST_STRIP_PIXELS: u32 = 1 << 20;
+/// Pixels of a strip for each thread, but at least [`BANDS`] bands. They bound the memory of a rendering
+/// to floats, and the time from one poll of the observer to the next.
+const PIXELS: usize = 1 << 16;
+/// Bands of a strip for each thread: with one alone, threads would wait for the slowest.
+const BANDS: usize = 2;
+/// Most pixels of a strip, unless a band has more.
+const MOST_PIXELS: usize = 1 << 21;
 
 /// Renders the first `prefix` Gaussians of a picture, of which there are no limits, strip by strip from
-/// the top, and shows every strip to `visit`: float samples, plane after plane.
+/// the top, and shows every strip to `visit`: float samples, plane after plane. The number of rows of a
+/// strip is a multiple of [`BAND_HEIGHT`], except at the bottom.
 ///
 /// # Errors
 /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -21,31 +25,78 @@ pub(crate) fn render(
     observer: &mut Observer<'_>,
     mut visit: impl FnMut(Region, &[f32]),
 ) -> Result<(), EncodeError> {
-    let header = picture.header();
-    let mut planes = Vec::new();
-    for region in strips(header.width, header.height) {
+    observer.poll()?;
+    let options = RenderOptions::new().with_prefix(prefix);
+    picture.render_strips(&options, bands(picture.header().width), |region, planes| {
         observer.poll()?;
-        planes.resize(region.pixels() as usize * header.color.channels(), 0.0);
-        let options = RenderOptions::new().with_region(region).with_prefix(prefix);
-        picture.render_planes(&options, &mut planes).expect("there are no limits");
-        observer.poll()?;
-        visit(region, &planes);
-    }
-    Ok(())
+        visit(region, planes);
+        observer.poll()
+    })
 }
 
 /// Size in bytes of a strip that is rendered to floats.
 pub(crate) fn memory(width: u32, height: u32, channels: usize) -> usize {
-    let largest = strips(width, height).next().map_or(0, |region| region.pixels());
-    largest as usize * channels * size_of::<f32>()
+    rows(width, height) * width as usize * channels * size_of::<f32>()
 }
 
-/// The strips of a picture from top to bottom, each of whole rows, of which the number is even except
-/// at the bottom.
-pub(crate) fn strips(width: u32, height: u32) -> impl Iterator<Item = Region> {
-    let threads = u32::try_from(rayon::current_num_threads()).unwrap_or(u32::MAX);
-    let pixels = STRIP_PIXELS.saturating_mul(threads).min(MOST_STRIP_PIXELS);
-    let rows = (pixels / width).max(2) & !1;
-    let region = move |y| Region { x: 0, y, width, height: rows.min(height - y) };
-    (0..height).step_by(rows as usize).map(region)
+/// Number of rows of a strip.
+pub(crate) fn rows(width: u32, height: u32) -> usize {
+    (bands(width) * BAND_HEIGHT).min(height as usize)
+}
+
+/// Number of bands of a strip.
+fn bands(width: u32) -> usize {
+    let pixels = width as usize * BAND_HEIGHT;
+    let for_all = rayon::current_num_threads() * (PIXELS / pixels).max(BANDS);
+    for_all.min(MOST_PIXELS / pixels).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
+    use crate::encode::source::Source;
+    use crate::encode::{Encoder, Target};
+    use crate::{StreamDecoder, Threads};
+
+    #[test]
+    fn strips_make_the_picture() {
+        let (width, height) = (70, 5 * BAND_HEIGHT as u32 + 3);
+        let mut rng = fastrand::Rng::with_seed(8);
+        let samples: Vec<u8> = (0..width * height * 3).map(|_| rng.u8(..)).collect();
+        let source =
+            Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("the sizes agree");
+        let encoder = Encoder::new().with_effort(1).with_target(Target::Gaussians(300));
+        let encoded = encoder.with_threads(Threads::One).encode(&source).expect("no target");
+        let mut stream = StreamDecoder::new();
+        stream.feed(&encoded.bytes).expect("a sound file");
+        let picture = stream.picture().expect("the header was read");
+        for prefix in [100, u32::MAX] {
+            let options = RenderOptions::new().with_prefix(prefix);
+            let mut whole = vec![0.0; samples.len()];
+            picture.render_planes(&options, &mut whole).expect("a small picture");
+            let pixels = (width * height) as usize;
+            for bands in [1, 2, 9] {
+                let mut next = 0;
+                let shown = picture.render_strips(&options, bands, |region, planes| {
+                    assert_eq!(region.y, next);
+                    next += region.height;
+                    let count = region.pixels() as usize;
+                    for (channel, plane) in planes.chunks_exact(count).enumerate() {
+                        let at = channel * pixels + (region.y * width) as usize;
+                        assert_eq!(plane, &whole[at..][..count], "{bands} bands, {channel}");
+                    }
+                    Ok::<(), EncodeError>(())
+                });
+                assert!(shown.is_ok() && next == height, "{bands} bands: {next} rows");
+            }
+            unobserved(|observer| {
+                render(&picture, prefix, observer, |region, planes| {
+                    let at = (region.y * width) as usize;
+                    assert_eq!(planes[0], whole[at]);
+                })
+            });
+        }
+    }
 }

@@ -1,18 +1,23 @@
 //! Verification: the distortion of a file as its decoder renders it, which is what the encoder
 //! reports.
 
+use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::error::EncodeError;
 use super::progress::Observer;
-use super::source::{Source, SourceSamples};
+use super::quality::Judgement;
+use super::source::{SPAN, Source};
 use super::strips;
 use crate::decode::StreamDecoder;
 use crate::limits::Limits;
-use crate::render::{Picture, Sample};
+use crate::region::Region;
+use crate::render::Picture;
 
 /// Bytes of a file from one poll of the observer to the next.
 const PIECE: usize = 1 << 12;
+/// Samples that are compared at a time.
+const LANES: usize = 8;
 
 /// A file that was decoded for comparison with its source.
 #[derive(Debug)]
@@ -67,48 +72,89 @@ impl<'a> Verified<'a> {
         count: u32,
         observer: &mut Observer<'_>,
     ) -> Result<FilePsnr, EncodeError> {
-        match self.source.samples() {
-            SourceSamples::Eight(samples) => self.distortion_from(samples, count, observer),
-            SourceSamples::Sixteen(samples) => self.distortion_from(samples, count, observer),
+        let mut errors = Errors::default();
+        strips::render(&self.picture(), count, observer, |region, planes| {
+            errors.add(self.source, region, planes);
+        })?;
+        Ok(errors.psnr(self.source))
+    }
+
+    /// The distortion of the decoded picture, and its dissimilarity to the source.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn judged(
+        &self,
+        observer: &mut Observer<'_>,
+    ) -> Result<(FilePsnr, f64), EncodeError> {
+        let (mut errors, mut judgement) = (Errors::default(), Judgement::new(self.source));
+        strips::render(&self.picture(), u32::MAX, observer, |region, planes| {
+            errors.add(self.source, region, planes);
+            judgement.see(region, planes);
+        })?;
+        Ok((errors.psnr(self.source), judgement.dissimilarity()))
+    }
+}
+
+/// Sums of squared errors of a rendering, which comes in strips.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    /// Of samples rounded to the source's depth, in its quantization steps.
+    rounded: f64,
+    /// Of samples that are clamped, but not rounded.
+    exact: f64,
+}
+
+impl Errors {
+    /// Adds those of a strip: float samples, plane after plane.
+    fn add(&mut self, source: &Source<'_>, region: Region, planes: &[f32]) {
+        let level = Level::new();
+        let rows = (0..region.height as usize).into_par_iter();
+        let errors =
+            rows.map(|row| dispatch!(level, _ => Self::of_row(source, region, planes, row)));
+        // Added row by row, so that the sums do not depend on the threads.
+        for row in errors.collect::<Vec<_>>() {
+            self.rounded += row.rounded;
+            self.exact += row.exact;
         }
     }
 
-    fn distortion_from<T: Sample + Into<f64> + Sync>(
-        &self,
-        samples: &[T],
-        count: u32,
-        observer: &mut Observer<'_>,
-    ) -> Result<FilePsnr, EncodeError> {
-        let width = self.source.width() as usize;
-        let channels = self.source.color().channels();
-        let stride = width * channels;
-        let full_scale: f64 = T::OPAQUE.into();
-        let (mut rounded, mut exact) = (0.0, 0.0);
-        strips::render(&self.picture(), count, observer, |region, planes| {
-            let pixels = region.pixels() as usize;
-            let source = &samples[region.y as usize * stride..][..pixels * channels];
-            let errors = source.par_chunks_exact(stride).enumerate().map(|(row, source)| {
-                let mut errors = [0.0; 2];
-                for (index, &source) in source.iter().enumerate() {
-                    let (x, channel) = (index / channels, index % channels);
-                    let value = planes[channel * pixels + row * width + x];
-                    let (source, sample): (f64, f64) = (source.into(), T::from_unit(value).into());
-                    errors[0] += (sample - source).powi(2);
-                    let value = f64::from(value.clamp(0.0, 1.0));
-                    errors[1] += (value * full_scale - source).powi(2);
+    /// Those of a row of a strip. The compiler turns the loops into code of the SIMD level.
+    #[inline(always)]
+    fn of_row(source: &Source<'_>, region: Region, planes: &[f32], row: usize) -> Self {
+        let (width, pixels) = (region.width as usize, region.pixels() as usize);
+        let full_scale = f32::from(source.depth().max_sample());
+        let mut samples = [[0.0; SPAN]; 4];
+        let (mut rounded, mut exact) = ([0.0; LANES], [0.0; LANES]);
+        for first in (0..width).step_by(SPAN) {
+            let count = source.read(first, region.y as usize + row, &mut samples);
+            for (samples, plane) in samples.iter_mut().zip(planes.chunks_exact(pixels)) {
+                let mut values = [0.0; SPAN];
+                values[..count].copy_from_slice(&plane[row * width + first..][..count]);
+                samples[count..].fill(0.0);
+                for at in (0..count).step_by(LANES) {
+                    for lane in 0..LANES {
+                        let sample = f64::from(samples[at + lane]);
+                        let value = values[at + lane].clamp(0.0, 1.0) * full_scale;
+                        let error = f64::from((value + 0.5).floor()) - sample;
+                        rounded[lane] += error * error;
+                        let error = f64::from(value) - sample;
+                        exact[lane] += error * error;
+                    }
                 }
-                errors
-            });
-            // Added row by row, so that the sums do not depend on the threads.
-            for [by_samples, by_values] in errors.collect::<Vec<_>>() {
-                rounded += by_samples;
-                exact += by_values;
             }
-        })?;
-        let most = full_scale * full_scale * samples.len() as f64;
-        Ok(FilePsnr {
-            psnr: 10.0 * (most / rounded).log10(),
-            psnr_float: 10.0 * (most / exact).log10(),
-        })
+        }
+        Self { rounded: rounded.iter().sum(), exact: exact.iter().sum() }
+    }
+
+    /// The PSNR with these errors over all samples.
+    fn psnr(&self, source: &Source<'_>) -> FilePsnr {
+        let full_scale = f64::from(source.depth().max_sample());
+        let samples = f64::from(source.width()) * f64::from(source.height());
+        let most = full_scale * full_scale * samples * source.color().channels() as f64;
+        FilePsnr {
+            psnr: 10.0 * (most / self.rounded).log10(),
+            psnr_float: 10.0 * (most / self.exact).log10(),
+        }
     }
 }

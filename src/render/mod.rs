@@ -18,6 +18,7 @@ pub(crate) mod view;
 
 use alloc::vec::Vec;
 use core::cmp::Reverse;
+use core::ops::Range;
 
 pub(crate) use output::Sample;
 pub use view::RenderOptions;
@@ -31,11 +32,13 @@ use crate::container::Header;
 use crate::error::{DecodeError, LimitKind, RequestError};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
+#[cfg(feature = "encode")]
+use crate::region::Region;
 use crate::simd::Backend;
-use crate::threads;
+use crate::threads::{self, Threads};
 
 /// Rows of pixels in a band.
-const BAND_HEIGHT: usize = BAND_ROWS * TILE_HEIGHT;
+pub(crate) const BAND_HEIGHT: usize = BAND_ROWS * TILE_HEIGHT;
 /// Most bytes that a band takes in the list of the parts of the output.
 const STRIP_MEMORY: u64 = 128;
 
@@ -123,31 +126,44 @@ impl<'a> Picture<'a> {
         options: &RenderOptions,
         out: &mut [f32],
     ) -> Result<(), DecodeError> {
-        let render = self.prepare(options, out.len())?;
-        let width = render.input.view.region.width as usize;
-        let pixels = width * render.input.view.region.height as usize;
-        let mut planes: Vec<&mut [f32]> = out.chunks_exact_mut(pixels).collect();
-        let mut strips = Vec::with_capacity(render.bands.count());
-        for band in 0..render.bands.count() {
-            let length = planes[0].len().min(width * BAND_HEIGHT);
-            let strip = planes.iter_mut().map(|plane| {
-                let (strip, rest) = core::mem::take(plane).split_at_mut(length);
-                *plane = rest;
-                strip
-            });
-            strips.push((band, strip.collect::<Vec<_>>()));
+        let render = self.prepare_for(options, out.len())?;
+        render.planes(0..render.bands.count(), options.threads, out);
+        Ok(())
+    }
+
+    /// Renders as [`Picture::render_planes`], but strip by strip from the top, each in the memory of the
+    /// last one. Strips have `bands` times [`BAND_HEIGHT`] rows, except the last one. Every strip is
+    /// shown to `visit` with its place in the region, until that returns an error.
+    ///
+    /// # Errors
+    /// That of `visit`.
+    ///
+    /// # Panics
+    /// When the options or a limit forbid to render.
+    #[cfg(feature = "encode")]
+    pub(crate) fn render_strips<E>(
+        &self,
+        options: &RenderOptions,
+        bands: usize,
+        mut visit: impl FnMut(Region, &[f32]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let render = self.prepare(options).expect("nothing forbids to render");
+        let whole = render.input.view.region;
+        let mut planes = Vec::new();
+        for first in (0..render.bands.count()).step_by(bands) {
+            let y = first * BAND_HEIGHT;
+            let height = (whole.height as usize - y).min(bands * BAND_HEIGHT);
+            let region = Region { x: 0, y: y as u32, width: whole.width, height: height as u32 };
+            planes.resize(region.pixels() as usize * render.sources.len(), 0.0);
+            let end = render.bands.count().min(first + bands);
+            render.planes(first..end, options.threads, &mut planes);
+            visit(region, &planes)?;
         }
-        render.sort(&mut strips);
-        threads::for_each(options.threads, strips, |memory: &mut Band, (band, mut strip)| {
-            render.band(memory, band, |planes, x, y| {
-                output::write_planes(planes, (x, y), render.sources, &mut strip, width);
-            });
-        });
         Ok(())
     }
 
     fn render<T: Sample>(&self, options: &RenderOptions, out: &mut [T]) -> Result<(), DecodeError> {
-        let render = self.prepare(options, out.len())?;
+        let render = self.prepare_for(options, out.len())?;
         let stride = render.input.view.region.width as usize * render.sources.len();
         let mut strips: Vec<_> = out.chunks_mut(stride * BAND_HEIGHT).enumerate().collect();
         render.sort(&mut strips);
@@ -160,9 +176,8 @@ impl<'a> Picture<'a> {
         Ok(())
     }
 
-    /// Checks the request and the limits, and finds the Gaussians of each band. `found` is the
-    /// length of the output buffer.
-    fn prepare(
+    /// As [`Picture::prepare`], where `found` is the length of the output buffer.
+    fn prepare_for(
         &self,
         options: &RenderOptions,
         found: usize,
@@ -171,6 +186,11 @@ impl<'a> Picture<'a> {
         if wanted != found {
             return Err(RequestError::BufferLength { found, wanted }.into());
         }
+        self.prepare(options)
+    }
+
+    /// Checks the request and the limits, and finds the Gaussians of each band.
+    fn prepare(&self, options: &RenderOptions) -> Result<PreparedRender<'a>, DecodeError> {
         let view = options.view(self.header, self.limits)?;
         let color = options.output_color(self.header)?;
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
@@ -203,6 +223,29 @@ struct PreparedRender<'a> {
 }
 
 impl PreparedRender<'_> {
+    /// Renders some bands to planes that hold these bands and no others.
+    fn planes(&self, bands: Range<usize>, threads: Threads, out: &mut [f32]) {
+        let width = self.input.view.region.width as usize;
+        let pixels = out.len() / self.sources.len();
+        let mut planes: Vec<&mut [f32]> = out.chunks_exact_mut(pixels).collect();
+        let mut strips = Vec::with_capacity(bands.len());
+        for band in bands {
+            let length = planes[0].len().min(width * BAND_HEIGHT);
+            let strip = planes.iter_mut().map(|plane| {
+                let (strip, rest) = core::mem::take(plane).split_at_mut(length);
+                *plane = rest;
+                strip
+            });
+            strips.push((band, strip.collect::<Vec<_>>()));
+        }
+        self.sort(&mut strips);
+        threads::for_each(threads, strips, |memory: &mut Band, (band, mut strip)| {
+            self.band(memory, band, |planes, x, y| {
+                output::write_planes(planes, (x, y), self.sources, &mut strip, width);
+            });
+        });
+    }
+
     /// Puts the bands with the most Gaussians first, so that at the end no thread waits for one of
     /// them.
     fn sort<T>(&self, strips: &mut [(usize, T)]) {

@@ -1,182 +1,173 @@
 //! A picture as the eye takes it in: luma and blue, on several scales.
 
-use rayon::prelude::*;
+use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::plane::Plane;
-use crate::color::ColorModel;
-use crate::encode::error::EncodeError;
-use crate::encode::progress::Observer;
+use super::light::{BlockRow, COLUMNS, Samples, blue_minus_luma, linear_row, luma};
+use super::rows::Group;
 
-/// Scales with luma: all of the size, a half, a quarter and an eighth of it.
-pub(super) const LUMA_SCALES: usize = 4;
-/// Entries of the table from encoded to linear samples, minus 1.
-const TABLE: usize = 4095;
-/// The bias of the cube root that models the response of the eye's cones (JPEG XL, annex L.2).
-const BIAS: f32 = 0.003_793_073;
-/// The responses of luma, the mean of the long and medium cones, and of the short cones to linear
-/// light.
-const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
-const SHORT: [f32; 3] = [0.243_423, 0.204_767, 0.551_81];
-/// What stands behind transparent pixels.
-const BACKGROUND: f32 = 0.5;
-/// Work for a pixel of a plane, or of a picture that is halved.
-const WORK: f64 = 12.0;
+/// Luma at all of the size, a half, a quarter and an eighth of it, and blue minus luma at a 16th.
+pub(super) const SCALES: usize = 5;
+/// Rows that make one row on the coarsest scale.
+pub(super) const ROWS: usize = 1 << (SCALES - 1);
 
-/// A picture on several scales, each half as wide and high as the one before.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Pyramid {
-    pub(super) luma: [Plane; LUMA_SCALES],
-    /// Blue minus luma at a 16th of the size.
-    pub(super) blue: Plane,
+/// The linear light of some columns of [`ROWS`] rows.
+struct Block {
+    planes: [[BlockRow; ROWS]; 3],
+    columns: usize,
+    rows: usize,
 }
 
-/// Collects the rows of a picture.
-#[derive(Debug)]
-pub(super) struct PyramidBuilder {
-    width: usize,
-    height: usize,
-    model: ColorModel,
-    /// From an encoded sample to linear light.
-    linear: Vec<f32>,
-    luma: Plane,
-    /// Linear light at half of the size.
-    half: LinearPicture,
-}
-
-/// A picture in linear light.
-#[derive(Clone, Debug)]
-struct LinearPicture {
-    width: usize,
-    pixels: Vec<[f32; 3]>,
-}
-
-impl PyramidBuilder {
-    pub(super) fn new([width, height]: [usize; 2], model: ColorModel) -> Self {
-        let linear = |index: usize| {
-            let encoded = index as f32 / TABLE as f32;
-            if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-        };
-        let half = [width.div_ceil(2), height.div_ceil(2)];
-        Self {
-            width,
-            height,
-            model,
-            linear: (0..=TABLE).map(linear).collect(),
-            luma: Plane { width, values: vec![0.0; width * height] },
-            half: LinearPicture { width: half[0], pixels: vec![[0.0; 3]; half[0] * half[1]] },
+/// Fills groups with rows of a picture on all scales, from the row `first` of `rows` rows on. It is
+/// picture number `which` of the groups.
+#[inline(always)]
+pub(super) fn fill<S: Simd>(
+    simd: S,
+    picture: &impl Samples,
+    [width, rows]: [usize; 2],
+    first: usize,
+    which: usize,
+    groups: &mut [Group; SCALES],
+) {
+    let mut samples = [[0.0; COLUMNS]; 4];
+    let mut block = Block { planes: [[[[0.0; 16]; COLUMNS / 16]; ROWS]; 3], columns: 0, rows: 0 };
+    for x in (0..width).step_by(COLUMNS) {
+        (block.columns, block.rows) = (COLUMNS.min(width - x), rows);
+        for row in 0..rows {
+            picture.read(x, first + row, &mut samples);
+            let light = block.planes.each_mut().map(|plane| &mut plane[row]);
+            linear_row(simd, picture.model(), &samples, light);
+        }
+        for (scale, group) in groups.iter_mut().enumerate() {
+            if scale > 0 {
+                block.halve(simd);
+            }
+            for row in 0..block.rows {
+                let responses = block.responses(simd, row, scale + 1 == SCALES);
+                let part = group.part(which, row, x >> scale);
+                part[..block.columns].copy_from_slice(&responses.as_flattened()[..block.columns]);
+            }
         }
     }
+}
 
-    /// Sets `rows` rows from `first` on, which is even; so is the number of rows, except at the bottom.
-    /// `sample` gives the sample in a column and row of these, and of a channel, where a full sample
-    /// is 1.
-    pub(super) fn set(
-        &mut self,
-        first: usize,
-        rows: usize,
-        sample: impl Fn(usize, usize, usize) -> f32 + Sync,
-    ) {
-        let (width, height) = (self.width, self.height);
-        let (model, linear) = (self.model, &self.linear);
-        let lines = self.luma.values[first * width..][..rows * width].par_chunks_mut(2 * width);
-        let halves = self.half.pixels.par_chunks_mut(self.half.width).skip(first / 2);
-        lines.zip(halves).enumerate().for_each(|(pair, (lines, half))| {
-            for (row, line) in lines.chunks_exact_mut(width).enumerate() {
-                let y = 2 * pair + row;
-                // At an odd end, the last row and column count twice.
-                let down = if first + y + 1 == height && row == 0 { 2.0 } else { 1.0 };
-                for (x, value) in line.iter_mut().enumerate() {
-                    let color = linear_color(model, linear, |channel| sample(x, y, channel));
-                    *value = luma(color);
-                    let across = if x + 1 == width && x % 2 == 0 { 2.0 } else { 1.0 };
-                    let weight = 0.25 * down * across;
-                    for (sum, value) in half[x / 2].iter_mut().zip(color) {
-                        *sum += weight * value;
+impl Block {
+    /// The responses of a row: of blue minus luma, or of luma.
+    #[inline(always)]
+    fn responses<S: Simd>(&self, simd: S, row: usize, is_blue: bool) -> BlockRow {
+        let mut responses = [[0.0; 16]; COLUMNS / 16];
+        for at in 0..self.columns.div_ceil(16) {
+            let [red, green, blue] = &self.planes;
+            let light = [
+                f32x16::load_array_ref(simd, &red[row][at]),
+                f32x16::load_array_ref(simd, &green[row][at]),
+                f32x16::load_array_ref(simd, &blue[row][at]),
+            ];
+            let response = if is_blue { blue_minus_luma(simd, light) } else { luma(simd, light) };
+            response.store_array(&mut responses[at]);
+        }
+        responses
+    }
+
+    /// Makes it half as wide and high; the last row and column of an odd number count twice.
+    #[inline(always)]
+    fn halve<S: Simd>(&mut self, simd: S) {
+        let (columns, rows) = (self.columns, self.rows);
+        (self.columns, self.rows) = (columns.div_ceil(2), rows.div_ceil(2));
+        for plane in &mut self.planes {
+            if columns % 2 == 1 {
+                for row in &mut plane[..rows] {
+                    row.as_flattened_mut()[columns] = row.as_flattened()[columns - 1];
+                }
+            }
+            if rows % 2 == 1 {
+                plane[rows] = plane[rows - 1];
+            }
+            for row in 0..self.rows {
+                for at in 0..self.columns.div_ceil(16) {
+                    let left = sum(simd, plane, row, 2 * at);
+                    let right = sum(simd, plane, row, 2 * at + 1);
+                    let (even, odd) = left.deinterleave(right);
+                    ((even + odd) * 0.25).store_array(&mut plane[row][at]);
+                }
+            }
+        }
+    }
+}
+
+/// Sixteen columns of a pair of rows, added.
+#[inline(always)]
+fn sum<S: Simd>(simd: S, plane: &[BlockRow; ROWS], pair: usize, at: usize) -> f32x16<S> {
+    f32x16::load_array_ref(simd, &plane[2 * pair][at])
+        + f32x16::load_array_ref(simd, &plane[2 * pair + 1][at])
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::dispatch;
+
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::quality::rows::Rows;
+    use crate::encode::source::Source;
+    use crate::testing::simd_levels;
+
+    /// Luma, or blue minus luma, of all pixels of a gray picture at a 2^scale-th of the size, where
+    /// `light` is linear.
+    fn plain(light: &[f64], [width, height]: [usize; 2], scale: usize) -> Vec<f64> {
+        if scale == 0 {
+            return light.iter().map(|light| (light + 0.003_793_073).cbrt()).collect();
+        }
+        let half = [width, height].map(|side| side.div_ceil(2));
+        let means = (0..half[1]).flat_map(|y| (0..half[0]).map(move |x| [x, y]));
+        let means = means.map(|[x, y]| {
+            let mut sum = 0.0;
+            for [dx, dy] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+                let [x, y] = [(2 * x + dx).min(width - 1), (2 * y + dy).min(height - 1)];
+                sum += 0.25 * light[y * width + x];
+            }
+            sum
+        });
+        plain(&means.collect::<Vec<_>>(), half, scale - 1)
+    }
+
+    #[test]
+    fn scales_are_those_of_the_definition() {
+        for size in [[COLUMNS + 21, 13], [COLUMNS, ROWS], [1, 1], [9, 3]] {
+            let mut rng = fastrand::Rng::with_seed(3);
+            let samples: Vec<u8> = (0..size[0] * size[1]).map(|_| rng.u8(..)).collect();
+            let source = Source::new_u8(size[0] as u32, size[1] as u32, ColorModel::Gray, &samples)
+                .expect("the sizes agree");
+            let light: Vec<f64> = samples
+                .iter()
+                .map(|&sample| {
+                    let encoded = f64::from(sample) / 255.0;
+                    if encoded <= 0.04045 {
+                        encoded / 12.92
+                    } else {
+                        ((encoded + 0.055) / 1.055).powf(2.4)
+                    }
+                })
+                .collect();
+            for (name, level) in simd_levels() {
+                let scaled = |scale: usize| size.map(|side| side.div_ceil(1 << scale));
+                let mut rows: [Rows; SCALES] =
+                    core::array::from_fn(|scale| Rows::new(scaled(scale), ROWS >> scale));
+                let mut groups = rows.each_mut().map(Rows::blank);
+                dispatch!(level, simd => fill(simd, &source, size, 0, 1, &mut groups));
+                for (scale, group) in groups.iter_mut().enumerate() {
+                    let [width, height] = scaled(scale);
+                    let expected = plain(&light, size, scale);
+                    for y in 0..height {
+                        for (x, &found) in group.part(1, y, 0)[..width].iter().enumerate() {
+                            let luma = expected[y * width + x];
+                            // Gray has no blue that luma has not.
+                            let expected = if scale + 1 < SCALES { luma } else { 0.0 };
+                            let error = (f64::from(found) - expected).abs();
+                            assert!(error < 5e-6, "{name} {scale} {x} {y}: {found}, {expected}");
+                        }
                     }
                 }
             }
-        });
-    }
-
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(super) fn finish(self, observer: &mut Observer<'_>) -> Result<Pyramid, EncodeError> {
-        let mut pyramid = Pyramid::default();
-        let mut picture = self.half;
-        for (scale, plane) in pyramid.luma.iter_mut().enumerate() {
-            if scale > 1 {
-                picture = picture.halved(observer)?;
-            }
-            if scale > 0 {
-                *plane = picture.plane(luma, observer)?;
-            }
         }
-        pyramid.luma[0] = self.luma;
-        let blue = |color| response(SHORT, color) - luma(color);
-        pyramid.blue = picture.halved(observer)?.plane(blue, observer)?;
-        Ok(pyramid)
     }
-}
-
-impl LinearPicture {
-    /// Half as wide and high; the last row and column of an odd number count twice.
-    fn halved(&self, observer: &mut Observer<'_>) -> Result<Self, EncodeError> {
-        let (width, height) = (self.width, self.pixels.len() / self.width);
-        let half = width.div_ceil(2);
-        let mut pixels = vec![[0.0; 3]; half * height.div_ceil(2)];
-        let rows = pixels.chunks_exact_mut(half).enumerate();
-        observer.map(WORK * half as f64, rows, |(row, pixels)| {
-            for (column, pixel) in pixels.iter_mut().enumerate() {
-                let (x, y) = (2 * column, 2 * row);
-                let (right, below) = ((x + 1).min(width - 1), (y + 1).min(height - 1));
-                let corners = [[x, y], [right, y], [x, below], [right, below]];
-                let corners = corners.map(|[x, y]| self.pixels[y * width + x]);
-                *pixel = core::array::from_fn(|channel| {
-                    0.25 * corners.iter().map(|corner| corner[channel]).sum::<f32>()
-                });
-            }
-        })?;
-        Ok(Self { width: half, pixels })
-    }
-
-    fn plane(
-        &self,
-        value: impl Fn([f32; 3]) -> f32 + Send + Sync,
-        observer: &mut Observer<'_>,
-    ) -> Result<Plane, EncodeError> {
-        let width = self.width;
-        let mut values = vec![0.0; self.pixels.len()];
-        let rows = values.chunks_exact_mut(width).zip(self.pixels.chunks_exact(width));
-        observer.map(WORK * width as f64, rows, |(values, pixels)| {
-            values.iter_mut().zip(pixels).for_each(|(to, &color)| *to = value(color));
-        })?;
-        Ok(Plane { width, values })
-    }
-}
-
-/// The linear light of a pixel.
-#[inline(always)]
-fn linear_color(model: ColorModel, linear: &[f32], sample: impl Fn(usize) -> f32) -> [f32; 3] {
-    let alpha = if model.has_alpha() { sample(model.channels() - 1) } else { 1.0 };
-    let value = |channel: usize| {
-        let value = sample(channel) * alpha + BACKGROUND * (1.0 - alpha);
-        // The cast saturates.
-        linear[((value * TABLE as f32 + 0.5) as usize).min(TABLE)]
-    };
-    match model {
-        ColorModel::Gray | ColorModel::GrayAlpha => [value(0); 3],
-        ColorModel::Rgb | ColorModel::Rgba => [0, 1, 2].map(value),
-    }
-}
-
-/// The response of luma to linear light.
-#[inline(always)]
-fn luma(color: [f32; 3]) -> f32 {
-    response(LUMA, color)
-}
-
-#[inline(always)]
-fn response(shares: [f32; 3], color: [f32; 3]) -> f32 {
-    let light: f32 = shares.iter().zip(color).map(|(share, value)| share * value).sum();
-    (light + BIAS).cbrt()
 }

@@ -8,7 +8,7 @@ use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
-use crate::encode::quality::Judge;
+use crate::encode::quality;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
 use crate::encode::source::Source;
@@ -60,7 +60,6 @@ fn settling(passes: u32) -> f64 {
 pub(crate) struct TargetSearch<'a> {
     source: &'a Source<'a>,
     raster: &'a Raster,
-    judge: &'a Judge<'a>,
     layout: &'a FileLayout<'a>,
     /// How many passes there shall be, and what they cost; for a target there may be a few more.
     work: SearchWork,
@@ -73,13 +72,12 @@ impl<'a> TargetSearch<'a> {
     pub(crate) fn new(
         source: &'a Source<'a>,
         raster: &'a Raster,
-        judge: &'a Judge<'a>,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
         let codes = CodeOptimizer::new(raster, layout, observer)?;
-        Ok(Self { source, raster, judge, layout, work, codes })
+        Ok(Self { source, raster, layout, work, codes })
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
@@ -279,7 +277,7 @@ impl<'a> TargetSearch<'a> {
             }
             Aim::Dissimilarity(dissimilarity) => {
                 let verified = Verified::new(&file, self.source, observer)?;
-                let reached = self.judge.dissimilarity(&verified.picture(), observer)?;
+                let reached = quality::dissimilarity(self.source, &verified.picture(), observer)?;
                 (reached / dissimilarity).log2().max(-LARGEST_DEVIATION)
             }
         };

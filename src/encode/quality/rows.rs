@@ -1,0 +1,106 @@
+//! Rows of a picture and of a rendering of it, on one scale.
+
+use std::collections::VecDeque;
+
+/// Sixteen neighbours in a row.
+pub(super) type Lanes = [f32; 16];
+
+/// Columns of zeros before a row; there are at least as many after it.
+const MARGIN: usize = 16;
+
+/// Some rows of the source and of a rendering.
+#[derive(Clone, Debug)]
+pub(super) struct Group {
+    /// Vectors of a row with its margins.
+    stride: usize,
+    /// The row of the source, then the row of the rendering, row by row.
+    values: Vec<Lanes>,
+}
+
+impl Group {
+    fn new(width: usize, rows: usize) -> Self {
+        let stride = stride(width);
+        Self { stride, values: vec![[0.0; 16]; 2 * rows * stride] }
+    }
+
+    /// The part of a row from column x on; `which` is 0 for the source and 1 for the rendering.
+    pub(super) fn part(&mut self, which: usize, row: usize, x: usize) -> &mut [f32] {
+        let row = &mut self.values[(2 * row + which) * self.stride..][..self.stride];
+        &mut row.as_flattened_mut()[MARGIN + x..]
+    }
+
+    /// A row of both, with margins.
+    fn row(&self, row: usize) -> [&[Lanes]; 2] {
+        [0, 1].map(|which| &self.values[(2 * row + which) * self.stride..][..self.stride])
+    }
+}
+
+/// The latest rows of both pictures.
+#[derive(Debug)]
+pub(super) struct Rows {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Rows of a group.
+    by_group: usize,
+    /// The first of the groups, as its number from the top.
+    first: usize,
+    groups: VecDeque<Group>,
+    /// Groups that are no longer needed, to be filled anew.
+    spare: Vec<Group>,
+    /// A row outside the picture.
+    zeros: Vec<Lanes>,
+}
+
+impl Rows {
+    /// No rows yet of pictures of a size.
+    pub(super) fn new([width, height]: [usize; 2], by_group: usize) -> Self {
+        let zeros = vec![[0.0; 16]; stride(width)];
+        let (groups, spare) = (VecDeque::new(), Vec::new());
+        Self { width, height, by_group, first: 0, groups, spare, zeros }
+    }
+
+    /// A group to be filled.
+    pub(super) fn blank(&mut self) -> Group {
+        self.spare.pop().unwrap_or_else(|| Group::new(self.width, self.by_group))
+    }
+
+    /// Appends the next rows.
+    pub(super) fn push(&mut self, group: Group) {
+        self.groups.push_back(group);
+    }
+
+    /// The number of rows that are known, from the top.
+    pub(super) fn known(&self) -> usize {
+        self.height.min((self.first + self.groups.len()) * self.by_group)
+    }
+
+    /// Forgets rows before this one.
+    pub(super) fn forget(&mut self, before: usize) {
+        while (self.first + 1) * self.by_group <= before {
+            let Some(group) = self.groups.pop_front() else { return };
+            self.spare.push(group);
+            self.first += 1;
+        }
+    }
+
+    /// Size in bytes of some groups, and of those with the rows before them.
+    pub(super) fn memory(&self, groups: usize, before: usize) -> usize {
+        let group = 2 * self.by_group * stride(self.width) * size_of::<Lanes>();
+        (groups + before.div_ceil(self.by_group)) * group
+    }
+
+    /// The row at y of both, with margins; zeros outside the picture.
+    pub(super) fn row(&self, y: Option<usize>) -> [&[Lanes]; 2] {
+        match y {
+            Some(y) if y < self.height => {
+                self.groups[y / self.by_group - self.first].row(y % self.by_group)
+            }
+            _ => [&self.zeros; 2],
+        }
+    }
+}
+
+/// Vectors of a row with its margins.
+fn stride(width: usize) -> usize {
+    width.div_ceil(16) + 2
+}
