@@ -6,7 +6,7 @@ use super::error::EncodeError;
 use super::options::Tune;
 use super::progress::Observer;
 use super::sensitivity::Sensitivity;
-use super::source::Source;
+use super::source::{Source, SourceSamples};
 use crate::render::tile_grid::TILE_HEIGHT;
 
 /// Width in pixels of a tile of the training pass, twice that of the decoder's tiles: every splat
@@ -15,18 +15,24 @@ pub(crate) const TILE_WIDTH: usize = 16;
 
 /// One channel of a tile, row by row.
 pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
-/// One channel of the source in a tile, row by row, where a full sample is [`FULL_SCALE`]: as exact
-/// as floats, in half the memory.
-pub(crate) type SamplePlane = [SampleLine; TILE_HEIGHT];
-/// A row of it.
-pub(crate) type SampleLine = [u16; TILE_WIDTH];
-/// The value of a full sample in a [`SamplePlane`].
+/// One channel of the source in a tile, row by row, in the source's depth.
+type SamplePlane<T> = [[T; TILE_WIDTH]; TILE_HEIGHT];
+/// The value of a full sample, of either depth.
 pub(crate) const FULL_SCALE: f32 = 65535.0;
+/// The factor from 8-bit samples to that scale.
+const OF_EIGHT: u16 = 257;
 /// Work for a sample.
 const WORK: f64 = 2.0;
 
-/// The samples of a picture, one [`SamplePlane`] per tile and channel: all channels of the
-/// first tile, then all of the second, and so on. Samples of a tile outside the picture are 0.
+/// One [`SamplePlane`] per tile and channel: all channels of the first tile, then all of the second, and
+/// so on. Samples of a tile outside the picture are 0.
+#[derive(Debug)]
+enum Planes {
+    Eight(Vec<SamplePlane<u8>>),
+    Sixteen(Vec<SamplePlane<u16>>),
+}
+
+/// The samples of a picture by tiles.
 #[derive(Debug)]
 pub(crate) struct Raster {
     pub(crate) width: usize,
@@ -38,7 +44,7 @@ pub(crate) struct Raster {
     pub(crate) sensitivity: Option<Sensitivity>,
     /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) mean: [f32; 4],
-    planes: Vec<SamplePlane>,
+    planes: Planes,
 }
 
 impl Raster {
@@ -51,30 +57,19 @@ impl Raster {
     ) -> Result<Self, EncodeError> {
         let (width, height) = (source.width() as usize, source.height() as usize);
         let channels = source.color().channels();
-        let columns = width.div_ceil(TILE_WIDTH);
-        let tiles = columns * height.div_ceil(TILE_HEIGHT);
-        let mut planes = vec![[[0; TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
-        let work = WORK * (TILE_HEIGHT * width * channels) as f64;
-        let rows = planes.chunks_exact_mut(columns * channels).enumerate();
-        let sums = observer.map(work, rows, |(row, planes)| {
-            let first = row * TILE_HEIGHT;
-            let mut sums = [0_u64; 4];
-            for y in first..height.min(first + TILE_HEIGHT) {
-                for x in 0..width {
-                    for channel in 0..channels {
-                        let sample = source.wide_sample((y * width + x) * channels + channel);
-                        planes[x / TILE_WIDTH * channels + channel][y - first][x % TILE_WIDTH] =
-                            sample;
-                        sums[channel] += u64::from(sample);
-                    }
-                }
+        let size = [width, height, channels];
+        let (planes, sums) = match source.samples() {
+            SourceSamples::Eight(samples) => {
+                let (planes, sums) = by_tiles(samples, size, observer)?;
+                (Planes::Eight(planes), sums.map(|sum| sum * u64::from(OF_EIGHT)))
             }
-            sums
-        })?;
+            SourceSamples::Sixteen(samples) => {
+                let (planes, sums) = by_tiles(samples, size, observer)?;
+                (Planes::Sixteen(planes), sums)
+            }
+        };
         let full = (width * height) as f64 * f64::from(FULL_SCALE);
-        let mean = core::array::from_fn(|channel| {
-            (sums.iter().map(|sums| sums[channel]).sum::<u64>() as f64 / full) as f32
-        });
+        let mean = sums.map(|sum| (sum as f64 / full) as f32);
         let half_step = 0.5 / f32::from(source.depth().max_sample());
         let sensitivity = match tune {
             Tune::Visual => Some(Sensitivity::new(source, observer)?),
@@ -84,8 +79,11 @@ impl Raster {
     }
 
     /// All channels of a tile.
-    pub(crate) fn tile<const CHANNELS: usize>(&self, tile: usize) -> &[SamplePlane; CHANNELS] {
-        self.planes[tile * CHANNELS..][..CHANNELS].try_into().expect("a tile has all channels")
+    pub(crate) fn tile<const CHANNELS: usize>(&self, tile: usize) -> SampleTile<'_, CHANNELS> {
+        match &self.planes {
+            Planes::Eight(planes) => SampleTile::Eight(channels_of(planes, tile)),
+            Planes::Sixteen(planes) => SampleTile::Sixteen(channels_of(planes, tile)),
+        }
     }
 
     /// The samples of a pixel, where a full sample is 1; 0 for absent channels.
@@ -93,19 +91,25 @@ impl Raster {
         let tile = y / TILE_HEIGHT * self.width.div_ceil(TILE_WIDTH) + x / TILE_WIDTH;
         let mut sample = [0.0; 4];
         for (channel, value) in sample[..self.channels].iter_mut().enumerate() {
-            let plane = &self.planes[tile * self.channels + channel];
-            *value = f32::from(plane[y % TILE_HEIGHT][x % TILE_WIDTH]) / FULL_SCALE;
+            let plane = tile * self.channels + channel;
+            *value = self.sample_line(plane, y % TILE_HEIGHT).sample(x % TILE_WIDTH) / FULL_SCALE;
         }
         sample
     }
 
     /// A row of one channel, by tiles.
-    pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = &SampleLine> {
+    pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = SampleLine<'_>> {
         let columns = self.width.div_ceil(TILE_WIDTH);
-        let tiles = self.planes[y / TILE_HEIGHT * columns * self.channels..]
-            .chunks_exact(self.channels)
-            .take(columns);
-        tiles.map(move |planes| &planes[channel][y % TILE_HEIGHT])
+        let first = y / TILE_HEIGHT * columns;
+        let planes = (first..first + columns).map(move |tile| tile * self.channels + channel);
+        planes.map(move |plane| self.sample_line(plane, y % TILE_HEIGHT))
+    }
+
+    fn sample_line(&self, plane: usize, row: usize) -> SampleLine<'_> {
+        match &self.planes {
+            Planes::Eight(planes) => SampleLine::Eight(&planes[plane][row]),
+            Planes::Sixteen(planes) => SampleLine::Sixteen(&planes[plane][row]),
+        }
     }
 
     /// How much a squared error of a pixel counts.
@@ -133,8 +137,95 @@ impl Raster {
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        size_of_val(&self.planes[..]) + self.sensitivity.as_ref().map_or(0, Sensitivity::memory)
+        let planes = match &self.planes {
+            Planes::Eight(planes) => size_of_val(&planes[..]),
+            Planes::Sixteen(planes) => size_of_val(&planes[..]),
+        };
+        planes + self.sensitivity.as_ref().map_or(0, Sensitivity::memory)
     }
+}
+
+/// All channels of a tile of the source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum SampleTile<'a, const CHANNELS: usize> {
+    Eight(&'a [SamplePlane<u8>; CHANNELS]),
+    Sixteen(&'a [SamplePlane<u16>; CHANNELS]),
+}
+
+impl<'a, const CHANNELS: usize> SampleTile<'a, CHANNELS> {
+    #[inline(always)]
+    pub(crate) fn line(&self, channel: usize, row: usize) -> SampleLine<'a> {
+        match self {
+            Self::Eight(planes) => SampleLine::Eight(&planes[channel][row]),
+            Self::Sixteen(planes) => SampleLine::Sixteen(&planes[channel][row]),
+        }
+    }
+}
+
+/// A row of one channel of a tile of the source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum SampleLine<'a> {
+    Eight(&'a [u8; TILE_WIDTH]),
+    Sixteen(&'a [u16; TILE_WIDTH]),
+}
+
+impl SampleLine<'_> {
+    /// The samples, where a full one is [`FULL_SCALE`].
+    #[inline(always)]
+    pub(crate) fn load<S: Simd>(self, simd: S) -> f32x16<S> {
+        match self {
+            Self::Eight(samples) => {
+                f32x16::from_fn(simd, |x| f32::from(samples[x])) * f32::from(OF_EIGHT)
+            }
+            Self::Sixteen(samples) => f32x16::from_fn(simd, |x| f32::from(samples[x])),
+        }
+    }
+
+    /// One of them.
+    fn sample(self, x: usize) -> f32 {
+        f32::from(match self {
+            Self::Eight(samples) => u16::from(samples[x]) * OF_EIGHT,
+            Self::Sixteen(samples) => samples[x],
+        })
+    }
+}
+
+fn channels_of<T, const CHANNELS: usize>(
+    planes: &[SamplePlane<T>],
+    tile: usize,
+) -> &[SamplePlane<T>; CHANNELS] {
+    planes[tile * CHANNELS..][..CHANNELS].try_into().expect("a tile has all channels")
+}
+
+/// Interleaved samples by tiles, and the sum of each channel. The size is the width, the height and the
+/// number of channels.
+fn by_tiles<T: Copy + Default + Into<u64> + Send + Sync>(
+    samples: &[T],
+    [width, height, channels]: [usize; 3],
+    observer: &mut Observer<'_>,
+) -> Result<(Vec<SamplePlane<T>>, [u64; 4]), EncodeError> {
+    let columns = width.div_ceil(TILE_WIDTH);
+    let tiles = columns * height.div_ceil(TILE_HEIGHT);
+    let mut planes = vec![[[T::default(); TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
+    let work = WORK * (TILE_HEIGHT * width * channels) as f64;
+    let rows = planes.chunks_exact_mut(columns * channels).enumerate();
+    let sums = observer.map(work, rows, |(row, planes)| {
+        let first = row * TILE_HEIGHT;
+        let mut sums = [0_u64; 4];
+        for y in first..height.min(first + TILE_HEIGHT) {
+            let line = &samples[y * width * channels..][..width * channels];
+            for (x, pixel) in line.chunks_exact(channels).enumerate() {
+                let planes = &mut planes[x / TILE_WIDTH * channels..][..channels];
+                for (channel, &sample) in pixel.iter().enumerate() {
+                    planes[channel][y - first][x % TILE_WIDTH] = sample;
+                    sums[channel] += sample.into();
+                }
+            }
+        }
+        sums
+    })?;
+    let total = |channel| sums.iter().map(|sums: &[u64; 4]| sums[channel]).sum();
+    Ok((planes, core::array::from_fn(total)))
 }
 
 /// The pixel centres of the sixteen columns from `x` on.

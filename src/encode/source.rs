@@ -18,7 +18,7 @@ pub(crate) const SPAN: usize = 128;
 
 /// Samples of either depth.
 #[derive(Clone, Copy, Debug)]
-enum SourceSamples<'a> {
+pub(crate) enum SourceSamples<'a> {
     Eight(&'a [u8]),
     Sixteen(&'a [u16]),
 }
@@ -79,6 +79,11 @@ impl<'a> Source<'a> {
             SourceSamples::Eight(_) => SampleDepth::Eight,
             SourceSamples::Sixteen(_) => SampleDepth::Sixteen,
         }
+    }
+
+    /// All samples.
+    pub(crate) fn samples(&self) -> SourceSamples<'a> {
+        self.samples
     }
 
     /// Copies the samples of the pixels of row y from column x on, [`SPAN`] of them or as many as there

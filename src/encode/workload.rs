@@ -13,10 +13,10 @@ const COVERAGE: f64 = 6.7;
 /// A late pass of coordinate descent, without and with the rendering before it.
 const DESCENT: Rates = (70.0, 3_300.0);
 const RENDERING: Rates = (25.0, 800.0);
-/// Coding, decoding, and measuring the squared error, or the visual quality.
+/// Coding, and measuring the squared error or the visual quality.
 const CODING: Rates = (0.0, 800.0);
-const ERROR: Rates = (17.0, 300.0);
-const QUALITY: Rates = (48.0, 300.0);
+const ERROR: Rates = (4.0, 80.0);
+const QUALITY: Rates = (6.0, 80.0);
 
 /// The work for a picture, in nanoseconds of one core.
 #[derive(Clone, Copy, Debug)]

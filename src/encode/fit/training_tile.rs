@@ -8,7 +8,7 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
-use crate::encode::raster::{FULL_SCALE, Raster, SamplePlane, TILE_WIDTH, TilePlane, centers};
+use crate::encode::raster::{FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers};
 use crate::encode::sensitivity::Sensitivity;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
@@ -115,7 +115,7 @@ pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     /// Numbers of columns and rows inside the picture.
     columns: usize,
     rows: usize,
-    target: &'a [SamplePlane; CHANNELS],
+    target: SampleTile<'a, CHANNELS>,
     /// How much errors count; `None` if all count the same.
     sensitivity: Option<&'a Sensitivity>,
     /// The base colour.
@@ -320,8 +320,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         for channel in 0..CHANNELS {
             for row in 0..TILE_HEIGHT {
                 let inside = if row < self.rows { inside } else { zero };
-                let sample = &self.target[channel][row];
-                let sample = f32x16::from_fn(simd, |column| f32::from(sample[column]));
+                let sample = self.target.line(channel, row).load(simd);
                 let target = sample * (1.0 / FULL_SCALE);
                 let value = rendering[channel][row];
                 let mut residual = (value - target) * inside;

@@ -249,11 +249,11 @@ fn store<S: Simd>(simd: S, residuals: f32x16<S>, to: &mut [i16]) {
 
 /// Sets the residuals of up to sixteen pixels of one channel.
 #[inline(always)]
-fn set<S: Simd>(simd: S, rendering: &[f32], samples: &SampleLine, residuals: &mut [i16]) {
+fn set<S: Simd>(simd: S, rendering: &[f32], samples: SampleLine<'_>, residuals: &mut [i16]) {
     let mut padded = [0.0; LANES];
     padded[..rendering.len()].copy_from_slice(rendering);
     let zero = f32x16::splat(simd, 0.0);
-    let sample = f32x16::from_fn(simd, |column| f32::from(samples[column]));
+    let sample = samples.load(simd);
     let residual = f32x16::load_array_ref(simd, &padded) - sample * (1.0 / FULL_SCALE);
     let residual = sample.simd_ge(FULL_SCALE).select(residual.min(zero), residual);
     let residual = sample.simd_le(zero).select(residual.max(zero), residual);
