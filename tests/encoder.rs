@@ -173,7 +173,7 @@ fn a_psnr_is_met_within_a_twentieth_of_a_decibel() {
         let encoded = encoder.encode(&source).expect("it encodes");
         check(&encoded, &samples);
         let psnr = encoded.report.psnr;
-        assert_eq!(encoded.report.shortfall, None, "{psnr} dB");
+        assert_eq!(encoded.report.shortfall, None, "{precision:?}: {psnr} dB");
         assert!((44.0..44.05).contains(&psnr), "{precision:?}: {psnr} dB");
     }
     // A few Gaussians come in few qualities, none of them less than asked for.
@@ -212,11 +212,16 @@ fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
 #[test]
 fn a_quality_is_met_and_estimated() {
     let (width, height) = (120, 88);
-    let samples = scene(width, height, 3);
+    // With noise, so that a single Gaussian makes little difference.
+    let mut samples = scene(width, height, 3);
+    let noise = noise(samples.len());
+    for (sample, noise) in samples.iter_mut().zip(noise) {
+        *sample = sample.saturating_add(noise / 8);
+    }
     let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
     for tune in [Tune::Visual, Tune::Psnr] {
         let mut sizes = Vec::new();
-        for quality in [20.0, 50.0, 80.0] {
+        for quality in [50.0, 70.0, 85.0] {
             let encoder = quick(Target::Quality(quality)).with_tune(tune).with_effort(3);
             let encoded = encoder.encode(&source).expect("it encodes");
             check(&encoded, &samples);

@@ -232,7 +232,7 @@ impl Encoder {
         let training = match &self.training {
             Some(training) => training.clone(),
             None if self.precision == Precision::Packed => {
-                Training::fast(iterations).with_time_for_quantization()
+                Training::fast(iterations).with_quantization()
             }
             None => Training::fast(iterations),
         };

@@ -65,8 +65,8 @@ pub(crate) fn finish(
     // Gaussians and their rendering; codes in three orders, with what they are chosen by.
     let by_gaussian = 2 * size_of::<Gaussian>() + 4 * size_of::<Code>() + size_of::<[u64; 4]>();
     let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
-    let memory =
-        raster.memory() + Residuals::memory(raster) + strip + gaussians.len() * by_gaussian;
+    let [residuals, window] = Residuals::memory(raster, &gaussians);
+    let memory = raster.memory() + residuals + strip.max(window) + gaussians.len() * by_gaussian;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);

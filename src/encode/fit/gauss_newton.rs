@@ -20,10 +20,10 @@ use crate::math;
 /// all of them would take the same step, and never come to rest.
 const FIRST_PACE: f32 = 0.4;
 /// The change of the pace, and its range.
-const FASTER: f32 = 1.3;
-const SLOWER: f32 = 0.77;
+const FASTER: f32 = 1.2;
+const SLOWER: f32 = 0.8;
 const LEAST_PACE: f32 = 0.02;
-const MOST_PACE: f32 = 5.0;
+const MOST_PACE: f32 = 3.0;
 
 /// The state for one Gaussian.
 #[derive(Clone, Copy, Debug)]

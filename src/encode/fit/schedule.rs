@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn only_the_packed_precision_is_trained_with_quantization() {
-        let training = Training::fast(600).with_time_for_quantization();
+        let training = Training::fast(600).with_quantization();
         let quantized_from = |precision| TrainingSchedule::new(&training, precision).quantized_from;
         assert_eq!(quantized_from(Precision::Packed), 360);
         assert_eq!(quantized_from(Precision::Float), u32::MAX);

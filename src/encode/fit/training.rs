@@ -293,13 +293,16 @@ impl Training {
         }
     }
 
-    /// These constants with growth and culling compressed such that they are over when quantization
-    /// starts.
-    pub(crate) fn with_time_for_quantization(mut self) -> Self {
+    /// These constants for quantization-aware training: growth and culling are over when quantization
+    /// starts, and steps are smaller, because quantizers round them.
+    pub(crate) fn with_quantization(mut self) -> Self {
         let Densification { end, culled, .. } = &mut self.densification;
         let share = (self.quantization.warm_up / *culled).min(1.0);
         *end *= share;
         *culled *= share;
+        if let Optimizer::GaussNewton(GaussNewton { rate, momentum, .. }) = &mut self.optimizer {
+            (*rate, *momentum) = (1.1, 0.7);
+        }
         self
     }
 

@@ -31,6 +31,9 @@ const MOST: f32 = i16::MAX as f32 / UNIT;
 /// Added to a float of less than 2^22, it leaves the rounded float in the lowest bits.
 const ROUNDER: f32 = (3 << 22) as f32;
 
+/// Sixteen residuals as they are stored.
+pub(crate) type StoredLanes = [i16; LANES];
+
 /// The residuals of a picture, rendering minus source, and how much their squares count.
 ///
 /// The rendering is clamped as in the output: where the source is black, a rendering below black is no
@@ -149,11 +152,16 @@ impl Residuals {
         Ok(())
     }
 
-    /// Size in bytes of the residuals of a source.
-    pub(crate) fn memory(raster: &Raster) -> usize {
-        let lines = raster.height * raster.channels * size_of::<i16>()
-            + raster.height.div_ceil(BLOCK) * size_of::<f32>();
-        (raster.width + LANES) * lines
+    /// Size in bytes of the residuals of a source, and of the largest window of some Gaussians, which
+    /// overlaps nearly all others and is mostly alone in its batch.
+    pub(crate) fn memory(raster: &Raster, gaussians: &[Gaussian]) -> [usize; 2] {
+        let by_column = raster.height * raster.channels * size_of::<i16>();
+        let sensitivities = raster.height.div_ceil(BLOCK) * size_of::<f32>();
+        let size = [raster.width, raster.height];
+        let windows = gaussians.iter().filter_map(|gaussian| window(gaussian, size));
+        let areas = windows.map(|[columns, rows]| (columns.len() + LANES) * rows.len());
+        let largest = areas.max().unwrap_or(0) * raster.channels * size_of::<i16>();
+        [(raster.width + LANES) * (by_column + sensitivities), largest]
     }
 
     pub(crate) fn width(&self) -> usize {
@@ -167,20 +175,7 @@ impl Residuals {
     /// The columns and rows of the window of a Gaussian: the bounding box of where it is visible,
     /// with a margin. `None` if that is outside the picture.
     pub(crate) fn window(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
-        let [l11, l21, l22] = gaussian.cholesky;
-        let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
-        let mut window = [0..0, 0..0];
-        for (axis, length) in [self.width, self.height].into_iter().enumerate() {
-            let reach = QUARTIC_RADIUS * (MARGIN.0 * extents[axis]) + MARGIN.1;
-            // Casts saturate.
-            let first = (gaussian.center[axis] - reach - 0.5).ceil().max(0.0) as usize;
-            let end = (gaussian.center[axis] + reach + 0.5).floor().max(0.0) as usize;
-            window[axis] = first..end.min(length);
-            if window[axis].is_empty() {
-                return None;
-            }
-        }
-        Some(window)
+        window(gaussian, [self.width, self.height])
     }
 
     /// Adds Gaussians to the rendering, each times its factor: 1 to add it, -1 to remove it.
@@ -225,6 +220,24 @@ impl Residuals {
     }
 }
 
+/// The window of a Gaussian in a picture of a width and height.
+fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
+    let [l11, l21, l22] = gaussian.cholesky;
+    let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
+    let mut window = [0..0, 0..0];
+    for (axis, length) in size.into_iter().enumerate() {
+        let reach = QUARTIC_RADIUS * (MARGIN.0 * extents[axis]) + MARGIN.1;
+        // Casts saturate.
+        let first = (gaussian.center[axis] - reach - 0.5).ceil().max(0.0) as usize;
+        let end = (gaussian.center[axis] + reach + 0.5).floor().max(0.0) as usize;
+        window[axis] = first..end.min(length);
+        if window[axis].is_empty() {
+            return None;
+        }
+    }
+    Some(window)
+}
+
 /// The first sixteen values.
 #[inline(always)]
 fn vector<T>(values: &[T]) -> &[T; LANES] {
@@ -232,13 +245,13 @@ fn vector<T>(values: &[T]) -> &[T; LANES] {
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, stored: &[i16]) -> f32x16<S> {
+pub(crate) fn load<S: Simd>(simd: S, stored: &[i16]) -> f32x16<S> {
     let stored = vector(stored);
     f32x16::from_fn(simd, |lane| f32::from(stored[lane])) * (1.0 / UNIT)
 }
 
 #[inline(always)]
-fn store<S: Simd>(simd: S, residuals: f32x16<S>, to: &mut [i16]) {
+pub(crate) fn store<S: Simd>(simd: S, residuals: f32x16<S>, to: &mut [i16]) {
     let to: &mut [i16; LANES] = to.first_chunk_mut().expect("lines are padded");
     let scaled = residuals.max(-MOST).min(MOST) * UNIT + f32x16::splat(simd, ROUNDER);
     let scaled = scaled.to_array();

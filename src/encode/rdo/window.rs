@@ -3,9 +3,9 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
-use super::kernel_weights::{KernelWeights, LANES, Lanes, kernel_root};
+use super::kernel_weights::{KernelWeights, LANES, kernel_root};
 use super::quadratic_model::{GeometryChange, GeometryErrorSums};
-use super::residuals::Residuals;
+use super::residuals::{Residuals, StoredLanes, load, store};
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
@@ -20,7 +20,7 @@ pub(crate) struct Window<'a> {
     /// Number of vectors in a row, and number of rows.
     size: [usize; 2],
     /// Row by row, in each row vector by vector, and for each vector channel by channel.
-    residuals: Vec<Lanes>,
+    residuals: Vec<StoredLanes>,
 }
 
 /// How much a Gaussian changes the error of its window, and the derivatives by its colour.
@@ -80,7 +80,7 @@ impl<'a> Window<'a> {
         self.size = [columns.len().div_ceil(LANES), rows.len()];
         let [vectors, rows] = self.size;
         // Old values are overwritten, so that they need not be cleared.
-        self.residuals.resize(vectors * rows * self.all.channels(), [0.0; LANES]);
+        self.residuals.resize(vectors * rows * self.all.channels(), [0; LANES]);
         let level = self.level;
         let (sums, by_geometry, sensitivity) = match self.all.channels() {
             1 => dispatch!(level, simd => self.without_with::<_, 1>(simd, gaussian)),
@@ -140,7 +140,7 @@ impl<'a> Window<'a> {
                     second[2] = by_v.mul_add_precise(v, second[2]);
                 }
                 for channel in 0..CHANNELS {
-                    residuals[channel].store_array(&mut place[channel]);
+                    store(simd, residuals[channel], &mut place[channel]);
                 }
             }
         }
@@ -195,7 +195,7 @@ impl<'a> Window<'a> {
                 squares = counted.mul_add_precise(weight, squares);
                 let residuals = &places[row * vectors + vector];
                 for channel in 0..CHANNELS {
-                    let residual = f32x16::load_array_ref(simd, &residuals[channel]);
+                    let residual = load(simd, &residuals[channel]);
                     products[channel] = counted.mul_add_precise(residual, products[channel]);
                 }
             }
