@@ -47,7 +47,7 @@ pub(crate) struct Batch {
     /// each job].
     ///
     /// A picture that would exceed them waits, and one that is larger by itself is worked on alone.
-    /// Encoding takes about 20 bytes per pixel of gray with 8 bits, 40 of RGB, and 55 of RGB with
+    /// Encoding takes about 10 bytes per pixel of gray with 8 bits, 24 of RGB, and 40 of RGB with
     /// alpha and 16 bits.
     #[arg(long, value_name = "MP", value_parser = |text: &str| number(text, 0.001, 1e6))]
     pub(crate) budget: Option<f64>,
