@@ -35,6 +35,13 @@ fn scene(width: u32, height: u32, channels: usize) -> Vec<u8> {
     samples
 }
 
+/// The scene in RGB with noise, so that a single Gaussian makes little difference.
+fn textured(width: u32, height: u32) -> Vec<u8> {
+    let scene = scene(width, height, 3);
+    let noise = noise(scene.len());
+    scene.iter().zip(noise).map(|(sample, noise)| sample.saturating_add(noise / 8)).collect()
+}
+
 /// Pseudo-random samples.
 fn noise(count: usize) -> Vec<u8> {
     let mut state = 1_u32;
@@ -194,7 +201,7 @@ fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
         quick(target).encode(&source).expect("it encodes")
     };
     let count = |samples: &[u8], target| encoded(samples, target).report.gaussians;
-    let picture = scene(96, 64, 3);
+    let picture = textured(96, 64);
     let files = [0.0, 30.0, 60.0, 90.0].map(|q| encoded(&picture, Target::Quality(q)));
     let sizes = files.each_ref().map(|file| file.bytes.len());
     let qualities = files.each_ref().map(|file| file.report.quality);
@@ -212,12 +219,7 @@ fn quality_is_monotone_and_simple_pictures_get_few_gaussians() {
 #[test]
 fn a_quality_is_met_and_estimated() {
     let (width, height) = (120, 88);
-    // With noise, so that a single Gaussian makes little difference.
-    let mut samples = scene(width, height, 3);
-    let noise = noise(samples.len());
-    for (sample, noise) in samples.iter_mut().zip(noise) {
-        *sample = sample.saturating_add(noise / 8);
-    }
+    let samples = textured(width, height);
     let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
     for tune in [Tune::Visual, Tune::Psnr] {
         let mut sizes = Vec::new();

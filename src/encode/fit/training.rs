@@ -248,7 +248,8 @@ impl Training {
         let steps = (iterations / 15).clamp(10, 160);
         // The longer a run, the more it gains from iterations after growth.
         let (end, culled) = match iterations {
-            ..=800 => (0.7, 0.8),
+            ..50 => (0.7, 0.8),
+            50..=800 => (0.6, 0.7),
             801..=2_000 => (0.5, 0.6),
             _ => (0.4, 0.5),
         };
