@@ -8,7 +8,9 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
-use crate::encode::raster::{FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers};
+use crate::encode::raster::{
+    FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers, visible,
+};
 use crate::encode::sensitivity::Sensitivity;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
@@ -323,11 +325,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 let sample = self.target.line(channel, row).load(simd);
                 let target = sample * (1.0 / FULL_SCALE);
                 let value = rendering[channel][row];
-                let mut residual = (value - target) * inside;
-                // The output is clamped: where the source is white, a rendering above white is no
-                // error, and below black where the source is black.
-                residual = sample.simd_ge(FULL_SCALE).select(residual.min(zero), residual);
-                residual = sample.simd_le(zero).select(residual.max(zero), residual);
+                let residual = visible(simd, (value - target) * inside, sample);
                 residual.store_array(&mut planes[channel][row]);
                 let clamped = (value.max(zero).min(one) - target) * inside;
                 total = clamped.mul_add_precise(clamped, total);

@@ -10,7 +10,7 @@ use super::kernel_weights::{KernelWeights, LANES, Lanes};
 use crate::encode::distortion::differentiate;
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::encode::raster::{FULL_SCALE, Raster, SampleLine, TILE_WIDTH};
+use crate::encode::raster::{FULL_SCALE, Raster, SampleLine, TILE_WIDTH, visible};
 use crate::encode::sensitivity::{BLOCK, Sensitivity};
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
@@ -265,12 +265,9 @@ pub(crate) fn store<S: Simd>(simd: S, residuals: f32x16<S>, to: &mut [i16]) {
 fn set<S: Simd>(simd: S, rendering: &[f32], samples: SampleLine<'_>, residuals: &mut [i16]) {
     let mut padded = [0.0; LANES];
     padded[..rendering.len()].copy_from_slice(rendering);
-    let zero = f32x16::splat(simd, 0.0);
     let sample = samples.load(simd);
     let residual = f32x16::load_array_ref(simd, &padded) - sample * (1.0 / FULL_SCALE);
-    let residual = sample.simd_ge(FULL_SCALE).select(residual.min(zero), residual);
-    let residual = sample.simd_le(zero).select(residual.max(zero), residual);
-    store(simd, residual, residuals);
+    store(simd, visible(simd, residual, sample), residuals);
 }
 
 /// A Gaussian that is added to the rendering.
