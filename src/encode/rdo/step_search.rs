@@ -9,8 +9,8 @@ const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 const AIMED_PSNR_EXCESS: f64 = 0.02;
 /// A file that is too large by up to this is shortened, and the range that is aimed at; base-2
 /// logarithms of the size.
-const MOST_SHORTENED: f64 = 0.02;
-const WELL_SHORTENED: (f64, f64) = (0.001, 0.009);
+const MOST_SHORTENED: f64 = 0.04;
+const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
 /// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
 /// right side is preferred.
 const WRONG_SIDE_PENALTY: f64 = 1e3;
