@@ -12,7 +12,7 @@ use super::progress::Observer;
 use super::quality;
 use super::raster::Raster;
 use super::rate_model;
-use super::rdo::{Residuals, SearchWork, TargetSearch};
+use super::rdo::{Residuals, SearchWork, TargetSearch, Window};
 use super::strips;
 use crate::coding::entropy::{Code, LatticeCodes};
 use crate::gaussian::Gaussian;
@@ -65,8 +65,9 @@ pub(crate) fn finish(
     // Gaussians and their rendering; codes in three orders, with what they are chosen by.
     let by_gaussian = 2 * size_of::<Gaussian>() + 4 * size_of::<Code>() + size_of::<[u64; 4]>();
     let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
-    let [residuals, window] = Residuals::memory(raster, &gaussians);
-    let memory = raster.memory() + residuals + strip.max(window) + gaussians.len() * by_gaussian;
+    let residuals = raster.memory() + Residuals::memory(raster);
+    let window = Window::memory(raster, &gaussians);
+    let memory = residuals + strip.max(window) + gaussians.len() * by_gaussian;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);

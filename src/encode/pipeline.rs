@@ -82,7 +82,8 @@ fn encode_for_target(
     };
     observer.advance(preparation)?;
     observer.expect(work_from_training(job, expected));
-    let peak_before = work.peak_memory;
+    let preparing = raster.memory() + raster.scratch_memory(source);
+    let peak_before = work.peak_memory.max(preparing);
     let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
     fit.run(job.workload(expected), observer)?;

@@ -135,6 +135,12 @@ impl Raster {
         self.width * self.height
     }
 
+    /// Size in bytes of what else [`Raster::new`] needs.
+    pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
+        let sensitivity = self.sensitivity.as_ref();
+        sensitivity.map_or(0, |sensitivity| sensitivity.scratch_memory(source))
+    }
+
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
         let planes = match &self.planes {

@@ -102,6 +102,15 @@ impl Sensitivity {
     pub(crate) fn memory(&self) -> usize {
         size_of_val(&self.blocks[..])
     }
+
+    /// Size in bytes of what else [`Sensitivity::new`] needs.
+    pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
+        let (width, height) = (source.width() as usize, source.height() as usize);
+        let tasks = height.div_ceil(BAND * BLOCK).min(rayon::current_num_threads());
+        let rows = (BAND * BLOCK + 2 * RADII[RADII.len() - 1]).min(height);
+        let sums = tasks * (width + 1) * (rows + 1) * size_of::<[f64; 2]>();
+        sums + self.blocks.len() * size_of::<f32>()
+    }
 }
 
 /// Sensitivities from their logarithms, with a mean of 1, and their mean before.

@@ -7,7 +7,7 @@ use crate::render::{BAND_HEIGHT, Picture, RenderOptions};
 
 /// Pixels of a strip for each thread, but at least [`BANDS`] bands. They bound the memory of a rendering
 /// to floats, and the time from one poll of the observer to the next.
-const PIXELS: usize = 1 << 16;
+const PIXELS: usize = 3 << 14;
 /// Bands of a strip for each thread: with one alone, threads would wait for the slowest.
 const BANDS: usize = 2;
 /// Most pixels of a strip, unless a band has more.

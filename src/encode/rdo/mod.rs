@@ -18,3 +18,4 @@ mod window;
 pub(crate) use residuals::Residuals;
 pub(crate) use search_work::SearchWork;
 pub(crate) use target_search::TargetSearch;
+pub(crate) use window::Window;

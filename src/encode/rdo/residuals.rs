@@ -51,7 +51,8 @@ pub(crate) struct Residuals {
     /// In units of 1 / [`UNIT`], row by row, and in each row channel by channel; every line is padded
     /// such that a vector from any pixel on is inside.
     residuals: Vec<i16>,
-    /// The sensitivities of pixels, padded by 0 as `residuals`; one line for each row of blocks.
+    /// The sensitivities of pixels, padded by 0 as `residuals`: one line for each row of blocks, or a
+    /// single one where all rows are the same.
     sensitivities: Vec<f32>,
     stride: usize,
     level: Level,
@@ -65,7 +66,7 @@ impl Residuals {
     pub(crate) fn new(raster: &Raster, observer: &mut Observer<'_>) -> Result<Self, EncodeError> {
         let (width, height, channels) = (raster.width, raster.height, raster.channels);
         let stride = width + LANES;
-        let mut sensitivities = vec![0.0; stride * height.div_ceil(BLOCK)];
+        let mut sensitivities = vec![0.0; stride * sensitivity_lines(raster)];
         let lines = sensitivities.chunks_exact_mut(stride).enumerate();
         observer.map(WORK.0 * width as f64, lines, |(row, line)| {
             for (x, value) in line[..width].iter_mut().enumerate() {
@@ -152,16 +153,11 @@ impl Residuals {
         Ok(())
     }
 
-    /// Size in bytes of the residuals of a source, and of the largest window of some Gaussians, which
-    /// overlaps nearly all others and is mostly alone in its batch.
-    pub(crate) fn memory(raster: &Raster, gaussians: &[Gaussian]) -> [usize; 2] {
+    /// Size in bytes of the residuals of a source.
+    pub(crate) fn memory(raster: &Raster) -> usize {
         let by_column = raster.height * raster.channels * size_of::<i16>();
-        let sensitivities = raster.height.div_ceil(BLOCK) * size_of::<f32>();
-        let size = [raster.width, raster.height];
-        let windows = gaussians.iter().filter_map(|gaussian| window(gaussian, size));
-        let areas = windows.map(|[columns, rows]| (columns.len() + LANES) * rows.len());
-        let largest = areas.max().unwrap_or(0) * raster.channels * size_of::<i16>();
-        [(raster.width + LANES) * (by_column + sensitivities), largest]
+        let sensitivities = sensitivity_lines(raster) * size_of::<f32>();
+        (raster.width + LANES) * (by_column + sensitivities)
     }
 
     pub(crate) fn width(&self) -> usize {
@@ -216,12 +212,19 @@ impl Residuals {
     /// The sensitivities of these pixels; 0 outside the picture.
     #[inline(always)]
     pub(crate) fn sensitivities(&self, x: usize, y: usize) -> &Lanes {
-        vector(&self.sensitivities[y / BLOCK * self.stride + x..])
+        let is_single = self.sensitivities.len() == self.stride;
+        let line = if is_single { 0 } else { y / BLOCK };
+        vector(&self.sensitivities[line * self.stride + x..])
     }
 }
 
+/// Number of different lines of sensitivities.
+fn sensitivity_lines(raster: &Raster) -> usize {
+    raster.sensitivity.as_ref().map_or(1, |_| raster.height.div_ceil(BLOCK))
+}
+
 /// The window of a Gaussian in a picture of a width and height.
-fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
+pub(super) fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
     let [l11, l21, l22] = gaussian.cholesky;
     let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
     let mut window = [0..0, 0..0];

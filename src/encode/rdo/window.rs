@@ -1,26 +1,60 @@
 //! The residuals around one Gaussian, and how the error, the sum of their squares times their
 //! sensitivities, depends on it.
 
+use core::ops::Range;
+
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, kernel_root};
 use super::quadratic_model::{GeometryChange, GeometryErrorSums};
-use super::residuals::{Residuals, StoredLanes, load, store};
+use super::residuals::{Residuals, StoredLanes, load, store, window};
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
+use crate::encode::raster::Raster;
 use crate::gaussian::Gaussian;
+
+/// The residuals of a window of up to so many pixels are kept without the Gaussian. Those of a wider
+/// one would take as much memory as all others, and are computed again.
+const MOST_KEPT: usize = 1 << 15;
+/// Rows of a wider window that one task goes through; nearly no other window is independent of it.
+const ROWS_PER_TASK: usize = 32;
 
 /// The residuals of a rectangle around one Gaussian, without it.
 #[derive(Debug)]
 pub(crate) struct Window<'a> {
+    frame: Frame<'a>,
+    without: Without,
+    /// As [`MOST_KEPT`].
+    most_kept: usize,
+}
+
+/// A rectangle of all residuals.
+#[derive(Clone, Copy, Debug)]
+struct Frame<'a> {
     all: &'a Residuals,
     level: Level,
     /// First column and row, in pixels.
     corner: [usize; 2],
     /// Number of vectors in a row, and number of rows.
     size: [usize; 2],
-    /// Row by row, in each row vector by vector, and for each vector channel by channel.
-    residuals: Vec<StoredLanes>,
+}
+
+/// The residuals without a Gaussian.
+#[derive(Debug)]
+struct Without {
+    /// The residuals, if they are kept: row by row, in each row vector by vector, and for each vector
+    /// channel by channel.
+    kept: Vec<StoredLanes>,
+    /// Otherwise, what was taken out.
+    removed: Option<Removed>,
+}
+
+/// A Gaussian that is not part of the rendering.
+#[derive(Clone, Copy, Debug)]
+struct Removed {
+    weights: KernelWeights,
+    color: [f32; 4],
 }
 
 /// How much a Gaussian changes the error of its window, and the derivatives by its colour.
@@ -65,7 +99,21 @@ pub(crate) struct ErrorGradient {
 impl<'a> Window<'a> {
     /// A window that is still empty.
     pub(crate) fn new(all: &'a Residuals) -> Self {
-        Self { all, level: all.level(), corner: [0; 2], size: [0; 2], residuals: Vec::new() }
+        Self {
+            frame: Frame { all, level: all.level(), corner: [0; 2], size: [0; 2] },
+            without: Without { kept: Vec::new(), removed: None },
+            most_kept: MOST_KEPT,
+        }
+    }
+
+    /// Size in bytes of what the largest window for some Gaussians keeps.
+    pub(crate) fn memory(raster: &Raster, gaussians: &[Gaussian]) -> usize {
+        let size = [raster.width, raster.height];
+        let windows = gaussians.iter().filter_map(|gaussian| window(gaussian, size));
+        let pixels =
+            windows.map(|[columns, rows]| columns.len().next_multiple_of(LANES) * rows.len());
+        let largest = pixels.filter(|&pixels| pixels <= MOST_KEPT).max().unwrap_or(0);
+        largest * raster.channels * size_of::<i16>()
     }
 
     /// Takes a Gaussian out of the rendering in its window. Returns the derivatives of the error by the
@@ -75,46 +123,140 @@ impl<'a> Window<'a> {
         gaussian: &Gaussian,
         model: ColorModel,
     ) -> Option<ErrorGradient> {
-        let [columns, rows] = self.all.window(gaussian)?;
-        self.corner = [columns.start, rows.start];
-        self.size = [columns.len().div_ceil(LANES), rows.len()];
-        let [vectors, rows] = self.size;
-        // Old values are overwritten, so that they need not be cleared.
-        self.residuals.resize(vectors * rows * self.all.channels(), [0; LANES]);
-        let level = self.level;
-        let (sums, by_geometry, sensitivity) = match self.all.channels() {
-            1 => dispatch!(level, simd => self.without_with::<_, 1>(simd, gaussian)),
-            2 => dispatch!(level, simd => self.without_with::<_, 2>(simd, gaussian)),
-            3 => dispatch!(level, simd => self.without_with::<_, 3>(simd, gaussian)),
-            _ => dispatch!(level, simd => self.without_with::<_, 4>(simd, gaussian)),
+        let [columns, rows] = self.frame.all.window(gaussian)?;
+        self.frame.corner = [columns.start, rows.start];
+        self.frame.size = [columns.len().div_ceil(LANES), rows.len()];
+        let sums = match self.frame.all.channels() {
+            1 => self.without_of::<1>(gaussian),
+            2 => self.without_of::<2>(gaussian),
+            3 => self.without_of::<3>(gaussian),
+            _ => self.without_of::<4>(gaussian),
         };
-        Some(ErrorGradient { change: sums.change(gaussian, model), by_geometry, sensitivity })
+        // Without any weight in the picture, nothing depends on it.
+        let sensitivity = if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
+        Some(ErrorGradient {
+            change: sums.change.with_present(gaussian, model),
+            by_geometry: sums.geometry(gaussian).gradient(gaussian),
+            sensitivity,
+        })
     }
 
     /// [`Window::without`] for a number of channels.
+    fn without_of<const CHANNELS: usize>(&mut self, gaussian: &Gaussian) -> GradientSums {
+        let weights = KernelWeights::new(gaussian);
+        let frame = self.frame;
+        let [vectors, rows] = frame.size;
+        let is_kept = vectors * rows * LANES <= self.most_kept;
+        let Without { kept, removed } = &mut self.without;
+        // Old values are overwritten, so that they need not be cleared.
+        kept.resize(if is_kept { vectors * rows * CHANNELS } else { 0 }, [0; LANES]);
+        *removed = (!is_kept).then_some(Removed { weights, color: gaussian.color });
+        if is_kept {
+            let kept = kept.as_chunks_mut::<CHANNELS>().0;
+            return dispatch!(frame.level, simd =>
+                frame.gradient_sums(simd, gaussian, &weights, 0..rows, Some(kept)));
+        }
+        let of_rows = |rows| {
+            dispatch!(frame.level, simd =>
+                frame.gradient_sums::<_, CHANNELS>(simd, gaussian, &weights, rows, None))
+        };
+        frame.by_tasks(of_rows).into_iter().fold(GradientSums::default(), GradientSums::plus)
+    }
+
+    /// The change of error by a Gaussian that is not part of the rendering.
+    pub(crate) fn change(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
+        let sums = match self.frame.all.channels() {
+            1 => self.change_of::<1>(gaussian),
+            2 => self.change_of::<2>(gaussian),
+            3 => self.change_of::<3>(gaussian),
+            _ => self.change_of::<4>(gaussian),
+        };
+        sums.with_absent(gaussian, model)
+    }
+
+    /// [`Window::change`] for a number of channels.
+    fn change_of<const CHANNELS: usize>(&self, gaussian: &Gaussian) -> ChangeSums {
+        let (frame, without) = (self.frame, &self.without);
+        let weights = KernelWeights::new(gaussian);
+        let of_rows = |rows| {
+            dispatch!(frame.level, simd =>
+                frame.change_sums::<_, CHANNELS>(simd, &weights, rows, without))
+        };
+        if without.removed.is_none() {
+            return of_rows(0..frame.size[1]);
+        }
+        frame.by_tasks(of_rows).into_iter().fold(ChangeSums::default(), ChangeSums::plus)
+    }
+}
+
+impl Frame<'_> {
+    /// The results for all rows, a part of them at a time.
+    fn by_tasks<T: Send>(&self, of_rows: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
+        let [_, rows] = self.size;
+        let starts = (0..rows).into_par_iter().step_by(ROWS_PER_TASK);
+        starts.map(|start| of_rows(start..rows.min(start + ROWS_PER_TASK))).collect()
+    }
+
+    /// The first column of a vector, and its row in the picture.
+    #[inline(always)]
+    fn place(&self, row: usize, vector: usize) -> [usize; 2] {
+        [self.corner[0] + vector * LANES, self.corner[1] + row]
+    }
+
+    /// The residuals of a vector.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
-    fn without_with<S: Simd, const CHANNELS: usize>(
-        &mut self,
+    fn residuals<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        [x, y]: [usize; 2],
+    ) -> [f32x16<S>; CHANNELS] {
+        let mut residuals = [f32x16::splat(simd, 0.0); CHANNELS];
+        for channel in 0..CHANNELS {
+            residuals[channel] = self.all.vector(simd, x, y, channel);
+        }
+        residuals
+    }
+
+    /// The residuals of a vector without a Gaussian.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
+    fn residuals_without<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        [x, y]: [usize; 2],
+        removed: &Removed,
+    ) -> [f32x16<S>; CHANNELS] {
+        let mut residuals = self.residuals(simd, [x, y]);
+        let weight = removed.weights.at(simd, x, y);
+        for channel in 0..CHANNELS {
+            let color = removed.color[channel];
+            residuals[channel] = weight.mul_add_precise(-color, residuals[channel]);
+        }
+        residuals
+    }
+
+    /// The sums over some rows for the gradient by a Gaussian. The residuals without it are put into
+    /// `kept`, which has those of all rows.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
+    fn gradient_sums<S: Simd, const CHANNELS: usize>(
+        &self,
         simd: S,
         gaussian: &Gaussian,
-    ) -> (WindowSums, GeometryChange, f32) {
-        let weights = KernelWeights::new(gaussian);
-        let ([left, top], [vectors, rows]) = (self.corner, self.size);
-        let places = self.residuals.as_chunks_mut::<CHANNELS>().0;
+        weights: &KernelWeights,
+        rows: Range<usize>,
+        mut kept: Option<&mut [[StoredLanes; CHANNELS]]>,
+    ) -> GradientSums {
+        let [vectors, _] = self.size;
         let zero = f32x16::splat(simd, 0.0);
         let (mut squares, mut products, mut all) = (zero, [zero; CHANNELS], zero);
         let (mut first, mut second) = ([zero; 2], [zero; 3]);
-        for row in 0..rows {
-            let y = top + row;
-            let span = weights.span(left, y, vectors);
+        for row in rows {
+            let span = weights.span(self.corner[0], self.corner[1] + row, vectors);
             for vector in 0..vectors {
-                let x = left + vector * LANES;
-                let place = &mut places[row * vectors + vector];
-                let mut residuals = [zero; CHANNELS];
-                for channel in 0..CHANNELS {
-                    residuals[channel] = self.all.vector(simd, x, y, channel);
-                }
+                let [x, y] = self.place(row, vector);
+                let mut residuals: [_; CHANNELS] = self.residuals(simd, [x, y]);
                 if span.contains(&vector) {
                     let [u, v] = weights.local(simd, x, y);
                     let root = kernel_root(simd, [u, v]);
@@ -139,94 +281,149 @@ impl<'a> Window<'a> {
                     second[1] = by_u.mul_add_precise(v, second[1]);
                     second[2] = by_v.mul_add_precise(v, second[2]);
                 }
-                for channel in 0..CHANNELS {
-                    store(simd, residuals[channel], &mut place[channel]);
+                if let Some(kept) = &mut kept {
+                    let place = &mut kept[row * vectors + vector];
+                    for channel in 0..CHANNELS {
+                        store(simd, residuals[channel], &mut place[channel]);
+                    }
                 }
             }
         }
-        let squared_weights = lane_sum(squares);
-        let mut sums = WindowSums { error: 0.0, by_channel: [0.0; 4], squared_weights };
-        let mut weighted = 0.0;
+        let mut change = ChangeSums { squares: lane_sum(squares), products: [0.0; 4] };
         for channel in 0..CHANNELS {
-            let (color, product) = (gaussian.color[channel], lane_sum(products[channel]));
-            sums.error += color * (2.0 * product - color * squared_weights);
-            sums.by_channel[channel] = product;
-            weighted += color * product;
+            change.products[channel] = lane_sum(products[channel]);
         }
-        let geometry = GeometryErrorSums {
-            first: [lane_sum(first[0]), lane_sum(first[1])],
-            second: [lane_sum(second[0]), lane_sum(second[1]), lane_sum(second[2])],
-            weighted,
-        };
-        // Without any weight in the picture, nothing depends on it.
-        let all = lane_sum(all);
-        let sensitivity = if all > 0.0 { squared_weights / all } else { 1.0 };
-        (sums, geometry.gradient(gaussian), sensitivity)
+        GradientSums {
+            change,
+            weights: lane_sum(all),
+            first: first.map(lane_sum),
+            second: second.map(lane_sum),
+        }
     }
 
-    /// The change of error by a Gaussian that is not part of the rendering.
-    pub(crate) fn change(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
-        let level = self.level;
-        let sums = match self.all.channels() {
-            1 => dispatch!(level, simd => self.sums::<_, 1>(simd, gaussian)),
-            2 => dispatch!(level, simd => self.sums::<_, 2>(simd, gaussian)),
-            3 => dispatch!(level, simd => self.sums::<_, 3>(simd, gaussian)),
-            _ => dispatch!(level, simd => self.sums::<_, 4>(simd, gaussian)),
-        };
-        sums.change(gaussian, model)
-    }
-
-    /// [`Window::change`] for a number of channels.
+    /// The sums over some rows for the change of error by a Gaussian that is not part of the rendering.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
-    fn sums<S: Simd, const CHANNELS: usize>(&self, simd: S, gaussian: &Gaussian) -> WindowSums {
-        let weights = KernelWeights::new(gaussian);
-        let ([left, top], [vectors, rows]) = (self.corner, self.size);
-        let places = self.residuals.as_chunks::<CHANNELS>().0;
+    fn change_sums<S: Simd, const CHANNELS: usize>(
+        &self,
+        simd: S,
+        weights: &KernelWeights,
+        rows: Range<usize>,
+        without: &Without,
+    ) -> ChangeSums {
+        let [vectors, _] = self.size;
+        let places = without.kept.as_chunks::<CHANNELS>().0;
         let zero = f32x16::splat(simd, 0.0);
         let (mut squares, mut products) = (zero, [zero; CHANNELS]);
-        for row in 0..rows {
-            let y = top + row;
-            for vector in weights.span(left, y, vectors) {
-                let x = left + vector * LANES;
+        for row in rows {
+            for vector in weights.span(self.corner[0], self.corner[1] + row, vectors) {
+                let [x, y] = self.place(row, vector);
                 let weight = weights.at(simd, x, y);
                 let sensitivity = f32x16::load_array_ref(simd, self.all.sensitivities(x, y));
                 let counted = weight * sensitivity;
                 squares = counted.mul_add_precise(weight, squares);
-                let residuals = &places[row * vectors + vector];
+                let residuals: [_; CHANNELS] = match &without.removed {
+                    Some(removed) => self.residuals_without(simd, [x, y], removed),
+                    None => {
+                        let mut residuals = [zero; CHANNELS];
+                        for channel in 0..CHANNELS {
+                            residuals[channel] =
+                                load(simd, &places[row * vectors + vector][channel]);
+                        }
+                        residuals
+                    }
+                };
                 for channel in 0..CHANNELS {
-                    let residual = load(simd, &residuals[channel]);
-                    products[channel] = counted.mul_add_precise(residual, products[channel]);
+                    products[channel] =
+                        counted.mul_add_precise(residuals[channel], products[channel]);
                 }
             }
         }
-        let squared_weights = lane_sum(squares);
-        let mut sums = WindowSums { error: 0.0, by_channel: [0.0; 4], squared_weights };
+        let mut sums = ChangeSums { squares: lane_sum(squares), products: [0.0; 4] };
         for channel in 0..CHANNELS {
-            let (color, product) = (gaussian.color[channel], lane_sum(products[channel]));
-            sums.error += color * (color * squared_weights + 2.0 * product);
-            sums.by_channel[channel] = color * squared_weights + product;
+            sums.products[channel] = lane_sum(products[channel]);
         }
         sums
     }
 }
 
-/// An [`ErrorChange`] by channels instead of colour axes.
-#[derive(Clone, Copy, Debug)]
-struct WindowSums {
-    error: f32,
-    /// Half of the derivative of `error` by the amplitude in each channel.
-    by_channel: [f32; 4],
-    squared_weights: f32,
+/// What the change of error by a Gaussian is made of.
+#[derive(Clone, Copy, Debug, Default)]
+struct ChangeSums {
+    /// Squared weights times sensitivities.
+    squares: f32,
+    /// Weights times sensitivities times residuals, by channel.
+    products: [f32; 4],
 }
 
-impl WindowSums {
-    fn change(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
+impl ChangeSums {
+    fn plus(self, other: Self) -> Self {
+        let products =
+            core::array::from_fn(|channel| self.products[channel] + other.products[channel]);
+        Self { squares: self.squares + other.squares, products }
+    }
+
+    /// The change of error, where the residuals are those with the Gaussian.
+    fn with_present(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
+        let error = |color: f32, product: f32| color * (2.0 * product - color * self.squares);
+        self.change(gaussian, model, error, self.products)
+    }
+
+    /// The change of error, where the residuals are those without the Gaussian.
+    fn with_absent(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
+        let error = |color: f32, product: f32| color * (color * self.squares + 2.0 * product);
+        let colors = gaussian.color.iter().zip(self.products);
+        let mut by_channel = [0.0; 4];
+        for (by_channel, (color, product)) in by_channel.iter_mut().zip(colors) {
+            *by_channel = color * self.squares + product;
+        }
+        self.change(gaussian, model, error, by_channel)
+    }
+
+    fn change(
+        &self,
+        gaussian: &Gaussian,
+        model: ColorModel,
+        error: impl Fn(f32, f32) -> f32,
+        by_channel: [f32; 4],
+    ) -> ErrorChange {
+        let channels = gaussian.color.iter().zip(self.products).take(model.channels());
         ErrorChange {
-            error: self.error,
-            by_axis: to_axes(self.by_channel, model),
-            squared_weights: self.squared_weights,
+            error: channels.map(|(&color, product)| error(color, product)).sum(),
+            by_axis: to_axes(by_channel, model),
+            squared_weights: self.squares,
             amplitudes: to_axes(gaussian.color, model),
+        }
+    }
+}
+
+/// What the derivatives of the error by a Gaussian are made of.
+#[derive(Clone, Copy, Debug, Default)]
+struct GradientSums {
+    change: ChangeSums,
+    /// Squared weights.
+    weights: f32,
+    /// As in [`GeometryErrorSums`].
+    first: [f32; 2],
+    second: [f32; 3],
+}
+
+impl GradientSums {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            change: self.change.plus(other.change),
+            weights: self.weights + other.weights,
+            first: core::array::from_fn(|at| self.first[at] + other.first[at]),
+            second: core::array::from_fn(|at| self.second[at] + other.second[at]),
+        }
+    }
+
+    fn geometry(&self, gaussian: &Gaussian) -> GeometryErrorSums {
+        let channels = gaussian.color.iter().zip(self.change.products);
+        GeometryErrorSums {
+            first: self.first,
+            second: self.second,
+            weighted: channels.map(|(color, product)| color * product).sum(),
         }
     }
 }

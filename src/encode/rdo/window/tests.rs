@@ -58,6 +58,12 @@ fn gaussians() -> Vec<Gaussian> {
     ]
 }
 
+/// Gaussians, each with a limit within which the residuals of its window are kept, and with one beyond
+/// which they are not.
+fn gaussians_kept_or_not() -> impl Iterator<Item = (Gaussian, usize)> {
+    gaussians().into_iter().flat_map(|gaussian| [(gaussian, MOST_KEPT), (gaussian, 0)])
+}
+
 /// The quartic kernel of a Gaussian at a pixel, in f64.
 fn plain_weight(gaussian: &Gaussian, pixel: usize) -> f64 {
     let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
@@ -115,8 +121,8 @@ fn changes_are_those_of_the_plain_error() {
         for clamped in [false, true] {
             let scene = scene(model, clamped);
             let residuals = residuals(&scene);
-            for gaussian in gaussians() {
-                let mut window = Window::new(&residuals);
+            for (gaussian, most_kept) in gaussians_kept_or_not() {
+                let mut window = Window { most_kept, ..Window::new(&residuals) };
                 assert!(window.without(&gaussian, model).is_some());
                 let found = f64::from(window.change(&gaussian, model).error);
                 let without = plain_error(&scene, &gaussian, -1.0);
@@ -124,7 +130,7 @@ fn changes_are_those_of_the_plain_error() {
                 let error = (found - (with - without)).abs();
                 assert!(
                     error < 1e-4 * with,
-                    "{model:?} {clamped} {gaussian:?}: {found}, error {error}"
+                    "{model:?} {clamped} {gaussian:?} {most_kept}: {found}, error {error}"
                 );
             }
         }
@@ -137,8 +143,9 @@ fn gradients_are_those_of_the_plain_error() {
         for clamped in [false, true] {
             let scene = scene(model, clamped);
             let residuals = residuals(&scene);
-            for gaussian in gaussians() {
-                let without = Window::new(&residuals).without(&gaussian, model);
+            for (gaussian, most_kept) in gaussians_kept_or_not() {
+                let mut window = Window { most_kept, ..Window::new(&residuals) };
+                let without = window.without(&gaussian, model);
                 let gradient = without.expect("the window is inside").by_geometry;
                 let none = GeometryChange::default();
                 let directions = [
