@@ -18,8 +18,8 @@ use crate::gaussian::Gaussian;
 /// many Gaussians as fit in at this rate.
 pub(crate) const fn bits_per_gaussian(tune: Tune) -> f64 {
     match tune {
-        Tune::Visual => 32.0,
-        Tune::Psnr => 29.0,
+        Tune::Visual => 30.0,
+        Tune::Psnr => 27.0,
     }
 }
 /// The share of a target's squared error that the fit may have; quantization adds the rest.
