@@ -153,13 +153,9 @@ impl<'a> Window<'a> {
         *removed = (!is_kept).then_some(Removed { weights, color: gaussian.color });
         if is_kept {
             let kept = kept.as_chunks_mut::<CHANNELS>().0;
-            return dispatch!(frame.level, simd =>
-                frame.gradient_sums(simd, gaussian, &weights, 0..rows, Some(kept)));
+            return frame.gradient_of_rows(gaussian, &weights, 0..rows, Some(kept));
         }
-        let of_rows = |rows| {
-            dispatch!(frame.level, simd =>
-                frame.gradient_sums::<_, CHANNELS>(simd, gaussian, &weights, rows, None))
-        };
+        let of_rows = |rows| frame.gradient_of_rows::<CHANNELS>(gaussian, &weights, rows, None);
         frame.by_tasks(of_rows).into_iter().fold(GradientSums::default(), GradientSums::plus)
     }
 
@@ -178,10 +174,7 @@ impl<'a> Window<'a> {
     fn change_of<const CHANNELS: usize>(&self, gaussian: &Gaussian) -> ChangeSums {
         let (frame, without) = (self.frame, &self.without);
         let weights = KernelWeights::new(gaussian);
-        let of_rows = |rows| {
-            dispatch!(frame.level, simd =>
-                frame.change_sums::<_, CHANNELS>(simd, &weights, rows, without))
-        };
+        let of_rows = |rows| frame.change_of_rows::<CHANNELS>(&weights, rows, without);
         if without.removed.is_none() {
             return of_rows(0..frame.size[1]);
         }
@@ -234,6 +227,30 @@ impl Frame<'_> {
             residuals[channel] = weight.mul_add_precise(-color, residuals[channel]);
         }
         residuals
+    }
+
+    /// [`Frame::gradient_sums`], compiled once for all that call it.
+    #[inline(never)]
+    fn gradient_of_rows<const CHANNELS: usize>(
+        &self,
+        gaussian: &Gaussian,
+        weights: &KernelWeights,
+        rows: Range<usize>,
+        kept: Option<&mut [[StoredLanes; CHANNELS]]>,
+    ) -> GradientSums {
+        dispatch!(self.level, simd => self.gradient_sums(simd, gaussian, weights, rows, kept))
+    }
+
+    /// [`Frame::change_sums`], compiled once for all that call it.
+    #[inline(never)]
+    fn change_of_rows<const CHANNELS: usize>(
+        &self,
+        weights: &KernelWeights,
+        rows: Range<usize>,
+        without: &Without,
+    ) -> ChangeSums {
+        dispatch!(self.level, simd =>
+            self.change_sums::<_, CHANNELS>(simd, weights, rows, without))
     }
 
     /// The sums over some rows for the gradient by a Gaussian. The residuals without it are put into
