@@ -7,9 +7,9 @@ use crate::encode::quality::dissimilarity_at;
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 /// By how many dB the PSNR that is aimed at exceeds the target.
 const AIMED_PSNR_EXCESS: f64 = 0.02;
-/// A file that is too large by up to this is shortened, and the range that is aimed at; base-2
-/// logarithms of the size.
-const MOST_SHORTENED: f64 = 0.04;
+/// The deviations of size that are good enough, because a file that is a little too large will be
+/// shortened; and those that are not corrected even if there are passes left.
+const TOLERANCE_OF_SIZE: (f64, f64) = (-0.009, 0.04);
 const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
 /// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
 /// right side is preferred.
@@ -44,8 +44,7 @@ impl Aim {
     /// How badly a file with this deviation misses its target: 0 if it meets the target.
     pub(crate) fn miss(self, deviation: f64) -> f64 {
         let (below, above) = match self {
-            // A file that is a little too large will be shortened.
-            Self::Size { .. } => (-0.009, MOST_SHORTENED),
+            Self::Size { .. } => TOLERANCE_OF_SIZE,
             Self::Psnr(_) => (-0.009, 0.006),
             // At a quality of 75, a third of a point; less at a higher one.
             Self::Dissimilarity(_) => (-0.03, 0.03),
@@ -59,7 +58,7 @@ impl Aim {
     /// The deviation to aim at.
     pub(crate) fn middle(self) -> f64 {
         match self {
-            Self::Size { .. } => 0.5 * (WELL_SHORTENED.0 + WELL_SHORTENED.1),
+            Self::Size { .. } => 0.5 * (TOLERANCE_OF_SIZE.0 + TOLERANCE_OF_SIZE.1),
             Self::Psnr(_) | Self::Dissimilarity(_) => 0.0,
         }
     }
@@ -77,7 +76,7 @@ impl Aim {
     pub(crate) fn is_within_lambda(self, deviation: f64) -> bool {
         match self {
             // A pass removes Gaussians, but adds none.
-            Self::Size { .. } => (-0.018..0.05).contains(&deviation),
+            Self::Size { .. } => (-0.012..0.05).contains(&deviation),
             Self::Psnr(_) | Self::Dissimilarity(_) => (-0.1..0.03).contains(&deviation),
         }
     }
