@@ -124,7 +124,7 @@ mod tests {
     #[test]
     fn growth_steps_are_at_equal_intervals() {
         let schedule = TrainingSchedule::new(&Training::fast(600), Precision::Entropy);
-        let expected: Vec<_> = (1..=40).map(|growth| (9 * growth, 40 - growth)).collect();
+        let expected: Vec<_> = (1..=60).map(|growth| (6 * growth, 60 - growth)).collect();
         assert_eq!(growths(&schedule, 600), expected);
         let expected: Vec<_> = (0..=6).map(|cull| (360 + 10 * cull, 6 - cull)).collect();
         assert_eq!(culls(&schedule, 600), expected);

@@ -245,29 +245,21 @@ impl Training {
     /// by importance. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
-        let steps = (iterations / 15).clamp(10, 160);
-        // The longer a run, the more it gains from iterations after growth.
-        let (end, culled) = match iterations {
-            ..50 => (0.7, 0.8),
-            50..=800 => (0.6, 0.7),
-            801..=2_000 => (0.5, 0.6),
-            _ => (0.4, 0.5),
-        };
         // In a short run there is no time to be careful, and little to correct.
+        let (end, culled) = if iterations < 50 { (0.7, 0.8) } else { (0.6, 0.7) };
         let hurry = 1.0 / iterations.max(30) as f32;
-        let replaced = (4.0 / steps as f32).clamp(0.05, 0.2);
         Self {
             iterations,
             kernel: Kernel::Quartic,
             parameterization: Parameterization::Cholesky,
             densification: Densification {
                 initial: 0.02,
-                steps,
+                steps: (iterations / 10).clamp(10, 160),
                 end,
                 portion: Portion::Even,
                 surplus: 0.3,
                 culled,
-                replaced: replaced.min(iterations as f32 / 300.0),
+                replaced: (iterations as f32 / 300.0).min(0.2),
                 distortion: Distortion::L3,
                 placement: Placement::Spread,
                 color: NewColor::Residual(0.3),
