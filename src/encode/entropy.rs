@@ -7,7 +7,7 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::{Target, Tune};
+use super::options::Target;
 use super::progress::Observer;
 use super::quality;
 use super::raster::Raster;
@@ -29,20 +29,17 @@ const CLOSE: Range<f64> = 0.75..1.2;
 /// The least factor for a correction.
 const LEAST_FACTOR: f64 = 0.25;
 
-/// How many Gaussians a file of a size holds, about, up to `most`.
-pub(crate) fn count_for_size(
+/// The bits of the Gaussians in a file of a size.
+pub(crate) fn bits_for_size(
     bytes: u64,
-    most: usize,
-    tune: Tune,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<usize, EncodeError> {
+) -> Result<f64, EncodeError> {
     let lattice = rate_model::lattice(0.0, layout.header().color);
     let empty = LatticeCodes { lattice, codes: Vec::new() };
     let least = layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64;
     layout.check_size(bytes, least)?;
-    Ok((((bytes - least) * 8) as f64 / rate_model::bits_per_gaussian(tune)).min(most as f64)
-        as usize)
+    Ok(((bytes - least) * 8) as f64)
 }
 
 /// The file of a finished fit, which is extended and coded for the target.

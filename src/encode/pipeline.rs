@@ -78,6 +78,7 @@ fn encode_for_target(
     let budget = budget(job, &raster, &layout, observer)?;
     let expected = match budget {
         Budget::Count(count) => count,
+        Budget::Bits { .. } => budget.wanted(0, rate_model::USUAL_COMPONENT_BITS, job.pixels()),
         _ => job.pixels() / USUAL_PIXELS,
     };
     observer.advance(preparation)?;
@@ -131,13 +132,13 @@ fn budget(
     let Job { target, precision, training, .. } = *job;
     let is_coded = precision == Precision::Entropy;
     if let Some(bytes) = target.bytes(raster.pixels()) {
+        if is_coded {
+            let bits = entropy::bits_for_size(bytes, layout, observer)?;
+            return Ok(Budget::Bits { bits, tune: job.tune });
+        }
         let most = raster.pixels();
-        let count = if is_coded {
-            entropy::count_for_size(bytes, most, job.tune, layout, observer)
-        } else {
-            packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
-        };
-        return count.map(Budget::Count);
+        return packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
+            .map(Budget::Count);
     }
     if let Some(quality) = target.quality() {
         let dissimilarity = quality::dissimilarity_at(quality);

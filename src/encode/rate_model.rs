@@ -14,14 +14,10 @@ use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
-/// Bits that an entropy-coded Gaussian takes on average. A file of a given size is fitted with as
-/// many Gaussians as fit in at this rate.
-pub(crate) const fn bits_per_gaussian(tune: Tune) -> f64 {
-    match tune {
-        Tune::Visual => 30.0,
-        Tune::Psnr => 27.0,
-    }
-}
+/// The bits of a component ([`component_bits`]) on average over the Gaussians of a usual picture.
+pub(crate) const USUAL_COMPONENT_BITS: f64 = 2.2;
+/// The base-2 logarithm of what one more bit of a component is to [`bits_per_gaussian`].
+const BITS_BY_COMPONENT: f64 = 0.15;
 /// The share of a target's squared error that the fit may have; quantization adds the rest.
 pub(crate) const SHARE_OF_FIT: f64 = 0.8;
 /// The squared step of colour, as a share of the distortion per Gaussian: with it, a Gaussian takes
@@ -43,6 +39,27 @@ const SLANT: f32 = 1.732;
 const RATE_WEIGHT: f32 = 0.4;
 /// Components of a Gaussian's geometry: two of position, three of shape.
 const GEOMETRY: usize = 5;
+
+/// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
+/// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
+/// precise ones if they are strong, more and coarser ones if they are weak.
+pub(crate) fn bits_per_gaussian(tune: Tune, component_bits: f64) -> f64 {
+    let usual = match tune {
+        Tune::Visual => 30.0,
+        Tune::Psnr => 27.0,
+    };
+    usual * (BITS_BY_COMPONENT * (component_bits - USUAL_COMPONENT_BITS)).exp2()
+}
+
+/// The bits that a component of a Gaussian is taken to cost: log2(1 + s^2) / 2, where s is the
+/// Gaussian's strength in steps of colour, because the steps of geometry get finer as it grows. `step`
+/// is the base-2 logarithm of the step of colour.
+pub(crate) fn component_bits(gaussian: &Gaussian, step: f64) -> f64 {
+    let [l11, _, l22] = gaussian.cholesky;
+    let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
+    let step = step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1);
+    0.5 * (1.0 + f64::from(squared * l11 * l22) / (step * step)).log2()
+}
 
 /// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has this
 /// distortion.
@@ -86,10 +103,9 @@ pub(crate) fn class_of(
     steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
 }
 
-/// The rate term of the training loss. Every component of a Gaussian is taken to cost
-/// log2(1 + s^2) / 2 bits, where s is the Gaussian's strength in steps of colour: the steps of
-/// geometry get finer as it grows. The term makes weak Gaussians fade away, and keeps strong ones
-/// from growing only to cancel each other.
+/// The rate term of the training loss, for which every component of a Gaussian costs
+/// [`component_bits`]. The term makes weak Gaussians fade away, and keeps strong ones from growing only
+/// to cancel each other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RateTerm {
     squared_step: f32,
@@ -155,6 +171,24 @@ mod tests {
             assert!(relative.abs() < 1e-3, "channel {channel}: {gradient:?}, {half}");
         }
         assert_eq!(gradient[3], 0.0);
+    }
+
+    #[test]
+    fn strong_gaussians_take_more_bits() {
+        let bits = |color: f32| {
+            let cholesky = [4.0, 1.0, 1.0];
+            let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
+            component_bits(&gaussian, 1.0)
+        };
+        // Strengths of 0, 1 and the root of 3 steps.
+        for (color, expected) in [(0.0, 0.0), (1.0, 0.5), (3.0_f32.sqrt(), 1.0)] {
+            assert!((bits(color) - expected).abs() < 1e-6, "{color}");
+        }
+        for tune in [Tune::Visual, Tune::Psnr] {
+            let [weak, usual, strong] = [bits(0.1), USUAL_COMPONENT_BITS, bits(100.0)]
+                .map(|component_bits| bits_per_gaussian(tune, component_bits));
+            assert!(10.0 < weak && weak < usual && usual < strong && strong < 100.0);
+        }
     }
 
     #[test]

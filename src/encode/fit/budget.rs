@@ -1,10 +1,15 @@
 //! The budget: how many Gaussians a picture gets.
 
+use crate::encode::options::Tune;
+use crate::encode::rate_model;
+
 /// What sets the number of Gaussians, where a full sample is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Budget {
     /// This many Gaussians.
     Count(usize),
+    /// As many Gaussians as take this many bits.
+    Bits { bits: f64, tune: Tune },
     /// As many Gaussians as bring the sum of squared errors down to this.
     SquaredError(f64),
     /// As many Gaussians as leave this distortion per Gaussian. The slope of the distortion over the
@@ -18,17 +23,19 @@ const POWER: f64 = 1.1;
 
 impl Budget {
     /// The number of Gaussians that is expected to meet the budget, extrapolated from `count`
-    /// Gaussians with an error of `error`, which is what the budget sets; at most `most`.
-    pub(crate) fn wanted(self, count: usize, error: f64, most: usize) -> usize {
-        let ratio = match self {
+    /// Gaussians, of which `measured` is what the budget depends on: the error, or the bits of a
+    /// component ([`rate_model::component_bits`]) on average; at most `most`.
+    pub(crate) fn wanted(self, count: usize, measured: f64, most: usize) -> usize {
+        let count = count.max(1) as f64;
+        let wanted = match self {
             Self::Count(wanted) => return wanted.min(most),
-            Self::SquaredError(target) => (error / target).powf(1.0 / POWER),
+            Self::Bits { bits, tune } => bits / rate_model::bits_per_gaussian(tune, measured),
+            Self::SquaredError(target) => count * (measured / target).powf(1.0 / POWER),
             Self::DistortionPerGaussian(target) => {
-                (error / count.max(1) as f64 / target).powf(1.0 / (POWER + 1.0))
+                count * (measured / count / target).powf(1.0 / (POWER + 1.0))
             }
         };
         // The cast of a float saturates, and that of NaN gives 0. A target of 0 gives `most`.
-        let wanted = (count.max(1) as f64 * ratio).ceil() as usize;
-        wanted.min(most)
+        (wanted.ceil() as usize).min(most)
     }
 }

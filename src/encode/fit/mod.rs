@@ -34,7 +34,7 @@ use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
 use super::progress::Observer;
 use super::raster::Raster;
-use super::rate_model::RateTerm;
+use super::rate_model::{self, RateTerm};
 use super::workload::Workload;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
@@ -250,11 +250,27 @@ impl<'a> Fit<'a> {
     /// The number of Gaussians that the budget sets, if training changes the error by the factor
     /// `foreseen`.
     fn wanted(&self, foreseen: f64) -> usize {
-        let error = match self.budget {
-            Budget::DistortionPerGaussian(_) => self.error.distortion,
-            _ => self.error.squared,
+        let RenderingError { squared, distortion, .. } = self.error;
+        let measured = match self.budget {
+            Budget::Count(_) => 0.0,
+            Budget::Bits { .. } => self.component_bits(distortion * foreseen),
+            Budget::SquaredError(_) => squared * foreseen,
+            Budget::DistortionPerGaussian(_) => distortion * foreseen,
         };
-        self.budget.wanted(self.len(), error * foreseen, self.most())
+        self.budget.wanted(self.len(), measured, self.most())
+    }
+
+    /// The bits of a component on average, if the picture has this distortion.
+    fn component_bits(&self, distortion: f64) -> f64 {
+        if self.len() == 0 {
+            return rate_model::USUAL_COMPONENT_BITS;
+        }
+        let step = rate_model::step_for(distortion, self.len());
+        let bits = |row: &Row| {
+            let gaussian = Gaussian::from_components(&row[..], self.bounds.parameterization);
+            rate_model::component_bits(&gaussian, step)
+        };
+        self.parameters.values.iter().map(bits).sum::<f64>() / self.len() as f64
     }
 
     /// How many Gaussians this growth step adds. `kept` Gaussians remain when the surplus has been
