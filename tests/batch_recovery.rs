@@ -348,9 +348,9 @@ mod killed {
         let room = Room::new();
         room.save_picture("in/large.png", &pictures::picture((400, 300), ColorType::Rgb8));
         for signal in [SIGINT, SIGTERM] {
-            let mut gip = room.spawn(&["batch", "in", "--out", "out", "--effort", "9"]);
+            let mut gip = room.spawn(&["batch", "in", "--out", "out", "--effort", "7"]);
             wait(&mut gip, || room.path("out").exists());
-            // Long enough to begin, and nothing against the minutes that it would take.
+            // Long enough to begin, and little of the seconds that it would take.
             std::thread::sleep(Duration::from_millis(100));
             let (ended_by_signal, printed) = kill(gip, signal);
             assert!(ended_by_signal, "{printed}");

@@ -16,7 +16,7 @@ pub(crate) const NAME: &str = "gip";
 /// The same for [`psnr_encoder`], beside the default.
 pub(crate) const PSNR_NAME: &str = "gip --tune psnr";
 /// The encoder's default effort, used wherever no other is named.
-pub(crate) const EFFORT: u8 = 5;
+pub(crate) const EFFORT: u8 = 4;
 /// The seed of everything random in the encoder.
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.

@@ -16,20 +16,11 @@ use crate::container::Metadata;
 use crate::kernel::Kernel;
 use crate::threads::Threads;
 
-/// For the efforts 1 to 9: iterations of training, and passes of rate-distortion optimization over
+/// For the efforts 1 to 7: iterations of training, and passes of rate-distortion optimization over
 /// the codes of an entropy-coded file. In a short run, time is better spent on iterations; in a
 /// long one, more iterations gain little without more passes.
-const EFFORTS: [(u32, u32); 9] = [
-    (30, 2),
-    (60, 2),
-    (110, 3),
-    (200, 5),
-    (320, 8),
-    (640, 12),
-    (1_280, 16),
-    (2_560, 16),
-    (5_120, 16),
-];
+const EFFORTS: [(u32, u32); 7] =
+    [(30, 1), (75, 2), (170, 4), (350, 8), (700, 10), (1_400, 10), (2_800, 12)];
 /// Fewest iterations for a target that sets the error instead of the number of Gaussians: a fit
 /// of fewer iterations needs far too many Gaussians to reach the error.
 const MIN_ITERATIONS_BY_ERROR: u32 = 180;
@@ -94,13 +85,13 @@ impl Default for Encoder {
 }
 
 impl Encoder {
-    /// An encoder with the default options: [`Target::Auto`], [`Tune::Visual`], effort 5,
+    /// An encoder with the default options: [`Target::Auto`], [`Tune::Visual`], effort 4,
     /// [`Precision::Entropy`].
     pub fn new() -> Self {
         Self {
             target: Target::default(),
             tune: Tune::default(),
-            effort: 5,
+            effort: 4,
             precision: Precision::Entropy,
             seed: 0,
             threads: Threads::Pool,
@@ -122,8 +113,8 @@ impl Encoder {
         self
     }
 
-    /// How much time to spend, from 1 (least) to 9 (most). Default 5. Up to that, each effort takes about
-    /// one and a half times as long as the one before, and from there on twice as long.
+    /// How much time to spend, from 1 (least) to 7 (most). Default 4. Each effort takes about twice as
+    /// long as the one before.
     pub fn with_effort(mut self, effort: u8) -> Self {
         self.effort = effort;
         self

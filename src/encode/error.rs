@@ -52,8 +52,8 @@ pub enum SourceError {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum OptionError {
-    /// The effort is not 1 to 9.
-    #[error("effort {0}; it must be 1 to 9")]
+    /// The effort is not 1 to 7.
+    #[error("effort {0}; it must be 1 to 7")]
     Effort(u8),
     /// The number in a [`Target`](crate::Target) is out of range.
     #[error("{name} {value}; it must be {least} to {most}")]

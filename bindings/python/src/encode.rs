@@ -42,7 +42,7 @@ const NEWS: f64 = 0.002;
 ///         medium, 70 high, and from 90 on people see no difference.
 ///     psnr: A PSNR of the decoded file in dB, 1 to 120.
 ///     gaussians: At most so many Gaussians, 1 to 2**22.
-///     effort: How much time to spend, 1 (least) to 9 (most).
+///     effort: How much time to spend, 1 (least) to 7 (most).
 ///     tune: What to minimize for the size of the file: "visual", the error that a person sees, or
 ///         "psnr", the squared error.
 ///     threads: The number of threads that work, 1 to 1024. The calling thread only waits for them.
@@ -62,7 +62,7 @@ const NEWS: f64 = 0.002;
 ///         option is out of range.
 ///     CancelledError: `progress` returned False.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=5, tune="visual", threads=1, seed=0, icc=None, exif=None, xmp=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", threads=1, seed=0, icc=None, exif=None, xmp=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -84,7 +84,7 @@ pub(crate) fn encode<'py>(
     let threads = threads::checked(threads)?;
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
     let effort = u8::try_from(effort)
-        .map_err(|_| PyValueError::new_err(format!("effort {effort}; it must be 1 to 9")))?;
+        .map_err(|_| PyValueError::new_err(format!("effort {effort}; it must be 1 to 7")))?;
     let encoder = Encoder::new()
         .with_target(target)
         .with_tune(tuning(tune)?)

@@ -107,8 +107,8 @@ def test_arrays_that_are_refused() -> None:
 def test_options_that_are_refused(photo: Picture) -> None:
     refused: list[tuple[dict[str, Any], type[Exception], str]] = [
         ({"bpp": 1, "psnr": 30}, TypeError, "at most one of bpp, bytes, quality, psnr"),
-        ({"effort": 0}, ValueError, "effort 0; it must be 1 to 9"),
-        ({"effort": 1000}, ValueError, "effort 1000; it must be 1 to 9"),
+        ({"effort": 0}, ValueError, "effort 0; it must be 1 to 7"),
+        ({"effort": 1000}, ValueError, "effort 1000; it must be 1 to 7"),
         ({"bpp": 0.0}, ValueError, "bits per pixel 0; it must be"),
         ({"bytes": -5}, ValueError, "bytes -5; it must be at least 1"),
         ({"bytes": 0}, ValueError, "size in bytes 0; it must be 1 to"),
@@ -185,14 +185,14 @@ def test_progress_cancels(photo: Picture) -> None:
         return len(calls) < 3
 
     with pytest.raises(image_gip.CancelledError):
-        image_gip.encode(photo, effort=9, progress=stop)
+        image_gip.encode(photo, effort=7, progress=stop)
     assert len(calls) == 3
 
     def fail(progress: Progress) -> None:
         raise LookupError("no")
 
     with pytest.raises(LookupError, match="no"):
-        image_gip.encode(photo, effort=9, progress=fail)
+        image_gip.encode(photo, effort=7, progress=fail)
 
 
 def test_ctrl_c() -> None:
@@ -201,7 +201,7 @@ def test_ctrl_c() -> None:
     timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        image_gip.encode(draw(400, 300, 3), effort=9, threads=2)
+        image_gip.encode(draw(400, 300, 3), effort=7, threads=2)
     timer.join()
 
 
@@ -212,7 +212,7 @@ def test_the_interpreter_goes_on() -> None:
 
     def work() -> None:
         try:
-            image_gip.encode(draw(400, 300, 3), effort=9, progress=lambda _: not stop.is_set())
+            image_gip.encode(draw(400, 300, 3), effort=7, progress=lambda _: not stop.is_set())
         except image_gip.CancelledError as error:
             errors.append(error)
 

@@ -55,7 +55,7 @@ if "busy" in sys.argv:
         return not stop.is_set()
     def encode():
         try:
-            image_gip.encode(picture, effort=9, threads=2, progress=progress)
+            image_gip.encode(picture, effort=7, threads=2, progress=progress)
         except image_gip.CancelledError:
             pass
     worker = threading.Thread(target=encode)

@@ -23,7 +23,7 @@ const QUICK_LARGE_GAUSSIANS: [u32; 1] = [10_000];
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 1;
 /// The effort that is shown beside the default one; a higher one gains next to nothing.
-const BEST_EFFORT: u8 = 8;
+const BEST_EFFORT: u8 = 6;
 /// Attributes of a Gaussian: two for the centre, three for the shape, three for the colour.
 const PARAMETERS: f64 = 8.0;
 

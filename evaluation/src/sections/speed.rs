@@ -20,7 +20,7 @@ const RATE: f64 = 0.5;
 /// How many pictures are coded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
-const EFFORTS: [u8; 9] = [1, 2, 3, 4, 5, 6, 7, 8, 9];
+const EFFORTS: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
 const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;

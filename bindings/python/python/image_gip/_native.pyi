@@ -49,7 +49,7 @@ def encode(
     quality: float | None = None,
     psnr: float | None = None,
     gaussians: int | None = None,
-    effort: int = 5,
+    effort: int = 4,
     tune: Tune = "visual",
     threads: int = 1,
     seed: int = 0,

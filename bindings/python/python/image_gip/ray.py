@@ -71,7 +71,7 @@ def encode_dataset(
     quality: float | None = None,
     psnr: float | None = None,
     gaussians: int | None = None,
-    effort: int = 5,
+    effort: int = 4,
     tune: Tune = "visual",
     seed: int = 0,
 ) -> Summary:

@@ -52,9 +52,9 @@ pub(crate) struct EncoderArgs {
     /// What to minimize for the size of the file.
     #[arg(long, value_enum, default_value_t = TuneArg::Visual)]
     tune: TuneArg,
-    /// Time to spend, from 1 (least) to 9 (most).
-    #[arg(long, value_name = "E", default_value_t = 5,
-          value_parser = clap::value_parser!(u8).range(1..=9))]
+    /// Time to spend, from 1 (least) to 7 (most).
+    #[arg(long, value_name = "E", default_value_t = 4,
+          value_parser = clap::value_parser!(u8).range(1..=7))]
     effort: u8,
     /// How the Gaussians are stored.
     #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
