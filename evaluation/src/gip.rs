@@ -17,6 +17,8 @@ pub(crate) const NAME: &str = "gip";
 pub(crate) const PSNR_NAME: &str = "gip --tune psnr";
 /// The encoder's default effort, used wherever no other is named.
 pub(crate) const EFFORT: u8 = 4;
+/// All efforts.
+pub(crate) const EFFORTS: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
 /// The seed of everything random in the encoder.
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.

@@ -12,7 +12,6 @@ use crate::store::Store;
 use crate::table::{Table, mean, median};
 use crate::{gip, memory};
 
-const EFFORTS: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
 const QUICK_EFFORTS: [u8; 3] = [1, 3, 5];
 /// Those whose PSNR is to be reached.
 const RIVALS: [&str; 2] = ["AVIF tune=psnr", "WebP"];
@@ -54,7 +53,7 @@ pub(super) fn measure(bench: &mut Bench, kodak: &[TestPicture], rate: f64) -> Re
 }
 
 fn set(bench: &mut Bench, pictures: &[TestPicture], rate: f64) -> Result<String> {
-    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &EFFORTS };
+    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
     let mut store: EncodingStore = bench.store(
         "encoding.csv",
         ["effort", "threads", "image"],

@@ -20,7 +20,6 @@ const RATE: f64 = 0.5;
 /// How many pictures are coded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
-const EFFORTS: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
 const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
@@ -109,7 +108,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
     )?;
     let mut files = RateStore::open(bench)?;
     let pictures = pictures(bench);
-    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &EFFORTS };
+    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let mut rows = Vec::new();
