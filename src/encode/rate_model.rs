@@ -52,13 +52,14 @@ pub(crate) fn bits_per_gaussian(tune: Tune, component_bits: f64) -> f64 {
 }
 
 /// The bits that a component of a Gaussian is taken to cost: log2(1 + s^2) / 2, where s is the
-/// Gaussian's strength in steps of colour, because the steps of geometry get finer as it grows. `step`
-/// is the base-2 logarithm of the step of colour.
-pub(crate) fn component_bits(gaussian: &Gaussian, step: f64) -> f64 {
-    let [l11, _, l22] = gaussian.cholesky;
-    let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
-    let step = step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1);
-    0.5 * (1.0 + f64::from(squared * l11 * l22) / (step * step)).log2()
+/// Gaussian's strength in steps of colour, because the steps of geometry get finer as it grows.
+pub(crate) fn component_bits(gaussian: &Gaussian, color_step: f64) -> f64 {
+    0.5 * (1.0 + f64::from(gaussian.importance()) / (color_step * color_step)).log2()
+}
+
+/// The step of colour with this base-2 logarithm, in the range of steps.
+pub(crate) fn color_step(step: f64) -> f64 {
+    step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1)
 }
 
 /// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has this
@@ -80,7 +81,7 @@ pub(crate) fn distortion_per_gaussian(step: f64) -> f64 {
 
 /// The lattice for a step of colour, given by its base-2 logarithm.
 pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
-    let step = step.exp2().clamp(STEP_RANGE.0, STEP_RANGE.1) as f32;
+    let step = color_step(step) as f32;
     Lattice::new([POSITION, SIZE, RATIO, SLANT], vec![step; model.channels()])
 }
 
@@ -178,7 +179,7 @@ mod tests {
         let bits = |color: f32| {
             let cholesky = [4.0, 1.0, 1.0];
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
-            component_bits(&gaussian, 1.0)
+            component_bits(&gaussian, 2.0)
         };
         // Strengths of 0, 1 and the root of 3 steps.
         for (color, expected) in [(0.0, 0.0), (1.0, 0.5), (3.0_f32.sqrt(), 1.0)] {

@@ -265,7 +265,7 @@ impl<'a> Fit<'a> {
         if self.len() == 0 {
             return rate_model::USUAL_COMPONENT_BITS;
         }
-        let step = rate_model::step_for(distortion, self.len());
+        let step = rate_model::color_step(rate_model::step_for(distortion, self.len()));
         let bits = |row: &Row| {
             let gaussian = Gaussian::from_components(&row[..], self.bounds.parameterization);
             rate_model::component_bits(&gaussian, step)

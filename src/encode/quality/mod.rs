@@ -174,8 +174,8 @@ pub(crate) fn dissimilarity_at(quality_wanted: f64) -> f64 {
 }
 
 /// About how many Gaussians a picture needs for a dissimilarity, where `means` are the means of the
-/// eye's sensitivity to it. It is a fit to photographs with 110 and 320 iterations, good to a factor of 1.3 on
-/// average: texture, and above all fine texture, takes Gaussians.
+/// eye's sensitivity to it. It is a fit to photographs with 110 and 320 iterations, good to a factor of
+/// 1.3 on average: texture, and above all fine texture, takes Gaussians.
 pub(crate) fn count_for(dissimilarity: f64, pixels: usize, means: [f64; SCALES]) -> usize {
     let [fine, .., coarse] = means;
     let density = 0.5 * dissimilarity.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);

@@ -7,9 +7,9 @@ use crate::encode::quality::dissimilarity_at;
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 /// By how many dB the PSNR that is aimed at exceeds the target.
 const AIMED_PSNR_EXCESS: f64 = 0.02;
-/// The deviations of size that are good enough, because a file that is a little too large will be
-/// shortened; and those that are not corrected even if there are passes left.
+/// The deviations of size that are good enough: a file that is a little too large will be shortened.
 const TOLERANCE_OF_SIZE: (f64, f64) = (-0.009, 0.04);
+/// Those that are not corrected even if there are passes left.
 const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
 /// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
 /// right side is preferred.

@@ -216,8 +216,8 @@ impl<'a> TargetSearch<'a> {
         for _ in 0..MOST_ROUNDING_TRIES {
             let coded = self.codes.rounded(gaussians, search.at, observer)?;
             let weak = coded.codes.iter().filter(|code| code.strength() <= WEAK).count();
-            let fall = settling_of_rounded(weak as f64 / coded.codes.len().max(1) as f64);
-            let fall = fall + settling(1) - settling(self.work.passes);
+            let share = weak as f64 / coded.codes.len().max(1) as f64;
+            let fall = settling_of_rounded(share) + settling(1) - settling(self.work.passes);
             let deviation = self.deviation(&coded, aim, observer)? - fall - aim.middle();
             if deviation.abs() < CLOSE_OF_ROUNDED {
                 return Ok((search.at - deviation / aim.by_step()).max(finest));
