@@ -46,10 +46,9 @@ impl Workload {
         self.of((ITERATION.0 + COVERAGE * covered, share * ITERATION.1))
     }
 
-    /// Training from nothing, where growth takes half of the iterations.
+    /// Training from nothing, where growth takes six tenths of the iterations.
     pub(crate) fn training(&self, iterations: u32) -> f64 {
-        let half = f64::from(iterations) / 2.0;
-        half * (self.iteration(0.4) + self.iteration(1.0))
+        f64::from(iterations) * (0.6 * self.iteration(0.4) + 0.4 * self.iteration(1.0))
     }
 
     /// Training after Gaussians were added or removed.

@@ -271,7 +271,9 @@ impl Frame<'_> {
         let (mut first, mut second) = ([zero; 2], [zero; 3]);
         for row in rows {
             let span = weights.span(self.corner[0], self.corner[1] + row, vectors);
-            for vector in 0..vectors {
+            // Residuals outside of the span are kept, too.
+            let visited = if kept.is_some() { 0..vectors } else { span.clone() };
+            for vector in visited {
                 let [x, y] = self.place(row, vector);
                 let mut residuals: [_; CHANNELS] = self.residuals(simd, [x, y]);
                 if span.contains(&vector) {
