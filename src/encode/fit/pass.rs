@@ -9,7 +9,7 @@
 
 use fearless_simd::Level;
 
-use super::bins::{RowBins, TileRow, reset};
+use super::bins::{RowBins, TileRow};
 use super::distortion_map;
 use super::parameterization::GeometrySums;
 use super::training::Distortion;
@@ -77,8 +77,9 @@ impl Pass {
         // The slots take most of the memory. They are freed while binning needs memory of its own.
         self.slots = Vec::new();
         self.bins.rebuild(splats, kernel.cutoff(), observer)?;
-        let slots = self.bins.span_count() * slots_per_span(raster.channels);
-        reset(&mut self.slots, slots, Slot::default());
+        // Memory that the system clears page by page when it is used, on all threads.
+        self.slots =
+            vec![Slot::default(); self.bins.span_count() * slots_per_span(raster.channels)];
         Ok(())
     }
 

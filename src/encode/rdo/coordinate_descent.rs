@@ -2,10 +2,13 @@
 //! Lagrangian cost D + lambda R is chosen, where D is the squared error of the picture and R the
 //! rate in bits.
 
+use core::ops::Range;
+
 use rayon::prelude::*;
 
 use super::quadratic_model::GeometryChange;
-use super::residuals::Residuals;
+use super::residuals::{Band, Residuals};
+use super::rounds::{Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_CLASS, SymbolCosts};
 use crate::color::ColorModel;
@@ -14,15 +17,8 @@ use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 
-/// Side in pixels of the blocks of the picture. Windows overlap only if they have a block in
-/// common.
-const BLOCK: usize = 16;
-/// Blocks of windows for each thread from one poll of the observer to the next: a few milliseconds.
-const BLOCKS_PER_POLL: usize = 1 << 11;
 /// Work to find the window of a Gaussian.
 const WORK: f64 = 200.0;
-/// Windows that are put into batches from one poll of the observer to the next.
-const PART: usize = 1 << 14;
 
 /// The trust region of the quadratic model: the largest change of each component of the geometry in
 /// a step to the model's minimum.
@@ -71,6 +67,16 @@ impl Candidate {
     }
 }
 
+/// What became of the Gaussians of a band.
+#[derive(Debug, Default)]
+struct Optimized {
+    /// Those that are left: the use of their bits, their indices, and their codes.
+    found: Vec<(f32, u32, Code)>,
+    /// Gaussians that reach beyond the band and are added to the rendering, each times a factor, and the
+    /// rows where they are already.
+    beyond: Vec<(Gaussian, f32, Range<usize>)>,
+}
+
 /// The cheapest codes out of those that cost less than a given one, cheapest first.
 #[derive(Debug)]
 struct Cheapest {
@@ -109,8 +115,7 @@ impl CoordinateDescent<'_> {
     /// `residuals` those of their rendering, which are updated. Returns the codes; the less one lowers
     /// the error for each of its bits, the later it comes.
     ///
-    /// Gaussians whose windows do not overlap are processed in parallel; the result is that of one
-    /// after the other.
+    /// Bands of the picture are processed in parallel; the result does not depend on the threads.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -121,42 +126,69 @@ impl CoordinateDescent<'_> {
         contexts: &[CodeContext<'_>],
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Code>, EncodeError> {
+        // Gaussians outside the picture are not among them, and thereby removed.
+        let entries = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
+            let window = residuals.window(&self.gaussian(code))?;
+            Some(Entry::new(index, window, residuals.height()))
+        })?;
+        let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
+        let work = self.work / work_of(&entries);
         let mut passed = Vec::with_capacity(codes.len());
-        let batches = self.independent_batches(residuals, codes, observer)?;
-        let work = self.work / batches.iter().flatten().map(|&(_, area)| area as f64).sum::<f64>();
-        let most = BLOCKS_PER_POLL * rayon::current_num_threads();
-        for batch in &batches {
-            let mut rest = &batch[..];
-            while !rest.is_empty() {
-                let (part, area) = portion(&mut rest, most);
-                observer.advance(work * area as f64)?;
-                let shared = &*residuals;
-                let chosen: Vec<Option<Candidate>> = part
-                    .par_iter()
-                    .map_init(
-                        || Window::new(shared),
-                        |window, &(index, _)| self.choose(window, codes[index], contexts[index]),
-                    )
-                    .collect();
-                let mut changes = Vec::new();
-                for (&(index, _), choice) in part.iter().zip(chosen) {
-                    let code = choice.map(|choice| choice.code);
-                    if code != Some(codes[index]) {
-                        changes.push((self.gaussian(&codes[index]), -1.0));
-                        changes.extend(code.map(|code| (self.gaussian(&code), 1.0)));
-                    }
-                    passed.extend(
-                        choice.map(|choice| (choice.use_of_bits(), index as u32, choice.code)),
-                    );
+        for round in Round::all(&mut entries) {
+            let tasks = bands_of(residuals, &round);
+            let round_work = work * tasks.iter().map(|task| work_of(task.1)).sum::<f64>();
+            let work = round_work / tasks.len() as f64;
+            let optimized =
+                observer.map_with(work, tasks.into_iter(), |window, (band, entries)| {
+                    self.optimize(window, band, entries, codes, contexts)
+                })?;
+            observer.advance(round_work)?;
+            let mut whole = residuals.whole();
+            for Optimized { found, beyond } in optimized {
+                passed.extend(found);
+                for (gaussian, factor, rows) in beyond {
+                    whole.add(&gaussian, factor, 0..rows.start);
+                    whole.add(&gaussian, factor, rows.end..usize::MAX);
                 }
-                residuals.add(&changes);
             }
         }
-        observer.poll()?;
         passed.par_sort_unstable_by(|(use_of_a, a, _), (use_of_b, b, _)| {
             use_of_b.total_cmp(use_of_a).then(a.cmp(b))
         });
         Ok(passed.into_iter().map(|(.., code)| code).collect())
+    }
+
+    /// Improves or removes Gaussians whose windows are inside of a band.
+    fn optimize(
+        &self,
+        window: &mut Window,
+        mut band: Band<'_>,
+        entries: &[Entry],
+        codes: &[Code],
+        contexts: &[CodeContext<'_>],
+    ) -> Optimized {
+        let mut optimized = Optimized::default();
+        let rows = band.rows();
+        for &Entry { index, .. } in entries {
+            let (code, context) = (codes[index as usize], contexts[index as usize]);
+            let choice = self.choose(window, &band, code, context);
+            let chosen = choice.map(|choice| choice.code);
+            if chosen != Some(code) {
+                for (code, factor) in [(Some(code), -1.0), (chosen, 1.0)] {
+                    let Some(gaussian) = code.map(|code| self.gaussian(&code)) else { continue };
+                    band.add(&gaussian, factor, rows.clone());
+                    let is_inside = band.window(&gaussian).is_none_or(|[_, window]| {
+                        rows.start <= window.start && window.end <= rows.end
+                    });
+                    if !is_inside {
+                        optimized.beyond.push((gaussian, factor, rows.clone()));
+                    }
+                }
+            }
+            let found = choice.map(|choice| (choice.use_of_bits(), index, choice.code));
+            optimized.found.extend(found);
+        }
+        optimized
     }
 
     fn gaussian(&self, code: &Code) -> Gaussian {
@@ -164,62 +196,22 @@ impl CoordinateDescent<'_> {
         lattice.gaussian(code, &lattice.shape(code), grid, self.model)
     }
 
-    /// The indices of all codes in batches, with the areas of their windows in blocks. Within a batch,
-    /// no two windows have a block in common.
-    ///
-    /// Large windows, which overlap many others, come first. Neighbours in the order of the codes
-    /// are mostly neighbours in the picture; windows of about the same size are therefore taken in
-    /// bit-reversed order.
-    fn independent_batches(
-        &self,
-        residuals: &Residuals,
-        codes: &[Code],
-        observer: &mut Observer<'_>,
-    ) -> Result<Vec<Vec<(usize, usize)>>, EncodeError> {
-        let columns = residuals.width().div_ceil(BLOCK);
-        let mut windows = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
-            let blocks = residuals
-                .window(&self.gaussian(code))
-                .map(|sides| sides.map(|side| side.start / BLOCK..side.end.div_ceil(BLOCK)));
-            // Gaussians outside the picture go into the first batch, and will be removed.
-            let [x, y] = blocks.unwrap_or_default();
-            let area = (x.len() * y.len()) as u32;
-            (core::cmp::Reverse(area.checked_ilog2()), (index as u32).reverse_bits(), x, y)
-        })?;
-        windows.par_sort_unstable_by_key(|(area, order, ..)| (*area, *order));
-        let mut next = vec![0; columns * residuals.height().div_ceil(BLOCK)];
-        let mut batches: Vec<Vec<(usize, usize)>> = Vec::new();
-        for (at, (_, order, x, y)) in windows.into_iter().enumerate() {
-            if at.is_multiple_of(PART) {
-                observer.poll()?;
-            }
-            let area = (x.len() * y.len()).max(1);
-            let blocks = y.flat_map(|row| x.clone().map(move |column| row * columns + column));
-            let batch = blocks.clone().map(|block| next[block]).max().unwrap_or(0);
-            blocks.for_each(|block| next[block] = batch + 1);
-            if batch == batches.len() {
-                batches.push(Vec::new());
-            }
-            batches[batch].push((order.reverse_bits() as usize, area));
-        }
-        Ok(batches)
-    }
-
     /// The code of least cost among a code and its candidates; `None` if it costs less to remove
     /// the Gaussian.
     fn choose(
         &self,
-        window: &mut Window<'_>,
+        window: &mut Window,
+        band: &Band<'_>,
         code: Code,
         context: CodeContext<'_>,
     ) -> Option<Candidate> {
         let gaussian = self.gaussian(&code);
-        let gradient = window.without(&gaussian, self.model)?;
+        let gradient = window.without(band, &gaussian, self.model)?;
         let mut best =
             Candidate { code, error: gradient.change.error, bits: self.bits(&code, context) };
         let candidates = self.candidates(&gradient, code, &gaussian, context, self.cost(&best));
         for candidate in candidates.codes() {
-            if let Some(other) = self.evaluated(window, candidate, context)
+            if let Some(other) = self.evaluated(window, band, candidate, context)
                 && self.cost(&other) < self.cost(&best)
             {
                 best = other;
@@ -295,11 +287,12 @@ impl CoordinateDescent<'_> {
     /// window's rendering. `None` if it has no weight in the picture.
     fn evaluated(
         &self,
-        window: &Window<'_>,
+        window: &Window,
+        band: &Band<'_>,
         code: Code,
         context: CodeContext<'_>,
     ) -> Option<Candidate> {
-        let change = window.change(&self.gaussian(&code), self.model);
+        let change = window.change(band, &self.gaussian(&code), self.model);
         if change.squared_weights <= 0.0 {
             return None;
         }
@@ -378,24 +371,31 @@ impl CoordinateDescent<'_> {
     }
 }
 
+/// The bands of a round with their Gaussians; those with most work first, so that all threads are done
+/// at about the same time.
+fn bands_of<'a, 'b>(
+    residuals: &'a mut Residuals,
+    round: &Round<'b>,
+) -> Vec<(Band<'a>, &'b [Entry])> {
+    let [first, height] = round.heights;
+    let mut bands = residuals.bands(first, height).enumerate();
+    let with_entries = round.by_band.iter().map(|&(number, entries)| {
+        let band = bands.find(|&(other, _)| other == number);
+        (band.expect("the picture has all bands").1, entries)
+    });
+    let mut bands: Vec<_> = with_entries.collect();
+    bands.sort_by(|a, b| work_of(b.1).total_cmp(&work_of(a.1)));
+    bands
+}
+
+fn work_of(entries: &[Entry]) -> f64 {
+    entries.iter().map(Entry::work).sum()
+}
+
 /// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time
 /// that a decoder takes, whose work the spec counts in such tiles (section 10).
 pub(super) fn touched_tiles([l11, l21, l22]: [f32; 3]) -> f32 {
     const SIDE: f32 = 8.0;
     let along = |sigma: f32| 2.0 * QUARTIC_RADIUS * sigma / SIDE + 1.0;
     along(l11) * along((l21 * l21 + l22 * l22).sqrt())
-}
-
-/// Takes the first of a batch, whose windows have at least `most` blocks together, or all. Returns them
-/// with the number of these blocks.
-fn portion<'a>(batch: &mut &'a [(usize, usize)], most: usize) -> (&'a [(usize, usize)], usize) {
-    let mut blocks = 0;
-    let mut count = 0;
-    while blocks < most && count < batch.len() {
-        blocks += batch[count].1;
-        count += 1;
-    }
-    let (part, rest) = batch.split_at(count);
-    *batch = rest;
-    (part, blocks)
 }

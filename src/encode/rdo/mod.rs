@@ -10,6 +10,7 @@ mod coordinate_descent;
 mod kernel_weights;
 mod quadratic_model;
 mod residuals;
+mod rounds;
 mod search_work;
 mod step_search;
 mod target_search;

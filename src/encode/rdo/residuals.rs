@@ -16,8 +16,10 @@ use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Rows that one task changes.
-const BAND: usize = 32;
+/// Threads share a window of more pixels.
+const MOST_OF_ONE_TASK: usize = 1 << 13;
+/// Rows of such a window that one task goes through.
+pub(super) const ROWS_PER_TASK: usize = 32;
 /// The margin of a window around its Gaussian, for candidates that are larger or elsewhere: a
 /// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
@@ -160,39 +162,66 @@ impl Residuals {
         (raster.width + LANES) * (by_column + sensitivities)
     }
 
-    pub(crate) fn width(&self) -> usize {
-        self.width
-    }
-
+    /// Number of rows.
     pub(crate) fn height(&self) -> usize {
         self.height
     }
 
-    /// The columns and rows of the window of a Gaussian: the bounding box of where it is visible,
-    /// with a margin. `None` if that is outside the picture.
+    /// The columns and rows of the window of a Gaussian ([`window`]).
     pub(crate) fn window(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
         window(gaussian, [self.width, self.height])
     }
 
-    /// Adds Gaussians to the rendering, each times its factor: 1 to add it, -1 to remove it.
-    pub(crate) fn add(&mut self, gaussians: &[(Gaussian, f32)]) {
-        let (level, stride, channels) = (self.level, self.stride, self.channels);
-        let added = gaussians.iter().filter_map(|(gaussian, factor)| {
-            let [columns, rows] = self.window(gaussian)?;
-            let color = gaussian.color.map(|color| color * factor);
-            Some(Added { weights: KernelWeights::new(gaussian), color, columns, rows })
-        });
-        let added: Vec<Added> = added.collect();
-        // In every band the Gaussians are added in the same order, whichever thread does it.
-        let bands = self.residuals.par_chunks_mut(stride * channels * BAND);
-        bands.enumerate().for_each(|(band, residuals)| {
-            let first = band * BAND;
-            for added in &added {
-                if added.rows.start < first + BAND && first < added.rows.end {
-                    dispatch!(level, simd => added.draw(simd, residuals, first, stride, channels));
-                }
-            }
-        });
+    /// All rows in bands: `first` ones, and then `height` at a time.
+    pub(crate) fn bands(
+        &mut self,
+        first: usize,
+        height: usize,
+    ) -> impl ExactSizeIterator<Item = Band<'_>> {
+        let Self { width, height: all, channels, stride, level, .. } = *self;
+        let sensitivities = &self.sensitivities[..];
+        let line = channels * stride;
+        let (start, rest) = self.residuals.split_at_mut(first.min(all) * line);
+        let others = rest.chunks_mut(height * line);
+        let mut bands = Vec::with_capacity(1 + others.len());
+        let mut row = 0;
+        for residuals in core::iter::once(start).chain(others) {
+            let rows = row..row + residuals.len() / line;
+            row = rows.end;
+            let size = [width, all];
+            bands.push(Band { size, channels, stride, level, rows, residuals, sensitivities });
+        }
+        bands.into_iter()
+    }
+
+    /// All rows in one band.
+    pub(crate) fn whole(&mut self) -> Band<'_> {
+        let height = self.height;
+        self.bands(height, height).next().expect("a picture has rows")
+    }
+}
+
+/// Some rows of the residuals, which can be changed independently of the others.
+#[derive(Debug)]
+pub(crate) struct Band<'a> {
+    /// Width and height of the picture.
+    size: [usize; 2],
+    channels: usize,
+    stride: usize,
+    level: Level,
+    rows: Range<usize>,
+    residuals: &'a mut [i16],
+    sensitivities: &'a [f32],
+}
+
+impl Band<'_> {
+    /// The columns and rows of the window of a Gaussian ([`window`]), whether the band has them or not.
+    pub(crate) fn window(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
+        window(gaussian, self.size)
+    }
+
+    pub(crate) fn rows(&self) -> Range<usize> {
+        self.rows.clone()
     }
 
     pub(crate) fn channels(&self) -> usize {
@@ -203,10 +232,39 @@ impl Residuals {
         self.level
     }
 
+    /// Adds a Gaussian times a factor to the rendering in some of the band's rows.
+    pub(crate) fn add(&mut self, gaussian: &Gaussian, factor: f32, within: Range<usize>) {
+        let Some([columns, rows]) = self.window(gaussian) else { return };
+        let first = rows.start.max(within.start).max(self.rows.start);
+        let end = rows.end.min(within.end).min(self.rows.end);
+        if first >= end {
+            return;
+        }
+        let (level, stride, line) = (self.level, self.stride, self.channels * self.stride);
+        let color = &gaussian.color.map(|color| color * factor)[..self.channels];
+        let weights = KernelWeights::new(gaussian);
+        let residuals = &mut self.residuals[(first - self.rows.start) * line..];
+        let residuals = &mut residuals[..(end - first) * line];
+        let draw = |first: usize, residuals: &mut [i16]| {
+            dispatch!(level, simd => draw(simd, &weights, color, &columns, first, residuals, stride));
+        };
+        if is_shared(&columns, &rows) {
+            let tasks = residuals.par_chunks_mut(ROWS_PER_TASK * line).enumerate();
+            tasks.for_each(|(task, residuals)| draw(first + task * ROWS_PER_TASK, residuals));
+        } else {
+            draw(first, residuals);
+        }
+    }
+
+    #[inline(always)]
+    fn place(&self, x: usize, y: usize, channel: usize) -> usize {
+        ((y - self.rows.start) * self.channels + channel) * self.stride + x
+    }
+
     /// The residuals of the sixteen pixels from (x, y) on, of which the first is inside the picture.
     #[inline(always)]
     pub(crate) fn vector<S: Simd>(&self, simd: S, x: usize, y: usize, channel: usize) -> f32x16<S> {
-        load(simd, &self.residuals[(y * self.channels + channel) * self.stride + x..])
+        load(simd, &self.residuals[self.place(x, y, channel)..])
     }
 
     /// The sensitivities of these pixels; 0 outside the picture.
@@ -218,12 +276,39 @@ impl Residuals {
     }
 }
 
+/// Adds weights times a colour to rows from `first` on.
+#[inline(always)]
+fn draw<S: Simd>(
+    simd: S,
+    weights: &KernelWeights,
+    color: &[f32],
+    columns: &Range<usize>,
+    first: usize,
+    residuals: &mut [i16],
+    stride: usize,
+) {
+    let vectors = columns.len().div_ceil(LANES);
+    for (y, row) in (first..).zip(residuals.chunks_exact_mut(color.len() * stride)) {
+        for vector in weights.span(columns.start, y, vectors) {
+            let x = columns.start + vector * LANES;
+            let weight = weights.at(simd, x, y);
+            for (channel, &color) in color.iter().enumerate() {
+                // The last vector may reach into the padding.
+                let residuals = &mut row[channel * stride + x..];
+                let changed = weight.mul_add_precise(color, load(simd, residuals));
+                store(simd, changed, residuals);
+            }
+        }
+    }
+}
+
 /// Number of different lines of sensitivities.
 fn sensitivity_lines(raster: &Raster) -> usize {
     raster.sensitivity.as_ref().map_or(1, |_| raster.height.div_ceil(BLOCK))
 }
 
-/// The window of a Gaussian in a picture of a width and height.
+/// The columns and rows of the window of a Gaussian in a picture of a width and height: the bounding box
+/// of where it is visible, with a margin. `None` if that is outside the picture.
 pub(super) fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usize>; 2]> {
     let [l11, l21, l22] = gaussian.cholesky;
     let extents = [l11, (l21 * l21 + l22 * l22).sqrt()];
@@ -239,6 +324,11 @@ pub(super) fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usi
         }
     }
     Some(window)
+}
+
+/// Whether threads share a window: nearly no other one is independent of it.
+pub(super) fn is_shared(columns: &Range<usize>, rows: &Range<usize>) -> bool {
+    columns.len() * rows.len() > MOST_OF_ONE_TASK
 }
 
 /// The first sixteen values.
@@ -271,43 +361,6 @@ fn set<S: Simd>(simd: S, rendering: &[f32], samples: SampleLine<'_>, residuals: 
     let sample = samples.load(simd);
     let residual = f32x16::load_array_ref(simd, &padded) - sample * (1.0 / FULL_SCALE);
     store(simd, visible(simd, residual, sample), residuals);
-}
-
-/// A Gaussian that is added to the rendering.
-#[derive(Debug)]
-struct Added {
-    weights: KernelWeights,
-    color: [f32; 4],
-    columns: Range<usize>,
-    rows: Range<usize>,
-}
-
-impl Added {
-    /// Adds it to the rows of a band from `first` on, which have `channels` lines of `stride` samples.
-    #[inline(always)]
-    fn draw<S: Simd>(
-        &self,
-        simd: S,
-        band: &mut [i16],
-        first: usize,
-        stride: usize,
-        channels: usize,
-    ) {
-        let vectors = self.columns.len().div_ceil(LANES);
-        for y in self.rows.start.max(first)..self.rows.end.min(first + BAND) {
-            for vector in self.weights.span(self.columns.start, y, vectors) {
-                let x = self.columns.start + vector * LANES;
-                let weight = self.weights.at(simd, x, y);
-                for channel in 0..channels {
-                    // The last vector may reach into the padding.
-                    let residuals = &mut band[((y - first) * channels + channel) * stride + x..];
-                    let changed =
-                        weight.mul_add_precise(self.color[channel], load(simd, residuals));
-                    store(simd, changed, residuals);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -359,7 +412,7 @@ mod tests {
                 with(here);
                 let stored = residuals.residuals[(y * channels + channel) * residuals.stride + x];
                 let residual = f32::from(stored) / UNIT;
-                let by_pixel = residuals.sensitivities(x, y)[0];
+                let by_pixel = residuals.whole().sensitivities(x, y)[0];
                 let found = f64::from(residual * by_pixel);
                 let rounding = 0.5 / UNIT * by_pixel;
                 assert!(

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, kernel_root};
 use super::quadratic_model::{GeometryChange, GeometryErrorSums};
-use super::residuals::{Residuals, StoredLanes, load, store, window};
+use super::residuals::{Band, ROWS_PER_TASK, StoredLanes, is_shared, load, store, window};
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 use crate::encode::raster::Raster;
@@ -17,31 +17,34 @@ use crate::gaussian::Gaussian;
 /// The residuals of a window of up to so many pixels are kept without the Gaussian. Those of a wider
 /// one would take as much memory as all others, and are computed again.
 const MOST_KEPT: usize = 1 << 15;
-/// Rows of a wider window that one task goes through; nearly no other window is independent of it.
-const ROWS_PER_TASK: usize = 32;
-
 /// The residuals of a rectangle around one Gaussian, without it.
 #[derive(Debug)]
-pub(crate) struct Window<'a> {
-    frame: Frame<'a>,
+pub(crate) struct Window {
+    place: Place,
     without: Without,
     /// As [`MOST_KEPT`].
     most_kept: usize,
 }
 
-/// A rectangle of all residuals.
-#[derive(Clone, Copy, Debug)]
-struct Frame<'a> {
-    all: &'a Residuals,
-    level: Level,
+/// A rectangle of the picture.
+#[derive(Clone, Copy, Debug, Default)]
+struct Place {
     /// First column and row, in pixels.
     corner: [usize; 2],
     /// Number of vectors in a row, and number of rows.
     size: [usize; 2],
 }
 
+/// A rectangle of a band.
+#[derive(Clone, Copy, Debug)]
+struct Frame<'a> {
+    band: &'a Band<'a>,
+    level: Level,
+    place: Place,
+}
+
 /// The residuals without a Gaussian.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Without {
     /// The residuals, if they are kept: row by row, in each row vector by vector, and for each vector
     /// channel by channel.
@@ -96,16 +99,14 @@ pub(crate) struct ErrorGradient {
     pub(crate) sensitivity: f32,
 }
 
-impl<'a> Window<'a> {
+impl Default for Window {
     /// A window that is still empty.
-    pub(crate) fn new(all: &'a Residuals) -> Self {
-        Self {
-            frame: Frame { all, level: all.level(), corner: [0; 2], size: [0; 2] },
-            without: Without { kept: Vec::new(), removed: None },
-            most_kept: MOST_KEPT,
-        }
+    fn default() -> Self {
+        Self { place: Place::default(), without: Without::default(), most_kept: MOST_KEPT }
     }
+}
 
+impl Window {
     /// Size in bytes of what the largest window for some Gaussians keeps.
     pub(crate) fn memory(raster: &Raster, gaussians: &[Gaussian]) -> usize {
         let size = [raster.width, raster.height];
@@ -116,21 +117,24 @@ impl<'a> Window<'a> {
         largest * raster.channels * size_of::<i16>()
     }
 
-    /// Takes a Gaussian out of the rendering in its window. Returns the derivatives of the error by the
-    /// Gaussian before; `None` if its window is outside the picture.
+    /// Takes a Gaussian out of the rendering in its window, all rows of which `band` must have. Returns
+    /// the derivatives of the error by the Gaussian before; `None` if its window is outside the picture.
     pub(crate) fn without(
         &mut self,
+        band: &Band<'_>,
         gaussian: &Gaussian,
         model: ColorModel,
     ) -> Option<ErrorGradient> {
-        let [columns, rows] = self.frame.all.window(gaussian)?;
-        self.frame.corner = [columns.start, rows.start];
-        self.frame.size = [columns.len().div_ceil(LANES), rows.len()];
-        let sums = match self.frame.all.channels() {
-            1 => self.without_of::<1>(gaussian),
-            2 => self.without_of::<2>(gaussian),
-            3 => self.without_of::<3>(gaussian),
-            _ => self.without_of::<4>(gaussian),
+        let [columns, rows] = band.window(gaussian)?;
+        self.place = Place {
+            corner: [columns.start, rows.start],
+            size: [columns.len().div_ceil(LANES), rows.len()],
+        };
+        let sums = match band.channels() {
+            1 => self.without_of::<1>(band, gaussian),
+            2 => self.without_of::<2>(band, gaussian),
+            3 => self.without_of::<3>(band, gaussian),
+            _ => self.without_of::<4>(band, gaussian),
         };
         // Without any weight in the picture, nothing depends on it.
         let sensitivity = if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
@@ -142,58 +146,85 @@ impl<'a> Window<'a> {
     }
 
     /// [`Window::without`] for a number of channels.
-    fn without_of<const CHANNELS: usize>(&mut self, gaussian: &Gaussian) -> GradientSums {
+    fn without_of<const CHANNELS: usize>(
+        &mut self,
+        band: &Band<'_>,
+        gaussian: &Gaussian,
+    ) -> GradientSums {
         let weights = KernelWeights::new(gaussian);
-        let frame = self.frame;
-        let [vectors, rows] = frame.size;
+        let frame = self.frame(band);
+        let [vectors, rows] = self.place.size;
         let is_kept = vectors * rows * LANES <= self.most_kept;
         let Without { kept, removed } = &mut self.without;
         // Old values are overwritten, so that they need not be cleared.
         kept.resize(if is_kept { vectors * rows * CHANNELS } else { 0 }, [0; LANES]);
         *removed = (!is_kept).then_some(Removed { weights, color: gaussian.color });
-        if is_kept {
-            let kept = kept.as_chunks_mut::<CHANNELS>().0;
-            return frame.gradient_of_rows(gaussian, &weights, 0..rows, Some(kept));
+        let kept = kept.as_chunks_mut::<CHANNELS>().0;
+        let of_rows = |(rows, kept)| frame.gradient_of_rows(gaussian, &weights, rows, kept);
+        if !self.place.is_shared() {
+            return of_rows((0..rows, is_kept.then_some(kept)));
         }
-        let of_rows = |rows| frame.gradient_of_rows::<CHANNELS>(gaussian, &weights, rows, None);
-        frame.by_tasks(of_rows).into_iter().fold(GradientSums::default(), GradientSums::plus)
+        let mut kept = kept.chunks_mut(ROWS_PER_TASK * vectors);
+        let tasks: Vec<_> = self.place.tasks().map(|rows| (rows, kept.next())).collect();
+        let sums: Vec<GradientSums> = tasks.into_par_iter().map(of_rows).collect();
+        sums.into_iter().fold(GradientSums::default(), GradientSums::plus)
     }
 
     /// The change of error by a Gaussian that is not part of the rendering.
-    pub(crate) fn change(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
-        let sums = match self.frame.all.channels() {
-            1 => self.change_of::<1>(gaussian),
-            2 => self.change_of::<2>(gaussian),
-            3 => self.change_of::<3>(gaussian),
-            _ => self.change_of::<4>(gaussian),
+    pub(crate) fn change(
+        &self,
+        band: &Band<'_>,
+        gaussian: &Gaussian,
+        model: ColorModel,
+    ) -> ErrorChange {
+        let sums = match band.channels() {
+            1 => self.change_of::<1>(band, gaussian),
+            2 => self.change_of::<2>(band, gaussian),
+            3 => self.change_of::<3>(band, gaussian),
+            _ => self.change_of::<4>(band, gaussian),
         };
         sums.with_absent(gaussian, model)
     }
 
     /// [`Window::change`] for a number of channels.
-    fn change_of<const CHANNELS: usize>(&self, gaussian: &Gaussian) -> ChangeSums {
-        let (frame, without) = (self.frame, &self.without);
+    fn change_of<const CHANNELS: usize>(&self, band: &Band<'_>, gaussian: &Gaussian) -> ChangeSums {
+        let (frame, without) = (self.frame(band), &self.without);
         let weights = KernelWeights::new(gaussian);
         let of_rows = |rows| frame.change_of_rows::<CHANNELS>(&weights, rows, without);
-        if without.removed.is_none() {
-            return of_rows(0..frame.size[1]);
+        if !self.place.is_shared() {
+            return of_rows(0..self.place.size[1]);
         }
-        frame.by_tasks(of_rows).into_iter().fold(ChangeSums::default(), ChangeSums::plus)
+        let tasks: Vec<Range<usize>> = self.place.tasks().collect();
+        let sums: Vec<ChangeSums> = tasks.into_par_iter().map(of_rows).collect();
+        sums.into_iter().fold(ChangeSums::default(), ChangeSums::plus)
+    }
+
+    fn frame<'a>(&self, band: &'a Band<'a>) -> Frame<'a> {
+        Frame { band, level: band.level(), place: self.place }
+    }
+}
+
+impl Place {
+    /// Whether threads share it.
+    fn is_shared(&self) -> bool {
+        let [vectors, rows] = self.size;
+        is_shared(&(0..vectors * LANES), &(0..rows))
+    }
+
+    /// The rows of every task.
+    fn tasks(&self) -> impl Iterator<Item = Range<usize>> {
+        let [_, rows] = self.size;
+        let starts = (0..rows).step_by(ROWS_PER_TASK);
+        starts.map(move |start| start..rows.min(start + ROWS_PER_TASK))
     }
 }
 
 impl Frame<'_> {
-    /// The results for all rows, a part of them at a time.
-    fn by_tasks<T: Send>(&self, of_rows: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
-        let [_, rows] = self.size;
-        let starts = (0..rows).into_par_iter().step_by(ROWS_PER_TASK);
-        starts.map(|start| of_rows(start..rows.min(start + ROWS_PER_TASK))).collect()
-    }
-
     /// The first column of a vector, and its row in the picture.
     #[inline(always)]
-    fn place(&self, row: usize, vector: usize) -> [usize; 2] {
-        [self.corner[0] + vector * LANES, self.corner[1] + row]
+    fn pixel(&self, row: usize, vector: usize) -> [usize; 2] {
+        let [x, y] = self.place.corner;
+        [x + vector * LANES, y + row]
     }
 
     /// The residuals of a vector.
@@ -206,7 +237,7 @@ impl Frame<'_> {
     ) -> [f32x16<S>; CHANNELS] {
         let mut residuals = [f32x16::splat(simd, 0.0); CHANNELS];
         for channel in 0..CHANNELS {
-            residuals[channel] = self.all.vector(simd, x, y, channel);
+            residuals[channel] = self.band.vector(simd, x, y, channel);
         }
         residuals
     }
@@ -254,7 +285,7 @@ impl Frame<'_> {
     }
 
     /// The sums over some rows for the gradient by a Gaussian. The residuals without it are put into
-    /// `kept`, which has those of all rows.
+    /// `kept`, which has those of these rows.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
     fn gradient_sums<S: Simd, const CHANNELS: usize>(
@@ -265,22 +296,22 @@ impl Frame<'_> {
         rows: Range<usize>,
         mut kept: Option<&mut [[StoredLanes; CHANNELS]]>,
     ) -> GradientSums {
-        let [vectors, _] = self.size;
+        let Place { corner: [left, top], size: [vectors, _] } = self.place;
         let zero = f32x16::splat(simd, 0.0);
         let (mut squares, mut products, mut all) = (zero, [zero; CHANNELS], zero);
         let (mut first, mut second) = ([zero; 2], [zero; 3]);
-        for row in rows {
-            let span = weights.span(self.corner[0], self.corner[1] + row, vectors);
+        for row in rows.clone() {
+            let span = weights.span(left, top + row, vectors);
             // Residuals outside of the span are kept, too.
             let visited = if kept.is_some() { 0..vectors } else { span.clone() };
             for vector in visited {
-                let [x, y] = self.place(row, vector);
+                let [x, y] = self.pixel(row, vector);
                 let mut residuals: [_; CHANNELS] = self.residuals(simd, [x, y]);
                 if span.contains(&vector) {
                     let [u, v] = weights.local(simd, x, y);
                     let root = kernel_root(simd, [u, v]);
                     let weight = root * root;
-                    let sensitivity = f32x16::load_array_ref(simd, self.all.sensitivities(x, y));
+                    let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
                     let counted = weight * sensitivity;
                     squares = counted.mul_add_precise(weight, squares);
                     all = weight.mul_add_precise(weight, all);
@@ -301,7 +332,7 @@ impl Frame<'_> {
                     second[2] = by_v.mul_add_precise(v, second[2]);
                 }
                 if let Some(kept) = &mut kept {
-                    let place = &mut kept[row * vectors + vector];
+                    let place = &mut kept[(row - rows.start) * vectors + vector];
                     for channel in 0..CHANNELS {
                         store(simd, residuals[channel], &mut place[channel]);
                     }
@@ -330,15 +361,15 @@ impl Frame<'_> {
         rows: Range<usize>,
         without: &Without,
     ) -> ChangeSums {
-        let [vectors, _] = self.size;
+        let Place { corner: [left, top], size: [vectors, _] } = self.place;
         let places = without.kept.as_chunks::<CHANNELS>().0;
         let zero = f32x16::splat(simd, 0.0);
         let (mut squares, mut products) = (zero, [zero; CHANNELS]);
         for row in rows {
-            for vector in weights.span(self.corner[0], self.corner[1] + row, vectors) {
-                let [x, y] = self.place(row, vector);
+            for vector in weights.span(left, top + row, vectors) {
+                let [x, y] = self.pixel(row, vector);
                 let weight = weights.at(simd, x, y);
-                let sensitivity = f32x16::load_array_ref(simd, self.all.sensitivities(x, y));
+                let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
                 let counted = weight * sensitivity;
                 squares = counted.mul_add_precise(weight, squares);
                 let residuals: [_; CHANNELS] = match &without.removed {
