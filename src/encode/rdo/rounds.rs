@@ -16,7 +16,7 @@ const LEAST_HEIGHT: usize = 32;
 /// Nanoseconds of work for a pixel of a window, and for a window.
 const WORK: (f64, f64) = (0.7, 2000.0);
 /// The work that a thread does at a time, so that the caller is asked often enough whether to go on.
-const MOST_WORK: f64 = 1.5e7;
+const MOST_WORK: f64 = 4e6;
 
 /// The height of the bands for windows of so many rows, in a picture of so many. There are two to the
 /// power of something: threads have about the same to do then.

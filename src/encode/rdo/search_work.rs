@@ -42,6 +42,11 @@ impl SearchWork {
         self.one_try() + self.workload.verification()
     }
 
+    /// One more pass after `done` ones, and all after it.
+    pub(super) fn one_more_pass(&self, done: u32) -> f64 {
+        self.pass(done) + self.comparison() + self.workload.verification()
+    }
+
     /// A pass after `done` ones.
     pub(super) fn pass(&self, done: u32) -> f64 {
         self.workload.descent(done + 1, 1)

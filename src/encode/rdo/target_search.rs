@@ -34,7 +34,7 @@ const MOST_LAMBDA_CHANGE: f64 = 1.0;
 /// Most passes of coordinate descent until a target is met.
 const MOST_PASSES: u32 = 12;
 /// Up to this pass, the step may change.
-const MOST_ROUNDED_PASSES: u32 = 4;
+const MOST_ROUNDED_PASSES: u32 = 10;
 /// Refinements of the step, one after the other, where the search does not reach the PSNR; base-2
 /// logarithms.
 const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
@@ -181,6 +181,9 @@ impl<'a> TargetSearch<'a> {
                     deviation,
                     expected - aim.change_by_lambda(lambda) - by_step,
                 ));
+            }
+            if pass >= self.work.passes {
+                observer.expect(self.work.one_more_pass(pass));
             }
             let mut coded = optimized.coded;
             if is_within_lambda {
