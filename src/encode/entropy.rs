@@ -59,8 +59,8 @@ pub(crate) fn finish(
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
-    // Gaussians and their rendering; codes in three orders, with what they are chosen by.
-    let by_gaussian = 2 * size_of::<Gaussian>() + 4 * size_of::<Code>() + size_of::<[u64; 4]>();
+    // Gaussians and their rendering; codes before a pass and after it, with what they are chosen by.
+    let by_gaussian = 2 * size_of::<Gaussian>() + 3 * size_of::<Code>() + size_of::<[u64; 4]>();
     let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
     let residuals = raster.memory() + Residuals::memory(raster);
     let window = Window::memory(raster, &gaussians);

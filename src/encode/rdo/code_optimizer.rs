@@ -39,6 +39,13 @@ pub(super) struct Optimized {
     pub(super) by_use: Vec<Code>,
 }
 
+impl Optimized {
+    /// The codes as they are in a file, without the memory of the others.
+    pub(super) fn into_coded(self) -> CodedLayers {
+        self.coded
+    }
+}
+
 /// Rounds Gaussians to a lattice and optimizes their codes, for the file of one picture.
 #[derive(Debug)]
 pub(super) struct CodeOptimizer<'a> {
@@ -138,6 +145,9 @@ impl<'a> CodeOptimizer<'a> {
         let descent =
             CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda, work };
         let by_use = descent.pass(&mut self.residuals, &codes, &contexts, observer)?;
+        // Coding needs memory of its own.
+        drop((contexts, codes));
+        drop(layers);
         let codes = LatticeCodes { lattice, codes: by_use.clone() };
         Ok(Optimized { coded: self.layout.coded(codes, observer)?, by_use })
     }

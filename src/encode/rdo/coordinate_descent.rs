@@ -69,7 +69,7 @@ impl Candidate {
 
 /// What became of the Gaussians of a band.
 #[derive(Debug, Default)]
-struct Optimized {
+struct PassedBand {
     /// Those that are left: the use of their bits, their indices, and their codes.
     found: Vec<(f32, u32, Code)>,
     /// Gaussians that reach beyond the band and are added to the rendering, each times a factor, and the
@@ -138,13 +138,13 @@ impl CoordinateDescent<'_> {
             let tasks = bands_of(residuals, &round);
             let round_work = work * tasks.iter().map(|task| work_of(task.1)).sum::<f64>();
             let work = round_work / tasks.len() as f64;
-            let optimized =
+            let passed_bands =
                 observer.map_with(work, tasks.into_iter(), |window, (band, entries)| {
                     self.optimize(window, band, entries, codes, contexts)
                 })?;
             observer.advance(round_work)?;
             let mut whole = residuals.whole();
-            for Optimized { found, beyond } in optimized {
+            for PassedBand { found, beyond } in passed_bands {
                 passed.extend(found);
                 for (gaussian, factor, rows) in beyond {
                     whole.add(&gaussian, factor, 0..rows.start);
@@ -166,8 +166,8 @@ impl CoordinateDescent<'_> {
         entries: &[Entry],
         codes: &[Code],
         contexts: &[CodeContext<'_>],
-    ) -> Optimized {
-        let mut optimized = Optimized::default();
+    ) -> PassedBand {
+        let mut of_band = PassedBand::default();
         let rows = band.rows();
         for &Entry { index, .. } in entries {
             let (code, context) = (codes[index as usize], contexts[index as usize]);
@@ -181,14 +181,14 @@ impl CoordinateDescent<'_> {
                         rows.start <= window.start && window.end <= rows.end
                     });
                     if !is_inside {
-                        optimized.beyond.push((gaussian, factor, rows.clone()));
+                        of_band.beyond.push((gaussian, factor, rows.clone()));
                     }
                 }
             }
             let found = choice.map(|choice| (choice.use_of_bits(), index, choice.code));
-            optimized.found.extend(found);
+            of_band.found.extend(found);
         }
-        optimized
+        of_band
     }
 
     fn gaussian(&self, code: &Code) -> Gaussian {

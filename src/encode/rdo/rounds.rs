@@ -18,8 +18,8 @@ const WORK: (f64, f64) = (0.7, 2000.0);
 /// The work that a thread does at a time, so that the caller is asked often enough whether to go on.
 const MOST_WORK: f64 = 4e6;
 
-/// The height of the bands for windows of so many rows, in a picture of so many. There are two to the
-/// power of something: threads have about the same to do then.
+/// The height of the bands for windows of so many rows, in a picture of so many. Their number is a
+/// power of two, so that threads have about the same to do.
 fn band_height(rows: usize, of_picture: usize) -> usize {
     let most = of_picture / rows.max(LEAST_HEIGHT / 2) / 2;
     of_picture.div_ceil(1 << most.checked_ilog2().unwrap_or(0))
@@ -44,12 +44,11 @@ impl Entry {
     pub(super) fn new(index: usize, [columns, rows]: [Range<usize>; 2], of_picture: usize) -> Self {
         let height = band_height(rows.len(), of_picture);
         let last = rows.end - 1;
-        let is_shifted = rows.start / height != last / height;
-        let band = if is_shifted { (last + height / 2) / height } else { last / height };
         Self {
             height: Reverse(height as u32),
-            is_shifted,
-            band: band as u32,
+            is_shifted: rows.start / height != last / height,
+            // Also of the shifted ones: that has the border, which is the first row of the band that is not.
+            band: (last / height) as u32,
             area_class: Reverse((columns.len() * rows.len()).ilog2()),
             index: index as u32,
         }

@@ -185,7 +185,7 @@ impl<'a> TargetSearch<'a> {
             if pass >= self.work.passes {
                 observer.expect(self.work.one_more_pass(pass));
             }
-            let mut coded = optimized.coded;
+            let mut coded = optimized.into_coded();
             if is_within_lambda {
                 let change = aim.lambda_against(aim.beyond(expected));
                 lambda = (lambda + change.clamp(-0.7, 0.7))
@@ -245,7 +245,7 @@ impl<'a> TargetSearch<'a> {
         let mut optimized = self.codes.descend(rounded, 0.0, self.work.pass(0), observer)?;
         for pass in 1..passes {
             let work = self.work.pass(pass);
-            optimized = self.codes.descend(optimized.coded, 0.0, work, observer)?;
+            optimized = self.codes.descend(optimized.into_coded(), 0.0, work, observer)?;
         }
         Ok(optimized)
     }
