@@ -7,8 +7,8 @@ use core::ops::Range;
 use rayon::prelude::*;
 
 use super::quadratic_model::GeometryChange;
-use super::residuals::{Band, Residuals};
-use super::rounds::{Entry, Round};
+use super::residuals::{Band, Residuals, window};
+use super::rounds::{BandEntries, Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_CLASS, SymbolCosts};
 use crate::color::ColorModel;
@@ -127,20 +127,22 @@ impl CoordinateDescent<'_> {
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Code>, EncodeError> {
         // Gaussians outside the picture are not among them, and thereby removed.
+        let size = residuals.size();
         let entries = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
-            let window = residuals.window(&self.gaussian(code))?;
-            Some(Entry::new(index, window, residuals.height()))
+            let window = window(&self.gaussian(code), size)?;
+            Some(Entry::new(index, window, size[1]))
         })?;
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
-        let work = self.work / work_of(&entries);
+        let rounds = Round::all(&mut entries);
+        let work = self.work / rounds.iter().map(Round::work).sum::<f64>();
         let mut passed = Vec::with_capacity(codes.len());
-        for round in Round::all(&mut entries) {
-            let tasks = bands_of(residuals, &round);
-            let round_work = work * tasks.iter().map(|task| work_of(task.1)).sum::<f64>();
+        for round in &rounds {
+            let round_work = work * round.work();
+            let tasks = bands_of(residuals, round);
             let work = round_work / tasks.len() as f64;
             let passed_bands =
-                observer.map_with(work, tasks.into_iter(), |window, (band, entries)| {
-                    self.optimize(window, band, entries, codes, contexts)
+                observer.map_with(work, tasks.into_iter(), |window, (band, of_band)| {
+                    self.optimize(window, band, of_band.entries, codes, contexts)
                 })?;
             observer.advance(round_work)?;
             let mut whole = residuals.whole();
@@ -376,20 +378,16 @@ impl CoordinateDescent<'_> {
 fn bands_of<'a, 'b>(
     residuals: &'a mut Residuals,
     round: &Round<'b>,
-) -> Vec<(Band<'a>, &'b [Entry])> {
+) -> Vec<(Band<'a>, BandEntries<'b>)> {
     let [first, height] = round.heights;
     let mut bands = residuals.bands(first, height).enumerate();
-    let with_entries = round.by_band.iter().map(|&(number, entries)| {
-        let band = bands.find(|&(other, _)| other == number);
-        (band.expect("the picture has all bands").1, entries)
+    let with_entries = round.bands.iter().map(|&of_band| {
+        let band = bands.find(|&(number, _)| number == of_band.band);
+        (band.expect("the picture has all bands").1, of_band)
     });
     let mut bands: Vec<_> = with_entries.collect();
-    bands.sort_by(|a, b| work_of(b.1).total_cmp(&work_of(a.1)));
+    bands.sort_by(|(_, a), (_, b)| b.work.total_cmp(&a.work));
     bands
-}
-
-fn work_of(entries: &[Entry]) -> f64 {
-    entries.iter().map(Entry::work).sum()
 }
 
 /// About how many tiles of 8 x 8 pixels the bounding box of a Gaussian touches: a model of the time

@@ -162,36 +162,23 @@ impl Residuals {
         (raster.width + LANES) * (by_column + sensitivities)
     }
 
-    /// Number of rows.
-    pub(crate) fn height(&self) -> usize {
-        self.height
-    }
-
-    /// The columns and rows of the window of a Gaussian ([`window`]).
-    pub(crate) fn window(&self, gaussian: &Gaussian) -> Option<[Range<usize>; 2]> {
-        window(gaussian, [self.width, self.height])
+    /// Width and height of the picture.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
     }
 
     /// All rows in bands: `first` ones, and then `height` at a time.
-    pub(crate) fn bands(
-        &mut self,
-        first: usize,
-        height: usize,
-    ) -> impl ExactSizeIterator<Item = Band<'_>> {
-        let Self { width, height: all, channels, stride, level, .. } = *self;
+    pub(crate) fn bands(&mut self, first: usize, height: usize) -> impl Iterator<Item = Band<'_>> {
+        let (size, channels, stride, level) = (self.size(), self.channels, self.stride, self.level);
         let sensitivities = &self.sensitivities[..];
         let line = channels * stride;
-        let (start, rest) = self.residuals.split_at_mut(first.min(all) * line);
-        let others = rest.chunks_mut(height * line);
-        let mut bands = Vec::with_capacity(1 + others.len());
+        let (start, rest) = self.residuals.split_at_mut(first.min(size[1]) * line);
         let mut row = 0;
-        for residuals in core::iter::once(start).chain(others) {
+        core::iter::once(start).chain(rest.chunks_mut(height * line)).map(move |residuals| {
             let rows = row..row + residuals.len() / line;
             row = rows.end;
-            let size = [width, all];
-            bands.push(Band { size, channels, stride, level, rows, residuals, sensitivities });
-        }
-        bands.into_iter()
+            Band { size, channels, stride, level, rows, residuals, sensitivities }
+        })
     }
 
     /// All rows in one band.
@@ -248,7 +235,7 @@ impl Band<'_> {
         let draw = |first: usize, residuals: &mut [i16]| {
             dispatch!(level, simd => draw(simd, &weights, color, &columns, first, residuals, stride));
         };
-        if is_shared(&columns, &rows) {
+        if is_shared(columns.len() * rows.len()) {
             let tasks = residuals.par_chunks_mut(ROWS_PER_TASK * line).enumerate();
             tasks.for_each(|(task, residuals)| draw(first + task * ROWS_PER_TASK, residuals));
         } else {
@@ -326,9 +313,9 @@ pub(super) fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usi
     Some(window)
 }
 
-/// Whether threads share a window: nearly no other one is independent of it.
-pub(super) fn is_shared(columns: &Range<usize>, rows: &Range<usize>) -> bool {
-    columns.len() * rows.len() > MOST_OF_ONE_TASK
+/// Whether threads share a window of so many pixels: nearly no other one is independent of it.
+pub(super) fn is_shared(pixels: usize) -> bool {
+    pixels > MOST_OF_ONE_TASK
 }
 
 /// The first sixteen values.

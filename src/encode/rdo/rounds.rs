@@ -55,7 +55,7 @@ impl Entry {
     }
 
     /// About how many nanoseconds it takes.
-    pub(super) fn work(&self) -> f64 {
+    fn work(&self) -> f64 {
         WORK.0 * f64::from(self.area_class.0).exp2() + WORK.1
     }
 }
@@ -65,8 +65,18 @@ impl Entry {
 pub(super) struct Round<'a> {
     /// The heights of the first band of the picture and of the others.
     pub(super) heights: [usize; 2],
-    /// Numbers of bands, and Gaussians of each.
-    pub(super) by_band: Vec<(usize, &'a [Entry])>,
+    /// The bands that have some, in order.
+    pub(super) bands: Vec<BandEntries<'a>>,
+}
+
+/// The Gaussians of a band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BandEntries<'a> {
+    /// The number of the band.
+    pub(super) band: usize,
+    pub(super) entries: &'a [Entry],
+    /// About how many nanoseconds they take.
+    pub(super) work: f64,
 }
 
 impl<'a> Round<'a> {
@@ -88,7 +98,7 @@ impl<'a> Round<'a> {
     fn first_of(rest: &mut Vec<&'a [Entry]>) -> Self {
         let Entry { height: Reverse(height), is_shifted, .. } = rest[0][0];
         let height = height as usize;
-        let mut by_band = Vec::with_capacity(rest.len());
+        let mut bands = Vec::with_capacity(rest.len());
         for entries in &mut *rest {
             let mut work = 0.0;
             let is_enough = |entry: &Entry| {
@@ -97,11 +107,16 @@ impl<'a> Round<'a> {
             };
             let count = entries.iter().position(is_enough).map_or(entries.len(), |last| last + 1);
             let (first, others) = entries.split_at(count);
-            by_band.push((first[0].band as usize, first));
+            bands.push(BandEntries { band: first[0].band as usize, entries: first, work });
             *entries = others;
         }
         rest.retain(|entries| !entries.is_empty());
-        Self { heights: [if is_shifted { height / 2 } else { height }, height], by_band }
+        Self { heights: [if is_shifted { height / 2 } else { height }, height], bands }
+    }
+
+    /// About how many nanoseconds it takes one thread.
+    pub(super) fn work(&self) -> f64 {
+        self.bands.iter().map(|of_band| of_band.work).sum()
     }
 }
 
@@ -131,8 +146,8 @@ mod tests {
             let mut entries: Vec<Entry> = entries.collect();
             let mut found = vec![0; windows.len()];
             for round in Round::all(&mut entries) {
-                assert!(round.by_band.is_sorted_by(|(a, _), (b, _)| a < b));
-                for &(band, of_band) in &round.by_band {
+                assert!(round.bands.is_sorted_by(|a, b| a.band < b.band));
+                for &BandEntries { band, entries: of_band, .. } in &round.bands {
                     let rows = rows(&round, band, of_picture);
                     let work: f64 = of_band[1..].iter().map(Entry::work).sum();
                     assert!(work < MOST_WORK);
@@ -159,7 +174,7 @@ mod tests {
         let rounds = Round::all(&mut entries);
         let order: Vec<u32> = rounds
             .iter()
-            .flat_map(|round| round.by_band.iter().flat_map(|(_, entries)| *entries))
+            .flat_map(|round| round.bands.iter().flat_map(|of_band| of_band.entries))
             .map(|entry| entry.index)
             .collect();
         assert_eq!(order, [1, 3, 2, 0, 4]);

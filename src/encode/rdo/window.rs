@@ -3,7 +3,7 @@
 
 use core::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, kernel_root};
@@ -17,6 +17,7 @@ use crate::gaussian::Gaussian;
 /// The residuals of a window of up to so many pixels are kept without the Gaussian. Those of a wider
 /// one would take as much memory as all others, and are computed again.
 const MOST_KEPT: usize = 1 << 15;
+
 /// The residuals of a rectangle around one Gaussian, without it.
 #[derive(Debug)]
 pub(crate) struct Window {
@@ -39,7 +40,6 @@ struct Place {
 #[derive(Clone, Copy, Debug)]
 struct Frame<'a> {
     band: &'a Band<'a>,
-    level: Level,
     place: Place,
 }
 
@@ -200,7 +200,7 @@ impl Window {
     }
 
     fn frame<'a>(&self, band: &'a Band<'a>) -> Frame<'a> {
-        Frame { band, level: band.level(), place: self.place }
+        Frame { band, place: self.place }
     }
 }
 
@@ -208,7 +208,7 @@ impl Place {
     /// Whether threads share it.
     fn is_shared(&self) -> bool {
         let [vectors, rows] = self.size;
-        is_shared(&(0..vectors * LANES), &(0..rows))
+        is_shared(vectors * rows * LANES)
     }
 
     /// The rows of every task.
@@ -269,7 +269,7 @@ impl Frame<'_> {
         rows: Range<usize>,
         kept: Option<&mut [[StoredLanes; CHANNELS]]>,
     ) -> GradientSums {
-        dispatch!(self.level, simd => self.gradient_sums(simd, gaussian, weights, rows, kept))
+        dispatch!(self.band.level(), simd => self.gradient_sums(simd, gaussian, weights, rows, kept))
     }
 
     /// [`Frame::change_sums`], compiled once for all that call it.
@@ -280,7 +280,7 @@ impl Frame<'_> {
         rows: Range<usize>,
         without: &Without,
     ) -> ChangeSums {
-        dispatch!(self.level, simd =>
+        dispatch!(self.band.level(), simd =>
             self.change_sums::<_, CHANNELS>(simd, weights, rows, without))
     }
 
