@@ -47,7 +47,7 @@ pub(crate) struct Batch {
     /// each job].
     ///
     /// A picture that would exceed them waits, and one that is larger by itself is worked on alone.
-    /// Encoding takes about 10 bytes per pixel of gray with 8 bits, 24 of RGB, and 40 of RGB with
+    /// Encoding takes about 16 bytes per pixel of gray with 8 bits, 22 of RGB, and 32 of RGB with
     /// alpha and 16 bits.
     #[arg(long, value_name = "MP", value_parser = |text: &str| number(text, 0.001, 1e6))]
     pub(crate) budget: Option<f64>,
@@ -60,13 +60,13 @@ pub(crate) struct Batch {
     /// Write a line of JSON for every file to FILE, or to standard output if it is `-`.
     ///
     /// Fields: input, output, status ("written", "skipped" or "failed"), input_bytes, width, height,
-    /// bytes, gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of SSIMULACRA2), seconds
-    /// (from reading to the encoded result), shortfall (null, or why the target was not met), error
-    /// (null, or why it failed). What is unknown or does not apply is null. Lines are written as
-    /// files are finished, which is not the order of the inputs. An existing FILE is replaced. With
-    /// --resume, lines of files that are skipped are kept, and so are those of files that this run
-    /// does not know; an incomplete last line is dropped. So there is one line per file. If a file is
-    /// skipped that has no line, it gets one with what its result tells.
+    /// bytes, gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of
+    /// SSIMULACRA2), seconds (from reading to the encoded result), shortfall (null, or why the target
+    /// was not met), error (null, or why it failed). What is unknown or does not apply is null. Lines
+    /// are written as files are finished, which is not the order of the inputs. An existing FILE is
+    /// replaced. With --resume, lines of files that are skipped are kept, and so are those of files
+    /// that this run does not know; an incomplete last line is dropped. So there is one line per
+    /// file. If a file is skipped that has no line, it gets one with what its result tells.
     #[arg(long, value_name = "FILE")]
     pub(crate) manifest: Option<PathBuf>,
     /// Decode .gip files; of a folder, only these are taken.
