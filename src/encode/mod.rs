@@ -11,6 +11,7 @@ mod error;
 mod file;
 mod fit;
 mod job;
+mod mul_add;
 mod options;
 mod packed;
 mod pipeline;

@@ -8,6 +8,7 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
+use crate::encode::mul_add::MulAdd;
 use crate::encode::raster::{
     FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers, visible,
 };
@@ -57,7 +58,7 @@ impl TrainingKernel for simd_kernel::Exponential {
 
     #[inline(always)]
     fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let weight = self.at(simd, v.mul_add_precise(v, column));
+        let weight = self.at(simd, v.fused_mul_add(v, column));
         (weight, weight)
     }
 
@@ -73,12 +74,12 @@ impl TrainingKernel for simd_kernel::Quartic {
 
     #[inline(always)]
     fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S> {
-        (-u).mul_add_precise(u, f32x16::splat(simd, 1.0))
+        (-u).fused_mul_add(u, f32x16::splat(simd, 1.0))
     }
 
     #[inline(always)]
     fn forward<S: Simd>(self, _: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let root = (-v).mul_add_precise(v, column).max(0.0);
+        let root = (-v).fused_mul_add(v, column).max(0.0);
         (root, root * root)
     }
 
@@ -235,7 +236,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 kept.store_array(&mut state.0[row]);
                 for channel in 0..CHANNELS {
                     let sum = &mut rendering[channel][row];
-                    *sum = weight.mul_add_precise(splat.color[channel], *sum);
+                    *sum = weight.fused_mul_add(splat.color[channel], *sum);
                 }
                 v += rise;
             }
@@ -280,14 +281,14 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 let mut along = zero;
                 for channel in 0..CHANNELS {
                     let residual = residuals[channel][row];
-                    by_color[channel] = residual.mul_add_precise(weight, by_color[channel]);
-                    along = residual.mul_add_precise(splat.color[channel], along);
+                    by_color[channel] = residual.fused_mul_add(weight, by_color[channel]);
+                    along = residual.fused_mul_add(splat.color[channel], along);
                 }
                 let s = along * slope;
                 let y = row as f32;
                 s0 += s;
-                s1 = s.mul_add_precise(y, s1);
-                s2 = s.mul_add_precise(y * y, s2);
+                s1 = s.fused_mul_add(y, s1);
+                s2 = s.fused_mul_add(y * y, s2);
             }
             // From the distance to the first row to that from the centre.
             let dy = top - splat.y;
@@ -328,7 +329,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 let residual = visible(simd, (value - target) * inside, sample);
                 residual.store_array(&mut planes[channel][row]);
                 let clamped = (value.max(zero).min(one) - target) * inside;
-                total = clamped.mul_add_precise(clamped, total);
+                total = clamped.fused_mul_add(clamped, total);
             }
         }
         total.to_array().iter().map(|&squared| f64::from(squared)).sum()

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::kernel_weights::{KernelWeights, LANES, Lanes};
 use crate::encode::distortion::differentiate;
 use crate::encode::error::EncodeError;
+use crate::encode::mul_add::MulAdd;
 use crate::encode::progress::Observer;
 use crate::encode::raster::{FULL_SCALE, Raster, SampleLine, TILE_WIDTH, visible};
 use crate::encode::sensitivity::{BLOCK, Sensitivity};
@@ -282,7 +283,7 @@ fn draw<S: Simd>(
             for (channel, &color) in color.iter().enumerate() {
                 // The last vector may reach into the padding.
                 let residuals = &mut row[channel * stride + x..];
-                let changed = weight.mul_add_precise(color, load(simd, residuals));
+                let changed = weight.fused_mul_add(color, load(simd, residuals));
                 store(simd, changed, residuals);
             }
         }

@@ -11,6 +11,7 @@ use super::quadratic_model::{GeometryChange, GeometryErrorSums};
 use super::residuals::{Band, ROWS_PER_TASK, StoredLanes, is_shared, load, store, window};
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
+use crate::encode::mul_add::MulAdd;
 use crate::encode::raster::Raster;
 use crate::gaussian::Gaussian;
 
@@ -255,7 +256,7 @@ impl Frame<'_> {
         let weight = removed.weights.at(simd, x, y);
         for channel in 0..CHANNELS {
             let color = removed.color[channel];
-            residuals[channel] = weight.mul_add_precise(-color, residuals[channel]);
+            residuals[channel] = weight.fused_mul_add(-color, residuals[channel]);
         }
         residuals
     }
@@ -313,23 +314,23 @@ impl Frame<'_> {
                     let weight = root * root;
                     let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
                     let counted = weight * sensitivity;
-                    squares = counted.mul_add_precise(weight, squares);
-                    all = weight.mul_add_precise(weight, all);
+                    squares = counted.fused_mul_add(weight, squares);
+                    all = weight.fused_mul_add(weight, all);
                     let mut along = zero;
                     for channel in 0..CHANNELS {
                         let (residual, color) = (residuals[channel], gaussian.color[channel]);
-                        products[channel] = counted.mul_add_precise(residual, products[channel]);
-                        along = residual.mul_add_precise(color, along);
-                        residuals[channel] = weight.mul_add_precise(-color, residual);
+                        products[channel] = counted.fused_mul_add(residual, products[channel]);
+                        along = residual.fused_mul_add(color, along);
+                        residuals[channel] = weight.fused_mul_add(-color, residual);
                     }
                     // dweight/dq = -root / 2, and q = u^2 + v^2.
                     let slope = along * sensitivity * root;
                     let (by_u, by_v) = (slope * u, slope * v);
                     first[0] += by_u;
                     first[1] += by_v;
-                    second[0] = by_u.mul_add_precise(u, second[0]);
-                    second[1] = by_u.mul_add_precise(v, second[1]);
-                    second[2] = by_v.mul_add_precise(v, second[2]);
+                    second[0] = by_u.fused_mul_add(u, second[0]);
+                    second[1] = by_u.fused_mul_add(v, second[1]);
+                    second[2] = by_v.fused_mul_add(v, second[2]);
                 }
                 if let Some(kept) = &mut kept {
                     let place = &mut kept[(row - rows.start) * vectors + vector];
@@ -371,7 +372,7 @@ impl Frame<'_> {
                 let weight = weights.at(simd, x, y);
                 let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
                 let counted = weight * sensitivity;
-                squares = counted.mul_add_precise(weight, squares);
+                squares = counted.fused_mul_add(weight, squares);
                 let residuals: [_; CHANNELS] = match &without.removed {
                     Some(removed) => self.residuals_without(simd, [x, y], removed),
                     None => {
@@ -385,7 +386,7 @@ impl Frame<'_> {
                 };
                 for channel in 0..CHANNELS {
                     products[channel] =
-                        counted.mul_add_precise(residuals[channel], products[channel]);
+                        counted.fused_mul_add(residuals[channel], products[channel]);
                 }
             }
         }

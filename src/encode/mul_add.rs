@@ -1,0 +1,44 @@
+//! Multiplication and addition with a single rounding, so that all machines get the same bits.
+
+use fearless_simd::{Simd, SimdInto, f32x16, prelude::*};
+
+/// [`MulAdd::fused_mul_add`] for vectors.
+pub(crate) trait MulAdd<S: Simd>: Sized {
+    /// `self` times `factor`, plus `summand`, rounded once.
+    ///
+    /// x86 before 2013 has no instruction for it. What emulates it there is long, and called: inlined, it
+    /// would be nearly all of the encoder's code.
+    fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: impl SimdInto<Self, S>)
+    -> Self;
+}
+
+impl<S: Simd> MulAdd<S> for f32x16<S> {
+    #[inline(always)]
+    fn fused_mul_add(
+        self,
+        factor: impl SimdInto<Self, S>,
+        summand: impl SimdInto<Self, S>,
+    ) -> Self {
+        let simd = self.simd;
+        let (factor, summand) = (factor.simd_into(simd), summand.simd_into(simd));
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        if simd.level().as_avx2().is_none() {
+            return emulated(simd, self, factor, summand);
+        }
+        self.mul_add_precise(factor, summand)
+    }
+}
+
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+#[inline(never)]
+fn emulated<S: Simd>(
+    simd: S,
+    value: f32x16<S>,
+    factor: f32x16<S>,
+    summand: f32x16<S>,
+) -> f32x16<S> {
+    simd.vectorize(
+        #[inline(always)]
+        || value.mul_add_precise(factor, summand),
+    )
+}
