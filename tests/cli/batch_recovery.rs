@@ -1,9 +1,6 @@
 //! `gip batch` that is interrupted, and `--resume`: whatever happens to a run, there are no
 //! half-written files, and the next one ends with the same files as one that is not disturbed.
 
-mod pictures;
-mod room;
-
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::Read;
@@ -11,8 +8,10 @@ use std::process::Output;
 use std::time::{Duration, SystemTime};
 
 use image::ColorType;
-use room::{Room, by_input, text};
 use serde_json::Value;
+
+use super::pictures;
+use super::room::{Room, by_input, text};
 
 /// Options that make files of some 2,000 bytes quickly.
 const QUICK: [&str; 6] = ["--effort", "1", "--gaussians", "50", "--precision", "f32"];

@@ -1,24 +1,19 @@
 //! The command line, from outside: files, streams, JSON, exit status.
 
-mod common;
-mod pictures;
-mod room;
-
 use std::fs;
 use std::path::Path;
 
-use common::layered;
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
 use image_gip::Region;
-use room::{Room, text};
 use serde_json::Value;
+
+use super::common::layered;
+use super::room::{Room, text};
+use super::{EXIF_ROTATE_90, pictures};
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 36;
-
-/// An Exif block with one entry, the orientation "rotate by 90 degrees".
-const EXIF_ROTATE_90: &[u8] = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
 impl Room {
     /// Saves a test picture as `name`.

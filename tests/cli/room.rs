@@ -1,7 +1,5 @@
 //! A directory in which a test runs the tool.
 
-#![allow(dead_code, reason = "every test binary uses a part of this")]
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;

@@ -1,22 +1,18 @@
 //! `gip batch` that runs to its end: names, order, formats, conflicts, bad pictures, the manifest.
 
-mod common;
-mod pictures;
-mod room;
-
 use std::fs;
 
-use common::layered;
 use image::{ColorType, ImageEncoder, ImageReader};
 use image_gip::{Encoder, GipEncoder, Target};
-use room::{Room, by_input};
 use serde_json::Value;
+
+use super::common::layered;
+use super::room::{Room, by_input};
+use super::{EXIF_ROTATE_90, pictures};
 
 const SIZE: (u32, u32) = (48, 32);
 /// Quick options of the encoder.
 const QUICK: [&str; 4] = ["--effort", "1", "--gaussians", "20"];
-/// An Exif block with one entry, the orientation "rotate by 90 degrees".
-const EXIF_ROTATE_90: &[u8] = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
 /// A folder `in` with four pictures.
 fn room_with_pictures() -> Room {
