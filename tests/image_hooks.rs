@@ -15,12 +15,10 @@ use image_gip::{
     ColorModel, Decoder, Encoder, GipDecoder, GipEncoder, Limits, RenderOptions, SampleDepth,
     Target,
 };
+use pictures::EXIF_ROTATE_90;
 
 const WIDTH: u32 = 37;
 const HEIGHT: u32 = 29;
-
-/// An Exif block with one entry, the orientation "rotate by 90 degrees".
-const EXIF_ROTATE_90: &[u8] = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
 /// The shared picture at the size of these tests.
 fn picture(color: ColorType) -> DynamicImage {

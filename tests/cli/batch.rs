@@ -7,8 +7,8 @@ use image_gip::{Encoder, GipEncoder, Target};
 use serde_json::Value;
 
 use super::common::layered;
+use super::pictures::{self, EXIF_ROTATE_90};
 use super::room::{Room, by_input};
-use super::{EXIF_ROTATE_90, pictures};
 
 const SIZE: (u32, u32) = (48, 32);
 /// Quick options of the encoder.

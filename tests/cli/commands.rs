@@ -9,8 +9,8 @@ use image_gip::Region;
 use serde_json::Value;
 
 use super::common::layered;
+use super::pictures::{self, EXIF_ROTATE_90};
 use super::room::{Room, text};
-use super::{EXIF_ROTATE_90, pictures};
 
 const WIDTH: u32 = 48;
 const HEIGHT: u32 = 36;

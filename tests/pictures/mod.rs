@@ -1,6 +1,10 @@
-//! The picture that the tests of the adapters share.
+//! The picture and the metadata that the tests of the adapters share.
 
 use image::{ColorType, DynamicImage};
+
+/// An Exif block with one entry, the orientation "rotate by 90 degrees".
+pub(crate) const EXIF_ROTATE_90: &[u8] =
+    b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
 /// A ramp with a bright spot, in any colour type; alpha is a ramp, too.
 pub(crate) fn picture((width, height): (u32, u32), color: ColorType) -> DynamicImage {
