@@ -8,19 +8,14 @@ pub(crate) trait MulAdd<S: Simd>: Sized {
     ///
     /// x86 before 2013 has no instruction for it. What emulates it there is long, and called: inlined, it
     /// would be nearly all of the encoder's code.
-    fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: impl SimdInto<Self, S>)
-    -> Self;
+    fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: Self) -> Self;
 }
 
 impl<S: Simd> MulAdd<S> for f32x16<S> {
     #[inline(always)]
-    fn fused_mul_add(
-        self,
-        factor: impl SimdInto<Self, S>,
-        summand: impl SimdInto<Self, S>,
-    ) -> Self {
+    fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: Self) -> Self {
         let simd = self.simd;
-        let (factor, summand) = (factor.simd_into(simd), summand.simd_into(simd));
+        let factor = factor.simd_into(simd);
         #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
         if simd.level().as_avx2().is_none() {
             return emulated(simd, self, factor, summand);
