@@ -7,8 +7,6 @@
 //! times the square root of its area l11 l22: the squared strength is proportional to the sum of
 //! the squares that it adds to the picture.
 
-use fearless_simd::{Simd, f32x16};
-
 use super::options::Tune;
 use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
 use crate::color::ColorModel;
@@ -27,19 +25,13 @@ const SQUARED_STEP: f64 = 0.22;
 const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
 /// The Lagrange multiplier lambda, in squared steps of colour per bit: with it, making all steps a
 /// little finer lowers the distortion by as much as lambda times the bits that it adds.
-const LAMBDA: f32 = 0.322;
+pub(crate) const LAMBDA: f32 = 0.322;
 /// Steps of geometry whose quantization adds as much distortion as that of a step of colour, for a
 /// Gaussian of strength 1: from integrals of the quartic kernel's derivatives.
 const POSITION: f32 = 1.095;
 const SIZE: f32 = 0.775;
 const RATIO: f32 = 0.866;
 const SLANT: f32 = 1.732;
-/// The weight of the rate term in training, as a share of lambda. It is tuned: at full weight,
-/// training loses more quality than it saves bits.
-const RATE_WEIGHT: f32 = 0.4;
-/// Components of a Gaussian's geometry: two of position, three of shape.
-const GEOMETRY: usize = 5;
-
 /// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
 /// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
 /// precise ones if they are strong, more and coarser ones if they are weak.
@@ -104,75 +96,9 @@ pub(crate) fn class_of(
     steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
 }
 
-/// The rate term of the training loss, for which every component of a Gaussian costs
-/// [`component_bits`]. The term makes weak Gaussians fade away, and keeps strong ones from growing only
-/// to cancel each other.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RateTerm {
-    squared_step: f32,
-    weight: f32,
-}
-
-impl RateTerm {
-    /// The term for `count` Gaussians whose picture has this distortion.
-    pub(crate) fn new(distortion: f64, count: usize, channels: usize) -> Self {
-        let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
-        let components = (GEOMETRY + channels) as f32;
-        let weight = RATE_WEIGHT * LAMBDA * components * (0.5 * core::f32::consts::LOG2_E);
-        Self { squared_step, weight: weight * squared_step }
-    }
-
-    /// The gradient by the colour of half the rate term: the training loss is half the squared
-    /// error.
-    #[inline]
-    pub(crate) fn gradient(&self, gaussian: &Gaussian) -> [f32; 4] {
-        let [l11, _, l22] = gaussian.cholesky;
-        let area = l11 * l22;
-        let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
-        let factor = self.weight * area / (self.squared_step + squared * area);
-        gaussian.color.map(|color| factor * color)
-    }
-
-    /// What the colours are multiplied by in [`Self::gradient`], for sixteen Gaussians of these areas
-    /// and squared lengths of colour.
-    #[inline(always)]
-    pub(crate) fn factors<S: Simd>(&self, area: f32x16<S>, squared: f32x16<S>) -> f32x16<S> {
-        area * self.weight / (squared * area + self.squared_step)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_gradient_is_that_of_the_bits() {
-        let gaussian = Gaussian {
-            center: [3.0, 4.0],
-            cholesky: [2.0, 0.3, 1.5],
-            color: [0.3, -0.1, 0.2, 0.0],
-        };
-        let (distortion, count) = (3.0, 20);
-        let lattice = lattice(step_for(distortion, count), ColorModel::Rgb);
-        let rate_term = |color: [f64; 4]| {
-            let squared = color.iter().map(|color| color * color).sum::<f64>() * 2.0 * 1.5;
-            let steps = squared / f64::from(lattice.color[0]).powi(2);
-            let bits = 8.0 * 0.5 * (1.0 + steps).log2();
-            f64::from(RATE_WEIGHT) * f64::from(lambda(&lattice)) * bits
-        };
-        let gradient = RateTerm::new(distortion, count, 3).gradient(&gaussian);
-        for channel in 0..3 {
-            let at = |offset: f64| {
-                let mut color = gaussian.color.map(f64::from);
-                color[channel] += offset;
-                rate_term(color)
-            };
-            let half = (at(1e-4) - at(-1e-4)) / 2e-4 / 2.0;
-            let relative = f64::from(gradient[channel]) / half - 1.0;
-            assert!(relative.abs() < 1e-3, "channel {channel}: {gradient:?}, {half}");
-        }
-        assert_eq!(gradient[3], 0.0);
-    }
 
     #[test]
     fn strong_gaussians_take_more_bits() {

@@ -10,6 +10,7 @@ mod lsq;
 mod parameterization;
 mod parameters;
 mod pass;
+mod rate_term;
 mod row;
 mod schedule;
 mod state;
@@ -25,6 +26,7 @@ use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use parameters::Parameters;
 use pass::{Pass, Rendered};
+use rate_term::RateTerm;
 use row::{Row, RowBounds, Slope, shape_of};
 use schedule::TrainingSchedule;
 use training::{Portion, Training};
@@ -34,7 +36,7 @@ use super::error::EncodeError;
 use super::options::{MAX_GAUSSIANS, Precision};
 use super::progress::Observer;
 use super::raster::Raster;
-use super::rate_model::{self, RateTerm};
+use super::rate_model;
 use super::workload::Workload;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
@@ -385,19 +387,19 @@ impl<'a> Fit<'a> {
         let by_chunk: Vec<QuantizerGradients> =
             self.parameters.step(self.bounds, factor, observer, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
-                let by_splat = pass.gradient(index, channels);
+                let mut by_splat = pass.gradient(index, channels);
+                if let Some(rate_term) = rate_term {
+                    by_splat += rate_term.gradient(&Gaussian::from_components(
+                        &decoded[..5 + channels],
+                        parameterization,
+                    ));
+                }
                 let (center, shape) =
                     by_splat.geometry.gradients(parameterization, shape_of(&decoded));
                 let mut gradient = [0.0; MAX_COMPONENTS];
                 gradient[..2].copy_from_slice(&center.to_array());
                 gradient[2..5].copy_from_slice(&shape.to_array());
                 gradient[5..].copy_from_slice(&by_splat.color);
-                if let Some(rate_term) = rate_term {
-                    let gaussian =
-                        Gaussian::from_components(&decoded[..5 + channels], parameterization);
-                    let by_color = rate_term.gradient(&gaussian);
-                    gradient[5..].iter_mut().zip(by_color).for_each(|(sum, part)| *sum += part);
-                }
                 if let Some(quantizers) = quantizers {
                     add(sum, &quantizers.backward(row, &decoded, &mut gradient));
                 }

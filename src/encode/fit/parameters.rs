@@ -5,13 +5,13 @@ use rayon::prelude::*;
 
 use super::gauss_newton::blocks::BlockStep;
 use super::pass::SplatGradient;
+use super::rate_term::RateTerm;
 use super::row::{Row, RowBounds, Slope};
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::encode::rate_model::RateTerm;
 use crate::gaussian::Parameterization;
 use crate::render::splat::Splat;
 

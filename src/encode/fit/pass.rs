@@ -7,6 +7,8 @@
 //! there are no atomic operations, and the result is the same, bit for bit, on any number of
 //! threads.
 
+use core::ops::AddAssign;
+
 use fearless_simd::Level;
 
 use super::bins::{RowBins, TileRow};
@@ -33,6 +35,16 @@ pub(crate) struct SplatGradient {
     pub(crate) geometry: GeometrySums,
     /// The gradient by the colour.
     pub(crate) color: [f32; 4],
+}
+
+impl AddAssign for SplatGradient {
+    fn add_assign(&mut self, other: Self) {
+        let GeometrySums { first, second } = &mut self.geometry;
+        let add = |sum: &mut f32, part: f32| *sum += part;
+        first.iter_mut().zip(other.geometry.first).for_each(|(sum, part)| add(sum, part));
+        second.iter_mut().zip(other.geometry.second).for_each(|(sum, part)| add(sum, part));
+        self.color.iter_mut().zip(other.color).for_each(|(sum, part)| add(sum, part));
+    }
 }
 
 /// The bins, results and scratch memory of passes, reused from one pass to the next.

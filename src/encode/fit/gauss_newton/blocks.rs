@@ -13,9 +13,9 @@ use super::{FASTER, LEAST_PACE, MOST_PACE, SLOWER, State};
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::encode::fit::parameterization::MIN_DEVIATION;
 use crate::encode::fit::pass::SplatGradient;
+use crate::encode::fit::rate_term::RateTerm;
 use crate::encode::fit::row::{MAX_COLOR, Row, RowBounds};
 use crate::encode::fit::training::GaussNewton;
-use crate::encode::rate_model::RateTerm;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::render::simd_kernel;
 use crate::render::splat::Splat;
@@ -218,20 +218,25 @@ impl BlockStep<'_> {
         let z21 = i11 * across;
         let z22 = w * across + i22 * (w * xy + i22 * yy);
 
-        let by_rate = match self.rate_term {
-            Some(rate_term) => rate_term.factors(area, squared_color),
-            None => f32x16::splat(simd, 0.0),
-        };
-        // The colour falls as the size grows.
-        let mut size = z11 + z22;
+        let mut shape = [z11 + z22, z11 - z22, z21];
         let mut by_color = color;
         for channel in 0..color.len() {
-            let gradient = f32x16::from_fn(simd, |lane| slopes[lane].0.color[channel]);
-            by_color[channel] = gradient + by_rate * color[channel];
-            size -= color[channel] * by_color[channel];
+            by_color[channel] = f32x16::from_fn(simd, |lane| slopes[lane].0.color[channel]);
+            // The colour falls as the size grows.
+            shape[0] -= color[channel] * by_color[channel];
         }
-        let [c0, c1, c2, c3] = by_color;
-        [i11 * x, w * x + i22 * y, size, z11 - z22, z21, c0, c1, c2, c3]
+        if let Some(rate_term) = self.rate_term {
+            let rate_by_shape = rate_term.by_shape(simd, cholesky);
+            for index in 0..shape.len() {
+                shape[index] += rate_by_shape[index];
+            }
+            let rate_by_color = rate_term.by_color(area, squared_color);
+            for channel in 0..color.len() {
+                by_color[channel] += rate_by_color * color[channel];
+            }
+        }
+        let ([size, ratio, slant], [c0, c1, c2, c3]) = (shape, by_color);
+        [i11 * x, w * x + i22 * y, size, ratio, slant, c0, c1, c2, c3]
     }
 
     /// [`RowBounds::clamped`] for finite rows.
@@ -328,13 +333,15 @@ mod tests {
         slopes: &[(SplatGradient, f32)],
     ) {
         for ((row, state), (by_splat, sensitivity)) in rows.iter_mut().zip(states).zip(slopes) {
+            let mut by_splat = *by_splat;
+            if let Some(rate_term) = step.rate_term {
+                let gaussian = Gaussian::from_components(&row[..], PARAMETERIZATION);
+                by_splat += rate_term.gradient(&gaussian);
+            }
             let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, shape_of(row));
-            let by_rate = step.rate_term.map_or([0.0; 4], |rate_term| {
-                rate_term.gradient(&Gaussian::from_components(&row[..], PARAMETERIZATION))
-            });
             let mut gradient = [center.x, center.y, shape.x, shape.y, shape.z, 0.0, 0.0, 0.0, 0.0];
             for channel in 0..4 {
-                gradient[5 + channel] = by_splat.color[channel] + by_rate[channel];
+                gradient[5 + channel] = by_splat.color[channel];
             }
             let slope = Slope { gradient, sensitivity: *sensitivity };
             super::super::step(row, state, &slope, step.options, step.bounds, step.factor);

@@ -1,0 +1,139 @@
+//! The rate term of the training loss, which makes Gaussians cheap to code (entropy coding only).
+
+use fearless_simd::{Simd, f32x16, prelude::*};
+
+use super::parameterization::GeometrySums;
+use super::pass::SplatGradient;
+use crate::encode::rate_model::{LAMBDA, step_for};
+use crate::gaussian::Gaussian;
+
+/// The weight of the term, as a share of lambda. It is tuned: at full weight, training loses more
+/// quality than it saves bits.
+const WEIGHT: f32 = 0.55;
+/// Components of a Gaussian's geometry: two of position, three of shape.
+const GEOMETRY: usize = 5;
+
+/// The rate term. A Gaussian of strength s, in steps of colour, with the Cholesky factor L and the area
+/// A = l11 l22 is taken to cost these bits, up to a constant:
+///
+/// - log2(1 + s^2) / 2 for every component, as in
+///   [`component_bits`](crate::encode::rate_model::component_bits). Weak Gaussians fade away, and strong
+///   ones do not grow only to cancel each other.
+/// - log2(1 / A) for the position: the larger a Gaussian, the fewer places there are for it.
+/// - log2(T / (2 A)) for the shape, where T is the trace of the covariance. With the standard deviations
+///   s1 and s2 along the axes, it is log2((s1 / s2 + s2 / s1) / 2), so 0 for a circle: most Gaussians
+///   are nearly round, and needles are rare.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RateTerm {
+    squared_step: f32,
+    components: f32,
+    /// Half of what a bit costs, times log2(e): the training loss is half the distortion, and
+    /// gradients are those of natural logarithms.
+    weight: f32,
+}
+
+impl RateTerm {
+    /// The term for `count` Gaussians whose picture has this distortion.
+    pub(super) fn new(distortion: f64, count: usize, channels: usize) -> Self {
+        let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
+        Self {
+            squared_step,
+            components: (GEOMETRY + channels) as f32,
+            weight: 0.5 * WEIGHT * LAMBDA * squared_step * core::f32::consts::LOG2_E,
+        }
+    }
+
+    /// The gradient of half the term by a Gaussian, in the form of the gradient of the loss: they are
+    /// added up.
+    pub(super) fn gradient(&self, gaussian: &Gaussian) -> SplatGradient {
+        let [l11, l21, l22] = gaussian.cholesky;
+        let area = l11 * l22;
+        let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
+        let by_color = self.weight * self.components * area / (self.squared_step + squared * area);
+        // Multiples of the covariance and of its square.
+        let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
+        let by_area = 0.5 * by_color * squared - 2.0 * self.weight;
+        let by_trace = 2.0 * self.weight / (xx + yy);
+        let second = [
+            by_area * xx + by_trace * (xx * xx + xy * xy),
+            by_area * xy + by_trace * (xx * xy + xy * yy),
+            by_area * yy + by_trace * (xy * xy + yy * yy),
+        ];
+        SplatGradient {
+            geometry: GeometrySums { first: [0.0; 2], second },
+            color: gaussian.color.map(|color| by_color * color),
+        }
+    }
+
+    /// What the colours are multiplied by in [`Self::gradient`], for sixteen Gaussians of these areas
+    /// and squared lengths of colour.
+    #[inline(always)]
+    pub(super) fn by_color<S: Simd>(&self, area: f32x16<S>, squared: f32x16<S>) -> f32x16<S> {
+        area * (self.weight * self.components) / (squared * area + self.squared_step)
+    }
+
+    /// The gradient of half the term by the size at the same strength, the ratio and the slant in the
+    /// own frames of sixteen Gaussians with these Cholesky factors.
+    #[inline(always)]
+    pub(super) fn by_shape<S: Simd>(
+        &self,
+        simd: S,
+        [l11, l21, l22]: [f32x16<S>; 3],
+    ) -> [f32x16<S>; 3] {
+        let twice = f32x16::splat(simd, 2.0 * self.weight);
+        let (first, second) = (l11 * l11 + l21 * l21, l22 * l22);
+        let by_trace = twice / (first + second);
+        [-twice, by_trace * (first - second), by_trace * (l21 * l22)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::Parameterization;
+
+    /// The values are l11, l21, l22 and three channels.
+    fn bits(values: [f64; 6], squared_step: f64) -> f64 {
+        let [l11, l21, l22, color @ ..] = values;
+        let area = l11 * l22;
+        let squared_strength = color.iter().map(|color| color * color).sum::<f64>() * area;
+        let components = 8.0 * 0.5 * (1.0 + squared_strength / squared_step).log2();
+        let shape = ((l11 * l11 + l21 * l21 + l22 * l22) / (2.0 * area)).log2();
+        components - area.log2() + shape
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_the_bits() {
+        let (distortion, count) = (3.0, 20);
+        let squared_step = (2.0 * step_for(distortion, count)).exp2();
+        let rate_term = RateTerm::new(distortion, count, 3);
+        for values in [
+            [2.0, 0.3, 1.5, 0.3, -0.1, 0.2],
+            [0.5, -4.0, 3.0, 0.0, 2.0, -0.01],
+            [9.0, 0.0, 0.4, 0.001, 0.0, 0.0],
+        ] {
+            let [l11, l21, l22, c0, c1, c2] = values.map(|value| value as f32);
+            let cholesky = [l11, l21, l22];
+            let gaussian = Gaussian { center: [3.0, 4.0], cholesky, color: [c0, c1, c2, 0.0] };
+            let SplatGradient { geometry, color } = rate_term.gradient(&gaussian);
+            let (center, shape) = geometry.gradients(Parameterization::Cholesky, cholesky.into());
+            assert_eq!(center.to_array(), [0.0; 2]);
+            assert_eq!(color[3], 0.0);
+            let found = [shape.x, shape.y, shape.z, color[0], color[1], color[2]];
+            let lambda = f64::from(WEIGHT * LAMBDA) * squared_step;
+            for (index, found) in found.into_iter().enumerate() {
+                let at = |offset: f64| {
+                    let mut values = values;
+                    values[index] += offset;
+                    0.5 * lambda * bits(values, squared_step)
+                };
+                let expected = (at(1e-5) - at(-1e-5)) / 2e-5;
+                let error = (f64::from(found) - expected).abs();
+                assert!(
+                    error < 1e-4 * lambda + 1e-3 * expected.abs(),
+                    "{index}: {found}, {expected}"
+                );
+            }
+        }
+    }
+}
