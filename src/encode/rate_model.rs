@@ -32,6 +32,7 @@ const POSITION: f32 = 1.095;
 const SIZE: f32 = 0.775;
 const RATIO: f32 = 0.866;
 const SLANT: f32 = 1.732;
+
 /// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
 /// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
 /// precise ones if they are strong, more and coarser ones if they are weak.

@@ -39,11 +39,11 @@ pub(crate) struct SplatGradient {
 
 impl AddAssign for SplatGradient {
     fn add_assign(&mut self, other: Self) {
+        let GeometrySums { first, second } = other.geometry;
+        let parts = first.into_iter().chain(second).chain(other.color);
         let GeometrySums { first, second } = &mut self.geometry;
-        let add = |sum: &mut f32, part: f32| *sum += part;
-        first.iter_mut().zip(other.geometry.first).for_each(|(sum, part)| add(sum, part));
-        second.iter_mut().zip(other.geometry.second).for_each(|(sum, part)| add(sum, part));
-        self.color.iter_mut().zip(other.color).for_each(|(sum, part)| add(sum, part));
+        let sums = first.iter_mut().chain(second).chain(&mut self.color);
+        sums.zip(parts).for_each(|(sum, part)| *sum += part);
     }
 }
 

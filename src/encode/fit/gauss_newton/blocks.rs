@@ -339,10 +339,8 @@ mod tests {
                 by_splat += rate_term.gradient(&gaussian);
             }
             let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, shape_of(row));
-            let mut gradient = [center.x, center.y, shape.x, shape.y, shape.z, 0.0, 0.0, 0.0, 0.0];
-            for channel in 0..4 {
-                gradient[5 + channel] = by_splat.color[channel];
-            }
+            let [c0, c1, c2, c3] = by_splat.color;
+            let gradient = [center.x, center.y, shape.x, shape.y, shape.z, c0, c1, c2, c3];
             let slope = Slope { gradient, sensitivity: *sensitivity };
             super::super::step(row, state, &slope, step.options, step.bounds, step.factor);
         }
