@@ -46,12 +46,12 @@ impl RateTerm {
     /// The gradient of half the term by a Gaussian, in the form of the gradient of the loss: they are
     /// added up.
     pub(super) fn gradient(&self, gaussian: &Gaussian) -> SplatGradient {
-        let [l11, l21, l22] = gaussian.cholesky;
+        let [l11, _, l22] = gaussian.cholesky;
         let area = l11 * l22;
         let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
         let by_color = self.weight * self.components * area / (self.squared_step + squared * area);
         // Multiples of the covariance and of its square.
-        let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
+        let [xx, xy, yy] = gaussian.covariance();
         let by_area = 0.5 * by_color * squared - 2.0 * self.weight;
         let by_trace = 2.0 * self.weight / (xx + yy);
         let second = [
