@@ -109,7 +109,7 @@ fn bad_pictures_are_reported_and_skipped() {
     assert_eq!(room.read("out/short.gip"), b"precious");
 
     // A target that one picture cannot meet is its own failure.
-    let (_, errors) = room.batch(3, &["in/a.png", "--out", "out", "--size", "20"]);
+    let (_, errors) = room.batch(3, &["in/a.png", "--out", "out", "--bytes", "20"]);
     assert!(errors.starts_with("error: in/a.png: "), "{errors}");
 }
 

@@ -135,7 +135,7 @@ fn a_target_that_is_not_met_is_told_with_its_reason() {
     DynamicImage::from(image::GrayImage::from_pixel(20, 20, image::Luma([77])))
         .save(room.path("flat.png"))
         .expect("writable");
-    let args = ["encode", "flat.png", "a.gip", "--effort", "1", "--size", "5000"];
+    let args = ["encode", "flat.png", "a.gip", "--effort", "1", "--bytes", "5000"];
     let report = room.json(&[&args[..], &["--json"]].concat());
     let reason = report["shortfall"].as_str().expect("it says why");
     assert!(reason.contains(&format!("0 Gaussians, {} bytes", report["bytes"])), "{reason}");
@@ -463,12 +463,12 @@ fn wrong_usage_exits_with_2() {
         (&encode, &["--psnr", "inf"], "from 1 to 120"),
         (&encode, &["--bpp", "0"], "from 0.0001 to 1000"),
         (&encode, &["--quality", "101"], "from 0 to 100"),
-        (&encode, &["--size", "0"], "1.."),
+        (&encode, &["--bytes", "0"], "1.."),
         // Only the picture tells that this is too small.
-        (&encode, &["--size", "20"], "at least"),
+        (&encode, &["--bytes", "20"], "at least"),
         (&encode, &["--gaussians", "-5"], "1..=4194304"),
         (&encode, &["--gaussians", "5", "--bpp", "1"], "cannot be used with"),
-        (&encode, &["--size", "5000", "--quality", "60"], "cannot be used with"),
+        (&encode, &["--bytes", "5000", "--quality", "60"], "cannot be used with"),
         (&encode, &["--precision", "f16"], "f32, packed"),
         (&encode, &["--threads", "0"], "1..=1024"),
         (&decode, &["--scale", "0"], "from 0.001 to 1000"),
@@ -481,10 +481,15 @@ fn wrong_usage_exits_with_2() {
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{args:?}: {error}");
         assert!(error.starts_with("error: ") && error.contains(allowed), "{args:?}: {error}");
-        assert_eq!(error.lines().count(), 1, "{args:?}: {error}");
         assert!(output.stdout.is_empty(), "{args:?}");
     }
     assert_eq!(room.names(), ["a.png"], "nothing was written");
+
+    // What comes next is told, too: a tip, how the command is used, and where to read more.
+    let error = text(&room.run(&["encode", "a.png", "a.gip", "--qualty", "60"]).stderr);
+    for words in ["similar argument exists: '--quality'", "Usage: gip encode ", "'--help'"] {
+        assert!(error.contains(words), "{words}: {error}");
+    }
 }
 
 #[test]

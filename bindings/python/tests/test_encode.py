@@ -29,7 +29,7 @@ def psnr(a: Picture, b: Picture) -> float:
     [
         ({}, []),
         ({"bpp": 2.5}, ["--bpp", "2.5"]),
-        ({"bytes": 900}, ["--size", "900"]),
+        ({"bytes": 900}, ["--bytes", "900"]),
         ({"quality": 60}, ["--quality", "60"]),
         ({"psnr": 35, "seed": 7}, ["--psnr", "35", "--seed", "7"]),
         ({"gaussians": 50, "tune": "psnr"}, ["--gaussians", "50", "--tune", "psnr"]),

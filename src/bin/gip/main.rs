@@ -22,15 +22,7 @@ use args::{Args, Command};
 fn main() -> ExitCode {
     // With this, `image` reads .gip too.
     image_gip::register();
-    let args = match Args::try_parse() {
-        Ok(args) => args,
-        // Help and version are not errors.
-        Err(error) if !error.use_stderr() => error.exit(),
-        Err(error) => {
-            eprintln!("{}", first_paragraph(&error.render().to_string()));
-            return ExitCode::from(2);
-        }
-    };
+    let args = Args::parse();
     let success = |()| ExitCode::SUCCESS;
     let outcome = match args.command {
         Command::Encode(args) => encode::run(&args).map(success),
@@ -43,10 +35,4 @@ fn main() -> ExitCode {
         eprintln!("error: {}", errors::one_line(&error));
         ExitCode::from(errors::exit_status(&error))
     })
-}
-
-/// The first paragraph of an error of `clap`, on one line: tips and usage follow it.
-fn first_paragraph(text: &str) -> String {
-    let paragraph = text.split("\n\n").next().unwrap_or_default();
-    paragraph.split_whitespace().collect::<Vec<_>>().join(" ")
 }

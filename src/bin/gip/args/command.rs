@@ -15,7 +15,7 @@ use super::inspect::{Compare, Info};
     after_help = "\
 Examples:
   gip encode photo.jpg photo.gip                     a good quality
-  gip encode photo.png small.gip --size 20000        a file of 20,000 bytes
+  gip encode photo.png small.gip --bytes 20000       a file of 20,000 bytes
   gip decode photo.gip photo.png                     back to pixels
   gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
   gip batch photos --out gips                        a folder, one picture per core

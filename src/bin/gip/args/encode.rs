@@ -18,7 +18,7 @@ use super::values::{ThreadCount, number};
 #[command(
     allow_negative_numbers = true,
     after_help = "\
-At most one of --gaussians, --bpp, --size, --psnr, --quality and --lambda may be given. If the target cannot
+At most one of --gaussians, --bpp, --bytes, --psnr, --quality and --lambda may be given. If the target cannot
 be met, the file comes as close as possible, and the report gives the reason."
 )]
 pub(crate) struct Encode {
@@ -91,10 +91,10 @@ struct TargetArgs {
     #[arg(long, help_heading = "Targets", value_name = "B",
           value_parser = |text: &str| number(text, 0.0001, 1000.0))]
     bpp: Option<f64>,
-    /// A file of at most BYTES bytes, from 1 to 1073741824.
-    #[arg(long, help_heading = "Targets", value_name = "BYTES",
+    /// A file of at most N bytes, from 1 to 1073741824.
+    #[arg(long, help_heading = "Targets", value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..))]
-    size: Option<u64>,
+    bytes: Option<u64>,
     /// A PSNR of the decoded file of DB decibels, from 1 to 120.
     #[arg(long, help_heading = "Targets", value_name = "DB",
           value_parser = |text: &str| number(text, 1.0, 120.0))]
@@ -115,7 +115,7 @@ impl TargetArgs {
         self.gaussians
             .map(Target::Gaussians)
             .or(self.bpp.map(Target::BitsPerPixel))
-            .or(self.size.map(Target::Bytes))
+            .or(self.bytes.map(Target::Bytes))
             .or(self.psnr.map(Target::Psnr))
             .or(self.quality.map(Target::Quality))
             .or(self.lambda.map(Target::Lambda))
@@ -182,7 +182,7 @@ mod tests {
         assert_eq!(target(&[]), Some(Target::Auto));
         assert_eq!(target(&["--gaussians", "9"]), Some(Target::Gaussians(9)));
         assert_eq!(target(&["--bpp", "0.5"]), Some(Target::BitsPerPixel(0.5)));
-        assert_eq!(target(&["--size", "900"]), Some(Target::Bytes(900)));
+        assert_eq!(target(&["--bytes", "900"]), Some(Target::Bytes(900)));
         assert_eq!(target(&["--psnr", "31.5"]), Some(Target::Psnr(31.5)));
         assert_eq!(target(&["--quality", "0"]), Some(Target::Quality(0.0)));
         assert_eq!(target(&["--lambda", "700"]), Some(Target::Lambda(700.0)));
