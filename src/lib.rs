@@ -55,7 +55,8 @@
 //!
 //! - **Decoding:** the three above. [`Limits`] bounds the memory and the work that a file may take;
 //!   [`DecodeError`] says why a file was not decoded. [`Header`] and [`Metadata`] describe the
-//!   picture.
+//!   picture. Sizes, regions and samples are those of the picture as stored, and [`Orientation`]
+//!   turns them.
 //! - **Rendering:** [`Picture`] is a header with the Gaussians that have arrived; [`RenderOptions`]
 //!   has the output size, the [`Region`] and the [`ColorModel`].
 //! - **The model:** [`Gaussian`], its stored shape ([`Parameterization`]), the [`Kernel`], and the
@@ -112,6 +113,8 @@ mod math;
 #[cfg(feature = "encode")]
 pub mod metrics;
 #[cfg(feature = "decode")]
+mod orientation;
+#[cfg(feature = "decode")]
 mod region;
 #[cfg(feature = "decode")]
 mod render;
@@ -155,6 +158,8 @@ pub use gaussian::{Gaussian, Parameterization};
 pub use kernel::Kernel;
 #[cfg(feature = "decode")]
 pub use limits::Limits;
+#[cfg(feature = "decode")]
+pub use orientation::Orientation;
 #[cfg(feature = "decode")]
 pub use region::Region;
 #[cfg(feature = "decode")]

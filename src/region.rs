@@ -15,6 +15,14 @@ pub struct Region {
 }
 
 impl Region {
+    /// Whether it is inside of `width` x `height` pixels, and not empty.
+    pub(crate) fn is_inside(self, width: u32, height: u32) -> bool {
+        let inside = |at: u32, length: u32, whole: u32| {
+            length > 0 && at.checked_add(length).is_some_and(|end| end <= whole)
+        };
+        inside(self.x, self.width, width) && inside(self.y, self.height, height)
+    }
+
     /// The number of its pixels.
     pub(crate) fn pixels(self) -> u64 {
         u64::from(self.width) * u64::from(self.height)

@@ -10,8 +10,8 @@ use common::{
     chunk, decode, decode_pieces, decode_valid, gaus, layered, of_chunks, oracle, qntz,
 };
 use image_gip::{
-    ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Quantizer,
-    Region, RenderOptions, RequestError, SampleDepth, Samples, StreamDecoder,
+    ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Orientation,
+    Quantizer, Region, RenderOptions, RequestError, SampleDepth, Samples, StreamDecoder,
 };
 use proptest::prelude::*;
 
@@ -279,6 +279,37 @@ fn metadata_arrives_as_it_was_stored() {
     assert_eq!((text.count, text.bytes), (2, 24 + 12 + 12));
     let bytes: u64 = decoder.chunks().iter().map(|chunk| chunk.bytes).sum();
     assert_eq!(bytes + 8, sample().bytes().len() as u64);
+}
+
+/// Exif data with one entry, the orientation "rotate by 90 degrees".
+const ROTATE_90: &[u8] = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+
+/// How many bytes tell the orientation, and what they tell; `None` if all of them do not.
+fn told(bytes: &[u8]) -> Option<(usize, Orientation)> {
+    let mut decoder = StreamDecoder::new();
+    (1..=bytes.len()).zip(bytes).find_map(|(count, &byte)| {
+        decoder.feed(&[byte]).expect("a valid file");
+        decoder.orientation().map(|orientation| (count, orientation))
+    })
+}
+
+#[test]
+fn the_orientation_is_told_as_soon_as_it_is_known() {
+    let turned = File { extra: Vec::new(), ..sample() }.with(b"tEXt", b"Title\0A test");
+    let first_layer = |file: &File| {
+        let chunks = file.chunks();
+        let at = chunks.iter().position(|chunk| &chunk[4..8] == b"GAUS").expect("layers");
+        8 + chunks[..at].iter().map(Vec::len).sum::<usize>() + 8
+    };
+    let plain = first_layer(&turned);
+    assert_eq!(told(&turned.bytes()), Some((plain, Orientation::NoTransforms)));
+    let turned = turned.with(b"eXIf", ROTATE_90);
+    assert_eq!(decode_valid(&turned.bytes()).metadata().orientation(), Orientation::Rotate90);
+    // With the end of the Exif data.
+    assert_eq!(told(&turned.bytes()), Some((first_layer(&turned) - 8, Orientation::Rotate90)));
+
+    let empty = File::new(Ghdr::default(), vec![Entry::FLOAT; 6], vec![]).bytes();
+    assert_eq!(told(&empty), Some((empty.len(), Orientation::NoTransforms)));
 }
 
 #[test]

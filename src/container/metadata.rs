@@ -3,10 +3,12 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use super::exif;
 use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
 use crate::chunk::MAX_CHUNK_LENGTH;
 use crate::error::DecodeError;
+use crate::orientation::Orientation;
 
 /// Most bytes of a keyword.
 const MAX_KEYWORD: usize = 79;
@@ -56,6 +58,13 @@ pub struct Text {
 }
 
 impl Metadata {
+    /// How the picture is to be turned for display: what the Exif data say, if they say anything
+    /// that Exif knows. The decoder's samples are not turned.
+    #[must_use]
+    pub fn orientation(&self) -> Orientation {
+        self.exif.as_deref().and_then(exif::orientation).unwrap_or_default()
+    }
+
     /// Adds the payload of a metadata chunk. A second ICC profile, Exif or XMP is an error.
     pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
         let slot = match chunk {

@@ -1,5 +1,6 @@
 //! The container of a file: signature, chunks, header and metadata (spec, sections 4 and 5).
 
+mod exif;
 mod header;
 mod metadata;
 mod parser;

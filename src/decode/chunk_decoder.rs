@@ -96,7 +96,6 @@ impl ChunkDecoder {
 
     /// Whether a layer or `GEND` has arrived, at least in part: header and metadata are complete
     /// then.
-    #[cfg(feature = "std")]
     pub(super) fn has_reached_layers(&self, current: Option<ChunkType>) -> bool {
         matches!(self.stage, Stage::Layer(..) | Stage::Complete)
             || !self.layers.is_empty()

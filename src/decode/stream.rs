@@ -13,6 +13,7 @@ use crate::container::{Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
+use crate::orientation::Orientation;
 use crate::render::Picture;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
@@ -220,6 +221,14 @@ impl StreamDecoder {
         &self.chunks.metadata
     }
 
+    /// How the picture is to be turned for display; `None` until it is known: until the Exif data or
+    /// a layer has arrived, or the end of a file without both.
+    #[must_use]
+    pub fn orientation(&self) -> Option<Orientation> {
+        let metadata = self.metadata();
+        (metadata.exif.is_some() || self.has_reached_layers()).then(|| metadata.orientation())
+    }
+
     /// The Gaussians that have arrived, in file order.
     #[must_use]
     pub fn gaussians(&self) -> &[Gaussian] {
@@ -245,6 +254,12 @@ impl StreamDecoder {
         let chunks = &self.chunks;
         let header = chunks.header.as_ref()?;
         Some(Picture::new(header, &chunks.gaussians, &chunks.limits, chunks.memory()))
+    }
+
+    /// Whether header and metadata are complete, since a layer or the end of the file has arrived,
+    /// at least in part.
+    pub(super) fn has_reached_layers(&self) -> bool {
+        self.chunks.has_reached_layers(self.parser.current())
     }
 
     /// Decodes the pending layers up to the first that is malformed.
@@ -274,10 +289,5 @@ impl StreamDecoder {
     /// See [`Parser::safe_to_read`].
     pub(super) fn safe_to_read(&self) -> usize {
         self.parser.safe_to_read()
-    }
-
-    /// Whether header and metadata are complete, since a layer or the end of the file has arrived.
-    pub(super) fn has_reached_layers(&self) -> bool {
-        self.chunks.has_reached_layers(self.parser.current())
     }
 }

@@ -130,10 +130,7 @@ impl RenderOptions {
             return Err(RequestError::OutputSize { width, height }.into());
         }
         let region = self.region.unwrap_or(Region { x: 0, y: 0, width, height });
-        let inside = |at: u32, length: u32, whole: u32| {
-            length > 0 && at.checked_add(length).is_some_and(|end| end <= whole)
-        };
-        if !inside(region.x, region.width, width) || !inside(region.y, region.height, height) {
+        if !region.is_inside(width, height) {
             return Err(RequestError::Region { region, width, height }.into());
         }
         limits.check_size(region.width, region.height)?;
