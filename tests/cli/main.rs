@@ -1,6 +1,7 @@
 //! The tool `gip`, from outside. All in one program, since the codecs of `image` are compiled into each.
 
 mod batch;
+mod batch_inputs;
 mod batch_recovery;
 mod commands;
 #[path = "../common/mod.rs"]

@@ -29,6 +29,26 @@ pub(crate) fn output_name(path: &Path) -> String {
     if is_standard_stream(path) { "standard output".into() } else { path.display().to_string() }
 }
 
+/// A path as text that no other path has: every byte that is not UTF-8 is U+FFFD and two hexadecimal
+/// digits. So are the three bytes of a U+FFFD in the path itself. On Windows, the bytes are WTF-8.
+pub(crate) fn unique_text(path: &Path) -> String {
+    let mut text = String::new();
+    let escape = |text: &mut String, bytes: &[u8]| {
+        for byte in bytes {
+            text.push_str(&format!("\u{FFFD}{byte:02X}"));
+        }
+    };
+    for chunk in path.as_os_str().as_encoded_bytes().utf8_chunks() {
+        for part in chunk.valid().split_inclusive(char::REPLACEMENT_CHARACTER) {
+            let plain = part.trim_end_matches(char::REPLACEMENT_CHARACTER);
+            text.push_str(plain);
+            escape(&mut text, &part.as_bytes()[plain.len()..]);
+        }
+        escape(&mut text, chunk.invalid());
+    }
+    text
+}
+
 /// Reads a whole file, or standard input.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     if is_standard_stream(path) {
@@ -166,4 +186,38 @@ fn is_temporary(name: &OsStr) -> bool {
         Some(random.len() == TEMPORARY_RANDOM && random.chars().all(|c| c.is_ascii_alphanumeric()))
     };
     name.to_str().and_then(random).unwrap_or(false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ordinary_paths_are_their_own_text() {
+        for path in ["", "in/a b%20\\xFF.png", "Grüße/写真.jpg", "in\n/\u{10FFFF}"] {
+            assert_eq!(unique_text(Path::new(path)), path);
+        }
+    }
+
+    #[test]
+    fn a_replacement_character_is_told_from_what_it_stands_for() {
+        assert_eq!(unique_text(Path::new("a\u{FFFD}.png")), "a\u{FFFD}EF\u{FFFD}BF\u{FFFD}BD.png");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn bytes_that_are_not_utf8_keep_their_values() {
+        use std::os::unix::ffi::OsStrExt;
+        let text = |bytes: &[u8]| unique_text(Path::new(OsStr::from_bytes(bytes)));
+        assert_eq!(text(b"\xFFa\xFE\xED\xA0\x80"), "�FFa�FE�ED�A0�80");
+        assert_eq!(text(b"caf\xE9/\xC3\xA9\xC3"), "caf�E9/é�C3");
+    }
+
+    #[test]
+    #[cfg(windows)]
+    fn unpaired_surrogates_keep_their_values() {
+        use std::os::windows::ffi::OsStringExt;
+        let name = std::ffi::OsString::from_wide(&[0x61, 0xD800, 0x62]);
+        assert_eq!(unique_text(Path::new(&name)), "a�ED�A0�80b");
+    }
 }

@@ -48,8 +48,8 @@ impl Record {
 
     fn new(item: &Item, status: Status, facts: Facts, error: Option<String>) -> Self {
         Self {
-            input: item.source.display().to_string(),
-            output: item.output.display().to_string(),
+            input: files::unique_text(&item.source),
+            output: files::unique_text(&item.output),
             status,
             input_bytes: item.source.metadata().ok().map(|metadata| metadata.len()),
             facts,
@@ -137,7 +137,7 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(items: &'a [Item], skipped: &'a [Option<Facts>]) -> Self {
-        let output = |item: &Item| item.output.display().to_string();
+        let output = |item: &Item| files::unique_text(&item.output);
         let numbers = items.iter().map(output).zip(0..).collect();
         Self { items, skipped, numbers, added: HashSet::new() }
     }
@@ -167,7 +167,7 @@ impl<'a> Lines<'a> {
         self.skipped[number].as_ref().is_some_and(|facts| {
             known.status != Status::Failed
                 && known.bytes == facts.bytes
-                && known.input == self.items[number].source.display().to_string()
+                && known.input == files::unique_text(&self.items[number].source)
         })
     }
 
@@ -175,7 +175,7 @@ impl<'a> Lines<'a> {
     fn add_missing(&self, file: &mut impl Write) -> Result<()> {
         for (item, facts) in self.items.iter().zip(self.skipped) {
             let Some(facts) = facts else { continue };
-            if !self.added.contains(&*item.output.to_string_lossy()) {
+            if !self.added.contains(&files::unique_text(&item.output)) {
                 serde_json::to_writer(&mut *file, &Record::skipped(item, facts.clone()))?;
                 file.write_all(b"\n")?;
             }

@@ -80,7 +80,7 @@ fn place(path: &Path) -> PathBuf {
 /// A path in the form in which the file system compares it.
 fn folded(path: &Path) -> PathBuf {
     if cfg!(any(windows, target_vendor = "apple")) {
-        return path.to_string_lossy().to_lowercase().into();
+        return files::unique_text(path).to_lowercase().into();
     }
     path.to_owned()
 }
