@@ -6,6 +6,7 @@ mod batch_recovery;
 mod commands;
 #[path = "../common/mod.rs"]
 mod common;
+mod frames;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod room;

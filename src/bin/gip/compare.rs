@@ -10,12 +10,15 @@ use crate::args;
 use crate::encode::json_psnr;
 use crate::files;
 use crate::picture::{SampleSlice, StillImage, widest};
+use crate::source;
 
 pub(crate) fn run(args: &args::Compare) -> Result<()> {
     if files::is_standard_stream(&args.a) && files::is_standard_stream(&args.b) {
         bail!("only one of the two pictures can come from standard input");
     }
-    let (mut a, mut b) = (StillImage::read(&args.a)?, StillImage::read(&args.b)?);
+    let (mut a, mut b) = (source::read(&args.a)?, source::read(&args.b)?);
+    files::warn(&args.a, &a.warnings);
+    files::warn(&args.b, &b.warnings);
     let size = |picture: &StillImage| (picture.image.width(), picture.image.height());
     if size(&a) != size(&b) {
         let ((w, h), (v, g)) = (size(&a), size(&b));

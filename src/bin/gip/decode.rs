@@ -23,6 +23,7 @@ pub(crate) fn run(args: &args::Decode) -> Result<()> {
         Err(_) if args.allow_partial => decode_partial(args, codec, &file),
         decoded => decoded,
     })?;
+    files::warn(&args.input, &picture.warnings);
     output.write(&codec.encode(&upright(picture))?)
 }
 
@@ -33,22 +34,24 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let metadata = decoder.metadata().clone();
     let wanted = Wanted::new(render_options(args, decoder.header()), codec, decoder.header())?;
     let image = wanted.decode(&mut decoder).with_context(context)?;
-    Ok(StillImage { image, metadata })
+    Ok(StillImage { image, metadata, warnings: Vec::new() })
 }
 
-/// Decodes as many Gaussians of an invalid file as possible, and prints a warning.
+/// Decodes as many Gaussians of an invalid file as possible.
 fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> {
-    let name = files::input_name(&args.input);
     let mut stream = StreamDecoder::new();
     let Err(error) = stream.feed(file).and_then(|_| stream.finish()) else {
         // The file is valid, so the error is in the request.
         return decode(args, codec, file);
     };
-    let Some(picture) = stream.picture() else { return Err(error).context(name) };
+    let Some(picture) = stream.picture() else {
+        return Err(error).context(files::input_name(&args.input));
+    };
     let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
-    eprintln!("warning: {name}: {error}; showing {shown} of {all} Gaussians");
+    let warnings = vec![format!("{error}; showing {shown} of {all} Gaussians")];
     let wanted = Wanted::new(render_options(args, picture.header()), codec, picture.header())?;
-    Ok(StillImage { image: wanted.render(&picture)?, metadata: stream.metadata().clone() })
+    let (image, metadata) = (wanted.render(&picture)?, stream.metadata().clone());
+    Ok(StillImage { image, metadata, warnings })
 }
 
 /// The orientation that the Exif of a file asks for.

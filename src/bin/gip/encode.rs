@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::args;
 use crate::files::{self, Output};
 use crate::picture::{SampleSlice, StillImage};
+use crate::source;
 
 /// What stands for an infinite PSNR in JSON, which has no infinity.
 const INFINITE_PSNR: f64 = 999.0;
@@ -22,7 +23,8 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     if !args.force {
         check_name(&output)?;
     }
-    let mut picture = StillImage::read(&args.input)?;
+    let mut picture = source::read(&args.input)?;
+    files::warn(&args.input, &picture.warnings);
     let pool = args.threads.pool()?;
     let encoded = pool.install(|| encode_with_bar(args.encoder.encoder(), &mut picture))?;
     output.write(&encoded.bytes)?;
@@ -97,6 +99,7 @@ struct JsonReport {
     seconds: f64,
     peak_memory: u64,
     shortfall: Option<String>,
+    warnings: Vec<String>,
 }
 
 impl JsonReport {
@@ -117,6 +120,7 @@ impl JsonReport {
             seconds: encoded.report.seconds,
             peak_memory: encoded.report.peak_memory,
             shortfall: encoded.report.shortfall.map(|shortfall| shortfall.to_string()),
+            warnings: picture.warnings.clone(),
         }
     }
 

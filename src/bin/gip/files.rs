@@ -49,6 +49,13 @@ pub(crate) fn unique_text(path: &Path) -> String {
     text
 }
 
+/// Prints what of an input is lost to standard error.
+pub(crate) fn warn(input: &Path, warnings: &[String]) {
+    for warning in warnings {
+        let _ = writeln!(io::stderr(), "warning: {}: {warning}", input_name(input));
+    }
+}
+
 /// Reads a whole file, or standard input.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     if is_standard_stream(path) {

@@ -12,6 +12,7 @@ mod errors;
 mod files;
 mod info;
 mod picture;
+mod source;
 
 use std::process::ExitCode;
 

@@ -1,27 +1,17 @@
-//! Pictures in memory: reading them, and converting their colour model and depth.
+//! Pictures in memory, and converting their colour model and depth.
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, Seek};
-use std::path::Path;
-
-use anyhow::{Context, Result};
+use image::DynamicImage;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use image_gip::{ColorModel, Metadata, SampleDepth};
 
-use crate::files;
-
-/// Most bytes that reading a picture may take: enough for 2^30 pixels of RGB at 8 bits.
-const MAX_MEMORY: u64 = 4 << 30;
-/// Longest side of a .gip file, in pixels.
-const MAX_SIDE: u32 = 1 << 20;
-
-/// A picture, with its Exif orientation applied, and its metadata.
+/// An upright picture, its metadata, and what was lost on the way to it.
 #[derive(Debug)]
 pub(crate) struct StillImage {
     /// Gray or RGB, with or without alpha, 8 or 16 bits: `image` has eight variants for these.
     pub(crate) image: DynamicImage,
     pub(crate) metadata: Metadata,
+    /// What the file that it was read from has and the picture lacks, a sentence each.
+    pub(crate) warnings: Vec<String>,
 }
 
 /// The samples of a picture.
@@ -32,41 +22,6 @@ pub(crate) enum SampleSlice<'a> {
 }
 
 impl StillImage {
-    /// Reads a picture of any format that `image` reads, .gip included.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
-        let bytes = files::read(path)?;
-        let name = || files::input_name(path);
-        Self::decode(reader(path, Cursor::new(bytes)).with_context(name)?).with_context(name)
-    }
-
-    /// Width and height in pixels as they are stored, before the orientation is applied.
-    pub(crate) fn dimensions(path: &Path) -> Result<(u32, u32)> {
-        let name = || files::input_name(path);
-        let file = BufReader::new(File::open(path).with_context(name)?);
-        reader(path, file)
-            .map_err(ImageError::from)
-            .and_then(ImageReader::into_dimensions)
-            .with_context(name)
-    }
-
-    fn decode(reader: ImageReader<impl BufRead + Seek>) -> Result<Self> {
-        let mut limits = limits();
-        let mut decoder = reader.into_decoder()?;
-        limits.reserve(decoder.total_bytes())?;
-        decoder.set_limits(limits)?;
-
-        let orientation = decoder.orientation()?;
-        let mut metadata = Metadata::default();
-        metadata.icc_profile = decoder.icc_profile()?;
-        metadata.exif = decoder.exif_metadata()?.and_then(tiff_stream);
-        metadata.xmp = decoder.xmp_metadata()?;
-        let image = stored_samples(DynamicImage::from_decoder(decoder)?);
-        let mut picture = Self { image, metadata };
-        picture.make_upright(orientation);
-        picture.drop_foreign_profile();
-        Ok(picture)
-    }
-
     /// Applies an orientation to the pixels, and resets the orientation in the Exif, so that it is
     /// not applied again.
     pub(crate) fn make_upright(&mut self, orientation: Orientation) {
@@ -159,61 +114,6 @@ pub(crate) fn widest(a: ColorModel, b: ColorModel) -> ColorModel {
     }
 }
 
-/// A reader of the picture at `path`, which has these contents.
-fn reader<R: BufRead + Seek>(path: &Path, contents: R) -> io::Result<ImageReader<R>> {
-    let mut reader = ImageReader::new(contents);
-    // A format without a signature is recognized by its extension.
-    if let Ok(format) = ImageFormat::from_path(path) {
-        reader.set_format(format);
-    }
-    reader.limits(limits());
-    reader.with_guessed_format()
-}
-
-fn limits() -> image::Limits {
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_MEMORY);
-    limits
-}
-
 fn is_opaque<T: PartialEq>(samples: &[T], channels: usize, full: &T) -> bool {
     samples.iter().skip(channels - 1).step_by(channels).all(|alpha| alpha == full)
-}
-
-/// The TIFF stream of Exif metadata: some programs write the prefix of JPEG's Exif marker before
-/// it. `None` for anything else.
-fn tiff_stream(mut exif: Vec<u8>) -> Option<Vec<u8>> {
-    if exif.starts_with(b"Exif\0\0") {
-        exif.drain(..6);
-    }
-    (exif.starts_with(b"II") || exif.starts_with(b"MM")).then_some(exif)
-}
-
-/// The picture with samples that a .gip file can hold: floats are taken as linear light, encoded as
-/// sRGB, and clipped and rounded to 16 bits.
-fn stored_samples(image: DynamicImage) -> DynamicImage {
-    let encode = |linear: f32| match linear {
-        0.003_130_8.. => 1.055 * linear.powf(1.0 / 2.4) - 0.055,
-        0.0.. => linear * 12.92,
-        // Negative, or not a number.
-        _ => 0.0,
-    };
-    match image {
-        DynamicImage::ImageRgb32F(mut image) => {
-            for pixel in image.pixels_mut() {
-                pixel.0 = pixel.0.map(encode);
-            }
-            DynamicImage::from(image).to_rgb16().into()
-        }
-        DynamicImage::ImageRgba32F(mut image) => {
-            for pixel in image.pixels_mut() {
-                let [r, g, b, a] = pixel.0;
-                pixel.0 = [encode(r), encode(g), encode(b), a];
-            }
-            DynamicImage::from(image).to_rgba16().into()
-        }
-        image => image,
-    }
 }

@@ -62,7 +62,8 @@ pub(crate) struct Batch {
     /// Fields: input, output, status ("written", "skipped" or "failed"), input_bytes, width, height,
     /// bytes, gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of
     /// SSIMULACRA2), seconds (from reading to the encoded result), shortfall (null, or why the target
-    /// was not met), error (null, or why it failed). What is unknown or does not apply is null. In input and
+    /// was not met), warnings (an array of what of the input is lost, such as all frames but the first),
+    /// error (null, or why it failed). What is unknown or does not apply is null. In input and
     /// output, a byte that is not UTF-8 is U+FFFD and two hexadecimal digits, and so are the bytes of
     /// a U+FFFD in a name. Lines are written as files are finished, which is not the order of the inputs. An existing FILE is
     /// replaced. With --resume, lines of files that are skipped are kept, and so are those of files

@@ -38,7 +38,8 @@ pub(crate) struct Encode {
     /// Fields: width, height, gaussians (their number), bytes, bpp (bits per pixel of the whole
     /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples), quality
     /// (an estimate of SSIMULACRA2, from 0 to 100), iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
-    /// (in bytes), shortfall (null, or why the target was not met). An infinite PSNR, of an exact
+    /// (in bytes), shortfall (null, or why the target was not met), warnings (an array of what of the input is
+    /// lost, such as all frames but the first). An infinite PSNR, of an exact
     /// copy, is given as 999.
     #[arg(long)]
     pub(crate) json: bool,

@@ -121,6 +121,7 @@ impl Batch {
             let item = todo[index];
             let record = match catch_panic(item, || self.result(item)) {
                 Ok(facts) => {
+                    bar.suspend(|| files::warn(&item.source, &facts.warnings));
                     tally.written.fetch_add(1, Ordering::Relaxed);
                     tally.bytes.fetch_add(facts.bytes.unwrap_or(0), Ordering::Relaxed);
                     Record::written(item, facts)

@@ -20,6 +20,7 @@ use crate::codec::Codec;
 use crate::decode::{self, Wanted};
 use crate::encode;
 use crate::picture::StillImage;
+use crate::source;
 
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
@@ -43,6 +44,7 @@ pub(crate) struct Facts {
     quality: Option<f64>,
     seconds: Option<f64>,
     shortfall: Option<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Task {
@@ -100,9 +102,9 @@ impl Task {
                 (header.width, header.height, Some(header.gaussians))
             }
             Self::Decode { .. } => {
-                let (width, height) = StillImage::dimensions(output)?;
+                let (width, height) = source::dimensions(output)?;
                 let _permit = budget.wait_for(pixels(width, height));
-                StillImage::read(output)?;
+                source::read(output)?;
                 (width, height, None)
             }
         };
@@ -122,11 +124,11 @@ fn encode(
     budget: &Budget,
     stop: &Stop,
 ) -> Result<(Vec<u8>, Facts)> {
-    let (width, height) = StillImage::dimensions(&item.source)?;
+    let (width, height) = source::dimensions(&item.source)?;
     let _permit = budget.wait_for(pixels(width, height));
     check(stop)?;
     let start = Instant::now();
-    let mut picture = StillImage::read(&item.source)?;
+    let mut picture = source::read(&item.source)?;
     let encoded = encode::encode(encoder.clone(), &mut picture, &mut |_| match check(stop) {
         Ok(()) => ControlFlow::Continue(()),
         Err(_) => ControlFlow::Break(()),
@@ -141,6 +143,7 @@ fn encode(
         quality: Some(encoded.report.quality),
         seconds: Some(start.elapsed().as_secs_f64()),
         shortfall: encoded.report.shortfall.map(|shortfall| shortfall.to_string()),
+        warnings: picture.warnings,
     };
     Ok((encoded.bytes, facts))
 }
@@ -174,7 +177,8 @@ fn decode(
         None => decoder.header().gaussians,
         Some(_) => decoder.stream().gaussians().len() as u32,
     };
-    let picture = decode::upright(StillImage { image: image.with_context(context)?, metadata });
+    let image = image.with_context(context)?;
+    let picture = decode::upright(StillImage { image, metadata, warnings: Vec::new() });
     let bytes = codec.encode(&picture).with_context(context)?;
     let facts = Facts {
         width: Some(picture.image.width()),
@@ -182,6 +186,7 @@ fn decode(
         bytes: Some(bytes.len() as u64),
         gaussians: Some(gaussians),
         seconds: Some(start.elapsed().as_secs_f64()),
+        warnings: picture.warnings,
         ..Facts::default()
     };
     Ok((bytes, facts))
