@@ -23,10 +23,15 @@ use crate::threads;
 ///     scale: A factor of the stored width and height, in place of `size`.
 ///     region: (x, y, width, height): render only this part of the output, in pixels of the size asked
 ///         for. Layers of the file that do not show in it are skipped.
-///     mode: "L", "LA", "RGB" or "RGBA". Gray can become RGB, and an alpha channel can be added; none
-///         is dropped. Default: that of the file.
+///     mode: "L", "LA", "RGB" or "RGBA". Gray can become RGB, an alpha channel can be added, and a
+///         picture with alpha is composed over `background` for a mode without it; colour does not
+///         become gray. Default: that of the file.
+///     background: What is behind a picture with alpha whose result has none: one number for all
+///         colours, or one for each, in the units of `dtype`. The samples composed are those that
+///         show, clamped and not linear, as in browsers. With a background, the default mode is that of
+///         the file without alpha. Default: white.
 ///     dtype: numpy.uint8 (0 to 255), numpy.uint16 (0 to 65535) or numpy.float32 (1.0 is a full sample;
-///         neither clamped nor rounded). Default: that of `out`, else uint8 or uint16, whichever the
+///         neither clamped nor rounded, unless composed). Default: that of `out`, else uint8 or uint16, whichever the
 ///         encoded picture had.
 ///     out: The array to decode into: C-contiguous, writeable, of the shape of the result.
 ///     threads: The number of threads, 1 to 1024. With 1, the work is done on the caller's thread. The
@@ -43,7 +48,7 @@ use crate::threads;
 ///     TypeError: An argument has the wrong type.
 ///     OSError: The file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, dtype=None, out=None, threads=1, limits=None))]
+#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, threads=1, limits=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn decode<'py>(
     py: Python<'py>,
@@ -52,12 +57,14 @@ pub(crate) fn decode<'py>(
     scale: Option<f64>,
     region: Option<(i64, i64, i64, i64)>,
     mode: Option<&str>,
+    background: Option<&Bound<'py, PyAny>>,
     dtype: Option<&Bound<'py, PyAny>>,
     out: Option<&Bound<'py, PyAny>>,
     threads: i64,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let request = Request { size, scale, region, mode, dtype, out, prefix: None, threads };
+    let request =
+        Request { size, scale, region, mode, background, dtype, out, prefix: None, threads };
     let rendering = request.check()?;
     let file = Bytes::of_file(src)?;
     let bytes = file.as_slice()?;
@@ -68,8 +75,7 @@ pub(crate) fn decode<'py>(
     let options = rendering.options(decoder.header());
     decoder.set_options(options.clone());
     decoder.output_len().map_err(failed)?;
-    let channels = options.output_color(decoder.header()).map_err(failed)?.channels();
-    let mut output = Output::new(py, decoder.header(), &options, &request)?;
+    let mut output = Output::new(py, decoder.header(), &rendering, &request)?;
     if output.overlaps(bytes) {
         return Err(PyValueError::new_err("out overlaps src"));
     }
@@ -77,7 +83,7 @@ pub(crate) fn decode<'py>(
     py.detach(|| {
         threads::decoding(rendering.threads, |threads| {
             decoder.set_options(options.with_threads(threads));
-            samples.decode(&mut decoder, channels)
+            samples.decode(&mut decoder)
         })
     })?
     .map_err(failed)?;

@@ -6,7 +6,7 @@ use core::time::Duration;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use image_gip::{
-    EncodeError, Encoded, Encoder, Metadata, Progress, Shortfall, Source, Target, Tune,
+    EncodeError, Encoded, Encoder, Precision, Progress, Shortfall, Source, Target, Tune,
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use pyo3::types::PyBytes;
 
 use crate::array::Picture;
 use crate::errors::{encode_error, warn_of_shortfall};
-use crate::{input, threads};
+use crate::{metadata, threads};
 
 /// How long the calling thread waits before it looks for signals, such as that of Ctrl-C.
 const INTERVAL: Duration = Duration::from_millis(10);
@@ -45,11 +45,16 @@ const NEWS: f64 = 0.002;
 ///     effort: How much time to spend, 1 (least) to 7 (most).
 ///     tune: What to minimize for the size of the file: "visual", the error that a person sees, or
 ///         "psnr", the squared error.
+///     precision: How the Gaussians are stored: "entropy", for the smallest files; "packed", with codes
+///         of fixed bit depths; or "f32", the fitted values themselves, in files several times as large.
 ///     threads: The number of threads that work, 1 to 1024. The calling thread only waits for them.
 ///     seed: The seed of all random numbers.
 ///     icc: An ICC profile to store with the picture.
 ///     exif: Exif data: a TIFF stream, with or without the prefix that it has in JPEG.
 ///     xmp: An XMP packet: XML in UTF-8.
+///     texts: Texts by their keywords, such as "Title", "Author" or "Copyright": a mapping, or pairs,
+///         in the order in which they are stored. A keyword is 1 to 79 bytes of UTF-8; neither has a
+///         NUL.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
 ///         or raises an exception, the encoding is cancelled. None goes on.
 ///
@@ -62,7 +67,7 @@ const NEWS: f64 = 0.002;
 ///         option is out of range.
 ///     CancelledError: `progress` returned False.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", threads=1, seed=0, icc=None, exif=None, xmp=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, icc=None, exif=None, xmp=None, texts=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -74,11 +79,13 @@ pub(crate) fn encode<'py>(
     gaussians: Option<i64>,
     effort: i64,
     tune: &str,
+    precision: &str,
     threads: i64,
     seed: u64,
     icc: Option<&Bound<'py, PyAny>>,
     exif: Option<&Bound<'py, PyAny>>,
     xmp: Option<&Bound<'py, PyAny>>,
+    texts: Option<&Bound<'py, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let threads = threads::checked(threads)?;
@@ -89,8 +96,9 @@ pub(crate) fn encode<'py>(
         .with_target(target)
         .with_tune(tuning(tune)?)
         .with_effort(effort)
+        .with_precision(self::precision(precision)?)
         .with_seed(seed)
-        .with_metadata(metadata(icc, exif, xmp)?);
+        .with_metadata(metadata::of(icc, exif, xmp, texts)?);
     let picture = Picture::new(array)?;
     let source = picture.source()?;
     let encoded = py
@@ -142,6 +150,17 @@ fn natural(name: &str, value: Option<i64>) -> PyResult<Option<u64>> {
     value.map(checked).transpose()
 }
 
+fn precision(name: &str) -> PyResult<Precision> {
+    match name {
+        "entropy" => Ok(Precision::Entropy),
+        "packed" => Ok(Precision::Packed),
+        "f32" => Ok(Precision::Float),
+        _ => Err(PyValueError::new_err(format!(
+            "precision {name:?}; it must be \"entropy\", \"packed\" or \"f32\""
+        ))),
+    }
+}
+
 fn tuning(tune: &str) -> PyResult<Tune> {
     match tune {
         "visual" => Ok(Tune::Visual),
@@ -150,34 +169,6 @@ fn tuning(tune: &str) -> PyResult<Tune> {
             Err(PyValueError::new_err(format!("tune {tune:?}; it must be \"visual\" or \"psnr\"")))
         }
     }
-}
-
-fn metadata(
-    icc: Option<&Bound<'_, PyAny>>,
-    exif: Option<&Bound<'_, PyAny>>,
-    xmp: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Metadata> {
-    let blob = |name: &str, data: Option<&Bound<'_, PyAny>>| {
-        let bytes =
-            data.map(|data| Ok::<_, PyErr>(input::buffer(name, data)?.as_slice()?.to_vec()));
-        bytes.transpose()
-    };
-    let mut metadata = Metadata::default();
-    metadata.icc_profile = blob("icc", icc)?;
-    metadata.exif = blob("exif", exif)?.map(tiff_stream).transpose()?;
-    metadata.xmp = blob("xmp", xmp)?;
-    Ok(metadata)
-}
-
-/// The TIFF stream of Exif data, without the prefix that it has in JPEG.
-fn tiff_stream(mut exif: Vec<u8>) -> PyResult<Vec<u8>> {
-    if exif.starts_with(b"Exif\0\0") {
-        exif.drain(..6);
-    }
-    if exif.starts_with(b"II") || exif.starts_with(b"MM") {
-        return Ok(exif);
-    }
-    Err(PyValueError::new_err("exif must be a TIFF stream, which begins with II or MM"))
 }
 
 /// What the threads that encode and the thread that waits for them tell each other.

@@ -4,10 +4,12 @@
 //! nothing is kept between calls: no pool of threads that a `fork` would lose.
 
 mod array;
+mod background;
 mod decode;
 mod encode;
 mod errors;
 mod input;
+mod metadata;
 mod objects;
 mod output;
 mod request;

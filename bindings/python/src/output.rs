@@ -10,38 +10,45 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::request::Request;
+use crate::background::{Channels, Pixels};
+use crate::errors::decode_error;
+use crate::request::{Rendering, Request};
 
 /// An array that is borrowed for writing.
-pub(crate) enum Output<'py> {
+enum Array<'py> {
     U8(PyReadwriteArrayDyn<'py, u8>),
     U16(PyReadwriteArrayDyn<'py, u16>),
     F32(PyReadwriteArrayDyn<'py, f32>),
 }
 
+/// The array for a rendering.
+pub(crate) struct Output<'a, 'py> {
+    array: Array<'py>,
+    channels: Channels<'a>,
+}
+
 /// The samples of an output array: height x width x channels.
 #[derive(Debug)]
 pub(crate) enum Samples<'a> {
-    U8(&'a mut [u8]),
-    U16(&'a mut [u16]),
-    F32(&'a mut [f32]),
+    U8(Pixels<'a, u8>),
+    U16(Pixels<'a, u16>),
+    F32(Pixels<'a, f32>),
 }
 
-impl<'py> Output<'py> {
-    /// A new array for what `options` render, or `out` if that fits. The size was checked against the
-    /// limits before.
+impl<'a, 'py> Output<'a, 'py> {
+    /// A new array for what is rendered of a picture, or `out` if that fits. The size was checked
+    /// against the limits before.
     pub(crate) fn new(
         py: Python<'py>,
         header: &Header,
-        options: &RenderOptions,
+        rendering: &'a Rendering,
         request: &Request<'_, 'py>,
     ) -> PyResult<Self> {
-        let (width, height) = options.output_size(header);
-        let color = options.output_color(header);
-        let channels = color.map_err(|error| crate::errors::decode_error(py, error))?.channels();
+        let (width, height) = rendering.options(header).output_size(header);
+        let channels = rendering.channels(header).map_err(|error| decode_error(py, error))?;
         let mut shape = vec![height as usize, width as usize];
-        if channels > 1 {
-            shape.push(channels);
+        if channels.returned > 1 {
+            shape.push(channels.returned);
         }
         let kind = match (request.dtype, request.out) {
             (Some(kind), _) => PyArrayDescr::new(py, kind)?,
@@ -49,60 +56,57 @@ impl<'py> Output<'py> {
             (None, None) if header.depth == SampleDepth::Sixteen => dtype::<u16>(py),
             (None, None) => dtype::<u8>(py),
         };
-        if kind.is_equiv_to(&dtype::<u8>(py)) {
-            Ok(Self::U8(array(py, shape, request.out)?))
+        let array = if kind.is_equiv_to(&dtype::<u8>(py)) {
+            Array::U8(array(py, shape, request.out)?)
         } else if kind.is_equiv_to(&dtype::<u16>(py)) {
-            Ok(Self::U16(array(py, shape, request.out)?))
+            Array::U16(array(py, shape, request.out)?)
         } else if kind.is_equiv_to(&dtype::<f32>(py)) {
-            Ok(Self::F32(array(py, shape, request.out)?))
+            Array::F32(array(py, shape, request.out)?)
         } else {
             let message = format!("dtype {kind}; it must be uint8, uint16 or float32");
-            Err(PyTypeError::new_err(message))
-        }
+            return Err(PyTypeError::new_err(message));
+        };
+        Ok(Self { array, channels })
     }
 
     /// Whether the array shares memory with these bytes.
     pub(crate) fn overlaps(&self, bytes: &[u8]) -> bool {
-        let (start, length) = match self {
-            Self::U8(array) => (array.data().addr(), array.len()),
-            Self::U16(array) => (array.data().addr(), 2 * array.len()),
-            Self::F32(array) => (array.data().addr(), 4 * array.len()),
+        let (start, length) = match &self.array {
+            Array::U8(array) => (array.data().addr(), array.len()),
+            Array::U16(array) => (array.data().addr(), 2 * array.len()),
+            Array::F32(array) => (array.data().addr(), 4 * array.len()),
         };
         let first = bytes.as_ptr().addr();
         start < first + bytes.len() && first < start + length
     }
 
     pub(crate) fn samples(&mut self) -> PyResult<Samples<'_>> {
-        Ok(match self {
-            Self::U8(array) => Samples::U8(array.as_slice_mut()?),
-            Self::U16(array) => Samples::U16(array.as_slice_mut()?),
-            Self::F32(array) => Samples::F32(array.as_slice_mut()?),
+        let Self { array, channels } = self;
+        Ok(match array {
+            Array::U8(array) => Samples::U8(channels.pixels(array.as_slice_mut()?)?),
+            Array::U16(array) => Samples::U16(channels.pixels(array.as_slice_mut()?)?),
+            Array::F32(array) => Samples::F32(channels.pixels(array.as_slice_mut()?)?),
         })
     }
 
     /// The array, which is no longer borrowed.
     pub(crate) fn into_array(self) -> Bound<'py, PyAny> {
-        match self {
-            Self::U8(array) => array.as_any().clone(),
-            Self::U16(array) => array.as_any().clone(),
-            Self::F32(array) => array.as_any().clone(),
+        match self.array {
+            Array::U8(array) => array.as_any().clone(),
+            Array::U16(array) => array.as_any().clone(),
+            Array::F32(array) => array.as_any().clone(),
         }
     }
 }
-
 impl Samples<'_> {
-    /// Decodes the file of a decoder with the options that it has. `channels` are those of the output.
-    pub(crate) fn decode(
-        self,
-        decoder: &mut Decoder<&[u8]>,
-        channels: usize,
-    ) -> Result<(), DecodeError> {
+    /// Decodes the file of a decoder with the options that it has.
+    pub(crate) fn decode(self, decoder: &mut Decoder<&[u8]>) -> Result<(), DecodeError> {
         match self {
-            Samples::U8(out) => decoder.decode_into(out),
-            Samples::U16(out) => decoder.decode_into_u16(out),
-            Samples::F32(out) => {
+            Samples::U8(pixels) => pixels.fill(|out, _| decoder.decode_into(out)),
+            Samples::U16(pixels) => pixels.fill(|out, _| decoder.decode_into_u16(out)),
+            Samples::F32(pixels) => pixels.fill(|out, channels| {
                 interleaved(out, channels, |planes| decoder.decode_into_planes(planes))
-            }
+            }),
         }
     }
 
@@ -113,12 +117,11 @@ impl Samples<'_> {
         options: &RenderOptions,
     ) -> Result<(), DecodeError> {
         match self {
-            Samples::U8(out) => picture.render_u8(options, out),
-            Samples::U16(out) => picture.render_u16(options, out),
-            Samples::F32(out) => {
-                let channels = options.output_color(picture.header())?.channels();
+            Samples::U8(pixels) => pixels.fill(|out, _| picture.render_u8(options, out)),
+            Samples::U16(pixels) => pixels.fill(|out, _| picture.render_u16(options, out)),
+            Samples::F32(pixels) => pixels.fill(|out, channels| {
                 interleaved(out, channels, |planes| picture.render_planes(options, planes))
-            }
+            }),
         }
     }
 }

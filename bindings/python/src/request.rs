@@ -1,9 +1,10 @@
 //! What to render, in the words of the caller.
 
-use image_gip::{ColorModel, Header, Region, RenderOptions};
+use image_gip::{ColorModel, DecodeError, Header, Region, RenderOptions};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::background::{Background, Channels};
 use crate::threads;
 
 /// Names of the colour models, as Pillow has them.
@@ -26,6 +27,7 @@ pub(crate) struct Request<'a, 'py> {
     pub(crate) scale: Option<f64>,
     pub(crate) region: Option<(i64, i64, i64, i64)>,
     pub(crate) mode: Option<&'a str>,
+    pub(crate) background: Option<&'a Bound<'py, PyAny>>,
     pub(crate) dtype: Option<&'a Bound<'py, PyAny>>,
     pub(crate) out: Option<&'a Bound<'py, PyAny>>,
     /// Render only the first Gaussians of the file.
@@ -37,6 +39,8 @@ pub(crate) struct Request<'a, 'py> {
 #[derive(Debug)]
 pub(crate) struct Rendering {
     scale: Option<f64>,
+    mode: Option<ColorModel>,
+    background: Option<Background>,
     options: RenderOptions,
     pub(crate) threads: usize,
 }
@@ -61,30 +65,69 @@ impl Request<'_, '_> {
             let (x, y, width, height) = (number(x)?, number(y)?, number(width)?, number(height)?);
             options = options.with_region(Region { x, y, width, height });
         }
-        if let Some(mode) = self.mode {
-            let Some(&(_, color)) = MODES.iter().find(|known| known.0 == mode) else {
-                return Err(PyValueError::new_err(format!(
-                    "mode {mode:?}; it must be \"L\", \"LA\", \"RGB\" or \"RGBA\""
-                )));
-            };
-            options = options.with_color(color);
+        let mode = self.mode.map(color_model).transpose()?;
+        let background = self.background.map(Background::new).transpose()?;
+        if let (Some(mode), true) = (mode, background.is_some())
+            && mode.has_alpha()
+        {
+            return Err(PyTypeError::new_err(format!(
+                "mode {:?} has alpha, so that there is no background",
+                mode_name(mode)
+            )));
         }
         if let Some(prefix) = self.prefix {
             options = options.with_prefix(number("prefix", prefix)?);
         }
         let threads = threads::checked(self.threads)?;
-        Ok(Rendering { scale: self.scale, options, threads })
+        Ok(Rendering { scale: self.scale, mode, background, options, threads })
     }
 }
 
 impl Rendering {
-    /// The options for a picture.
+    /// The options for a picture. Where alpha is dropped, it is rendered nevertheless.
     pub(crate) fn options(&self, header: &Header) -> RenderOptions {
-        let Some(scale) = self.scale else { return self.options.clone() };
+        let mut options = self.options.clone();
+        if let Some(mode) = self.mode {
+            options = options.with_color(mode);
+        }
+        if self.drops_alpha(header) {
+            options = options.with_color(header.color);
+        }
+        let Some(scale) = self.scale else { return options };
         // The cast of a side that is too long saturates, and the decoder refuses it.
         let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
-        self.options.clone().with_size(scaled(header.width), scaled(header.height))
+        options.with_size(scaled(header.width), scaled(header.height))
     }
+
+    /// The channels of a picture, as they are rendered and as the caller gets them.
+    pub(crate) fn channels(&self, header: &Header) -> Result<Channels<'_>, DecodeError> {
+        let rendered = self.options(header).output_color(header)?.channels();
+        let drops_alpha = self.drops_alpha(header);
+        let returned = match self.mode {
+            Some(mode) => mode.channels(),
+            None => rendered - usize::from(drops_alpha),
+        };
+        Ok(Channels { rendered, returned, drops_alpha, background: self.background.as_ref() })
+    }
+
+    /// Whether the picture has alpha, and is composed over a background.
+    fn drops_alpha(&self, header: &Header) -> bool {
+        let drops = match self.mode {
+            // Colours are not dropped.
+            Some(mode) => !mode.has_alpha() && mode.channels() >= header.color.channels() - 1,
+            None => self.background.is_some(),
+        };
+        header.color.has_alpha() && drops
+    }
+}
+
+fn color_model(mode: &str) -> PyResult<ColorModel> {
+    let known = MODES.iter().find(|known| known.0 == mode).map(|known| known.1);
+    known.ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "mode {mode:?}; it must be \"L\", \"LA\", \"RGB\" or \"RGBA\""
+        ))
+    })
 }
 
 fn number(name: &str, value: i64) -> PyResult<u32> {

@@ -81,7 +81,7 @@ impl StreamDecoder {
     /// Renders the Gaussians that have arrived.
     ///
     /// Args:
-    ///     size, scale, region, mode, dtype, out, threads: As for `decode`.
+    ///     size, scale, region, mode, background, dtype, out, threads: As for `decode`.
     ///     prefix: Render only so many Gaussians, the first of the file.
     ///
     /// Returns:
@@ -92,7 +92,7 @@ impl StreamDecoder {
     ///         fit.
     ///     TypeError: An argument has the wrong type.
     ///     LimitError: The output or the work exceeds a limit.
-    #[pyo3(signature = (*, size=None, scale=None, region=None, mode=None, dtype=None, out=None, prefix=None, threads=1))]
+    #[pyo3(signature = (*, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, prefix=None, threads=1))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn image<'py>(
         &self,
@@ -101,12 +101,14 @@ impl StreamDecoder {
         scale: Option<f64>,
         region: Option<(i64, i64, i64, i64)>,
         mode: Option<&str>,
+        background: Option<&Bound<'py, PyAny>>,
         dtype: Option<&Bound<'py, PyAny>>,
         out: Option<&Bound<'py, PyAny>>,
         prefix: Option<i64>,
         threads: i64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let request = Request { size, scale, region, mode, dtype, out, prefix, threads };
+        let request =
+            Request { size, scale, region, mode, background, dtype, out, prefix, threads };
         let rendering = request.check()?;
         let failed = |error| decode_error(py, error);
 
@@ -117,7 +119,7 @@ impl StreamDecoder {
             picture.output_len(&options).map_err(failed)?;
             (picture.header().clone(), options)
         };
-        let mut output = Output::new(py, &header, &options, &request)?;
+        let mut output = Output::new(py, &header, &rendering, &request)?;
         let samples = output.samples()?;
         let rendered = py.detach(|| {
             let stream = self.lock();

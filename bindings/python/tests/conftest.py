@@ -1,13 +1,17 @@
 """What the tests share: the test vectors, a picture, a file of it, the tool."""
 
+import io
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 import image_gip
+import image_gip.pillow
 
 ROOT = Path(__file__).resolve().parents[3]
 VECTORS = ROOT / "spec" / "vectors"
@@ -24,6 +28,14 @@ def draw(width: int, height: int, channels: int) -> Picture:
         disc = np.hypot(x - width / 2, y - height / 3) < height / 5
         samples[..., channel] = np.clip(128 + 70 * waves + 40 * disc - 20 * channel, 0, 255)
     return samples
+
+
+def saved(image: Image.Image, **options: Any) -> io.BytesIO:
+    """The file that Pillow's plug-in makes of a picture, quickly."""
+    file = io.BytesIO()
+    image.save(file, "GIP", **{"effort": 1} | options)
+    file.seek(0)
+    return file
 
 
 @pytest.fixture(scope="session")

@@ -34,6 +34,8 @@ def psnr(a: Picture, b: Picture) -> float:
         ({"psnr": 35, "seed": 7}, ["--psnr", "35", "--seed", "7"]),
         ({"gaussians": 50, "tune": "psnr"}, ["--gaussians", "50", "--tune", "psnr"]),
         ({"effort": 2, "threads": 2}, ["--effort", "2"]),
+        ({"bpp": 3, "precision": "packed"}, ["--bpp", "3", "--precision", "packed"]),
+        ({"gaussians": 40, "precision": "f32"}, ["--gaussians", "40", "--precision", "f32"]),
     ],
 )
 @pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA", "I;16"])
@@ -116,9 +118,22 @@ def test_options_that_are_refused(photo: Picture) -> None:
         ({"gaussians": 1 << 40}, ValueError, "it must be 1 to 4194304"),
         ({"quality": float("nan")}, ValueError, "quality NaN; it must be 0 to 100"),
         ({"tune": "ssim"}, ValueError, 'tune "ssim"; it must be "visual" or "psnr"'),
+        (
+            {"precision": "u8"},
+            ValueError,
+            'precision "u8"; it must be "entropy", "packed" or "f32"',
+        ),
         ({"threads": 2000}, ValueError, "threads 2000; it must be 1 to 1024"),
         ({"exif": b"\xff\xd8"}, ValueError, "begins with II or MM"),
         ({"icc": "sRGB"}, TypeError, "icc must be bytes-like, not str"),
+        ({"texts": "Title"}, TypeError, "texts must be a mapping of str to str, or pairs of str"),
+        ({"texts": {"Title": 5}}, TypeError, "texts must be a mapping of str to str"),
+        ({"texts": [("a", "b", "c")]}, TypeError, "texts must be"),
+        ({"texts": 5}, TypeError, "texts must be"),
+        ({"texts": {"": "a"}}, ValueError, 'keyword ""; it must be 1 to 79 bytes long'),
+        ({"texts": {"ä" * 40: "a"}}, ValueError, "it must be 1 to 79 bytes long"),
+        ({"texts": {"Title": "a\0b"}}, ValueError, 'a NUL in the text "Title"'),
+        ({"texts": {"Title": "\ud800"}}, ValueError, "surrogates not allowed"),
     ]
     for keywords, kind, message in refused:
         with pytest.raises(kind, match=message):
@@ -155,6 +170,28 @@ def test_metadata(photo: Picture) -> None:
     )
     info = image_gip.info(file)
     assert (info.icc, info.exif, info.xmp) == (b"profile", exif, "<ä/>".encode())
+
+
+def test_texts(photo: Picture) -> None:
+    pairs = [("Title", "Dämmerung"), ("Author", ""), ("Title", "once more")]
+    for texts in (pairs, iter(pairs), tuple(pairs)):
+        file = image_gip.encode(photo, effort=1, texts=texts)
+        assert image_gip.info(file).texts == tuple(pairs)
+    texts_by_keyword = dict(pairs)
+    file = image_gip.encode(photo, effort=1, texts=texts_by_keyword)
+    assert image_gip.info(file).texts == tuple(texts_by_keyword.items())
+
+
+def test_precision(photo: Picture) -> None:
+    codings = {"entropy": "entropy", "packed": "packed", "f32": "packed"}
+    sizes = []
+    for precision, coding in codings.items():
+        file = image_gip.encode(photo, effort=1, gaussians=60, precision=precision)  # type: ignore[arg-type]
+        info = image_gip.info(file)
+        assert info.coding == coding
+        assert 50 < info.gaussians <= 60
+        sizes.append(len(file))
+    assert sizes == sorted(sizes)
 
 
 def test_progress(photo: Picture) -> None:

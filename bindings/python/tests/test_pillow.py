@@ -3,17 +3,15 @@
 import io
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import VECTORS, Picture, draw
+from conftest import VECTORS, Picture, draw, saved
 from PIL import Image, ImageCms, ImageFile, UnidentifiedImageError
 
 import image_gip
 import image_gip.pillow
 
-FAST = {"effort": 1}
 #: Exif with the tag ImageDescription.
 DESCRIPTION = 0x010E
 
@@ -27,13 +25,6 @@ class Counted(io.BytesIO):
         data = super().read(size)
         self.furthest = max(self.furthest, self.tell())
         return data
-
-
-def saved(image: Image.Image, **options: Any) -> io.BytesIO:
-    file = io.BytesIO()
-    image.save(file, "GIP", **FAST | options)
-    file.seek(0)
-    return file
 
 
 @pytest.fixture
@@ -57,41 +48,6 @@ def test_round_trips(mode: str) -> None:
         np.testing.assert_array_equal(np.asarray(opened), expected)
         again = opened.copy()
     np.testing.assert_array_equal(np.asarray(again), expected)
-
-
-@pytest.mark.parametrize(
-    ("mode", "stored"), [("1", "L"), ("P", "RGB"), ("PA", "RGBA"), ("RGBX", "RGB")]
-)
-def test_modes_that_are_converted(mode: str, stored: str) -> None:
-    image = Image.fromarray(draw(40, 30, 3)).convert("P" if mode == "PA" else mode).convert(mode)
-    file = saved(image)
-    assert file.getvalue() == image_gip.encode(np.asarray(image.convert(stored)), effort=1)
-
-
-@pytest.mark.parametrize(("mode", "stored"), [("P", "RGBA"), ("L", "LA"), ("RGB", "RGBA")])
-def test_a_transparent_colour_becomes_alpha(mode: str, stored: str) -> None:
-    image = Image.fromarray(draw(40, 30, 3)).convert(mode)
-    colour = image.getpixel((5, 5))
-    image.info["transparency"] = colour
-    with Image.open(saved(image)) as opened:
-        assert opened.mode == stored
-
-
-@pytest.mark.parametrize("mode", ["CMYK", "YCbCr", "HSV", "I", "F"])
-def test_modes_that_are_refused(mode: str) -> None:
-    image = Image.new("RGB", (9, 9)).convert("L" if mode in "IF" else "RGB").convert(mode)
-    with pytest.raises(OSError, match=f"cannot write mode {mode} as GIP; convert it"):
-        saved(image)
-
-
-def test_16_bits_go_through_numpy() -> None:
-    samples = draw(40, 30, 1)[..., 0].astype(np.uint16) * 257
-    with pytest.raises(OSError, match="pass its NumPy array to"):
-        saved(Image.fromarray(samples))
-    file = image_gip.encode(samples, psnr=40, effort=1)
-    with Image.open(io.BytesIO(file)) as opened:
-        assert opened.mode == "L"
-        np.testing.assert_array_equal(np.asarray(opened), image_gip.decode(file, dtype=np.uint8))
 
 
 def test_files_by_name(tmp_path: Path, photo: Picture) -> None:

@@ -239,6 +239,23 @@ def test_decoded_pictures_are_upright(operation: Any, tmp_path: Path) -> None:
         assert folder.count_errors(out) == 1
 
 
+@pytest.mark.parametrize("format", ["png", "jpeg"])
+def test_gray_pictures_of_16_bits(format: str, tmp_path: Path) -> None:
+    gray = np.asarray(draw(1).convert("L")).astype(np.uint16) * 257
+    Image.fromarray(gray).save(tmp_path / "gray.png")
+    encoded = run_serially([tmp_path / "gray.png"], tmp_path / "encoded")
+    ((_, file),) = containers.pictures(encoded / "shard-000000.parquet")
+    assert image_gip.info(file).depth == 16
+    inputs = [encoded / "shard-000000.parquet"]
+    options: dict[str, Any] = {"format": format}
+    out = run_serially(inputs, tmp_path / "out", operation="decode", options=options)
+    (row,) = pyarrow.parquet.read_table(out / "shard-000000.parquet").to_pylist()
+    with Image.open(io.BytesIO(row["bytes"])) as image:
+        assert image.mode == "L"
+        error = np.asarray(image).astype(int) - image_gip.decode(file, dtype=np.uint8)
+    assert np.abs(error).mean() < 3
+
+
 def test_folders(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"
     folder.begin(out, {"effort": 1, "seed": 0})

@@ -1,11 +1,11 @@
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 
 from numpy.typing import DTypeLike, NDArray
 from typing_extensions import Buffer
 
-from image_gip._types import Info, Limits, Mode, Progress, Tune
+from image_gip._types import Info, Limits, Mode, Precision, Progress, Tune
 
 _Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
 _Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
@@ -36,6 +36,7 @@ def decode(
     scale: float | None = None,
     region: _Region | None = None,
     mode: Mode | None = None,
+    background: float | Iterable[float] | None = None,
     dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
     threads: int = 1,
@@ -51,11 +52,13 @@ def encode(
     gaussians: int | None = None,
     effort: int = 4,
     tune: Tune = "visual",
+    precision: Precision = "entropy",
     threads: int = 1,
     seed: int = 0,
     icc: _Buffer | None = None,
     exif: _Buffer | None = None,
     xmp: _Buffer | None = None,
+    texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
 def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
@@ -74,6 +77,7 @@ class StreamDecoder:
         scale: float | None = None,
         region: _Region | None = None,
         mode: Mode | None = None,
+        background: float | Iterable[float] | None = None,
         dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         prefix: int | None = None,

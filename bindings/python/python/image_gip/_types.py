@@ -7,6 +7,8 @@ from typing import Literal, TypeAlias
 Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
 #: What an encoding minimizes: the error that a person sees, or the squared error.
 Tune: TypeAlias = Literal["visual", "psnr"]
+#: How the Gaussians of a file are stored, as the tool names it.
+Precision: TypeAlias = Literal["entropy", "packed", "f32"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

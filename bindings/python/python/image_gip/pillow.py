@@ -4,9 +4,13 @@
 ``draft`` render it at the size that is wanted, from the first layers of the file, which costs a
 fraction.
 
-Modes are L, LA, RGB and RGBA with 8 bits per sample, as Pillow has no 16-bit colour: a file of 16
-bits is rendered with 8. ``image_gip.decode`` gives all 16 as a NumPy array, and
-``image_gip.encode`` takes them.
+Modes are L, LA, RGB and RGBA with 8 bits per sample, and I;16 for gray pictures of 16 bits. Pillow
+has no other mode of 16 bits: such files are rendered with 8, and ``image_gip.decode`` gives all 16
+as a NumPy array. Pillow converts I;16 to 8 bits by clipping; after ``draft("L", image.size)`` the
+picture is rendered with 8 bits.
+
+Saving keeps the samples of these modes and those of I;16B, I (from 0 to 65535), 1, P, PA and RGBX.
+La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK by its ICC profile.
 """
 
 from __future__ import annotations
@@ -15,8 +19,10 @@ import math
 from typing import IO, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageFile
 
+from image_gip import _modes
 from image_gip._errors import GipError, SignatureError
 from image_gip._native import StreamDecoder, encode, info, read_header
 from image_gip._types import Limits
@@ -33,10 +39,12 @@ _OPTIONS = (
     "bytes",
     "effort",
     "gaussians",
+    "precision",
     "progress",
     "psnr",
     "quality",
     "seed",
+    "texts",
     "threads",
     "tune",
 )
@@ -57,7 +65,7 @@ class GipImageFile(ImageFile.ImageFile):
         except GipError as error:
             raise OSError(str(error)) from error
         self._stored_size = header.size
-        self._mode = header.mode
+        self._mode = "I;16" if (header.mode, header.depth) == ("L", 16) else header.mode
         if header.icc is not None:
             self.info["icc_profile"] = header.icc
         if header.exif is not None:
@@ -76,10 +84,13 @@ class GipImageFile(ImageFile.ImageFile):
         """Lets the picture be rendered at about ``size``, not smaller, in the aspect that it has.
 
         The fewer pixels are wanted, the fewer layers of the file are read. Has no effect once the
-        picture is loaded. ``mode`` is ignored.
+        picture is loaded. With ``mode`` "L", a picture of mode I;16 is rendered with 8 bits; other
+        modes are ignored.
         """
         if size is None or not self.tile:
             return None
+        if (self.mode, mode) == ("I;16", "L"):
+            self._mode = "L"
         width, height = self._stored_size
         scale = min(max(size[0] / width, size[1] / height), 1.0)
         drafted = (max(math.ceil(width * scale), 1), max(math.ceil(height * scale), 1))
@@ -101,6 +112,19 @@ class GipImageFile(ImageFile.ImageFile):
         super().thumbnail(size, resample, reducing_gap)
         # The file may be closed soon.
         self.load()
+
+    def resize(
+        self,
+        size: tuple[int, int] | list[int] | NDArray[Any],
+        resample: int | None = None,
+        box: tuple[float, float, float, float] | None = None,
+        reducing_gap: float | None = None,
+    ) -> Image.Image:
+        """Resizes the picture as ``Image.resize`` does."""
+        if self.mode == "I;16":
+            # It is faster, and Pillow has it for 8 bits only.
+            reducing_gap = None
+        return super().resize(size, resample, box, reducing_gap)
 
     def verify(self) -> None:
         """Checks the whole file.
@@ -129,7 +153,12 @@ class _Decoder(ImageFile.PyDecoder):
         stream = StreamDecoder(limits=_LIMITS)
         try:
             self._read(self.fd, stream, self.im.size if is_draft else None)
-            samples = stream.image(size=self.im.size, mode=cast("Any", self.mode), dtype=np.uint8)
+            if self.mode == "I;16":
+                samples = stream.image(size=self.im.size, dtype=np.uint16)
+                # Pillow's has the less significant byte first.
+                samples = samples.astype("<u2", copy=False)
+            else:
+                samples = stream.image(size=self.im.size, dtype=np.uint8)
         except GipError as error:
             raise OSError(str(error)) from error
         # It takes any buffer, without copying it.
@@ -156,31 +185,17 @@ def _accept(prefix: bytes) -> bool:
     return prefix.startswith(_SIGNATURE)
 
 
-def _storable(image: Image.Image) -> Image.Image:
-    """The picture in a mode that a file can have, if no colour changes by that."""
-    has_alpha = image.has_transparency_data
-    if image.mode in {"1", "L", "LA"}:
-        mode = "LA" if has_alpha else "L"
-    elif image.mode in {"P", "PA", "RGB", "RGBA", "RGBX"}:
-        mode = "RGBA" if has_alpha else "RGB"
-    else:
-        hint = "convert it to L, LA, RGB or RGBA"
-        if image.mode.startswith("I;16"):
-            hint += ", or pass its NumPy array to image_gip.encode, which keeps 16 bits"
-        raise OSError(f"cannot write mode {image.mode} as {_FORMAT}; {hint}")
-    return image if image.mode == mode else image.convert(mode)
-
-
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
     asked = image.encoderinfo
     options: dict[str, Any] = {name: asked[name] for name in _OPTIONS if name in asked}
     # As in Pillow's own formats, the profile goes with the picture, and the rest on request.
-    options["icc"] = asked.get("icc_profile", image.info.get("icc_profile")) or None
-    exif = asked.get("exif")
-    options["exif"] = (exif.tobytes() if isinstance(exif, Image.Exif) else exif) or None
-    xmp = asked.get("xmp")
-    options["xmp"] = (xmp.encode() if isinstance(xmp, str) else xmp) or None
-    samples = np.asarray(_storable(image))
+    profile = asked.get("icc_profile", image.info.get("icc_profile"))
+    options["icc"] = _modes.stored_profile(image, profile)
+    if exif := asked.get("exif"):
+        options["exif"] = exif.tobytes() if isinstance(exif, Image.Exif) else exif
+    if xmp := asked.get("xmp"):
+        options["xmp"] = xmp.encode() if isinstance(xmp, str) else xmp
+    samples = _modes.samples(image, profile)
     try:
         encoded = encode(samples, **options)
     except GipError as error:

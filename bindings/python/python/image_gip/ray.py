@@ -75,9 +75,10 @@ def encode_dataset(
     tune: Tune = "visual",
     seed: int = 0,
 ) -> Summary:
-    """Encodes pictures of the formats that Pillow reads, with 8 bits per sample, to ``.gip``.
+    """Encodes pictures of the formats that Pillow reads to ``.gip``.
 
-    ICC profile, Exif and XMP are kept.
+    Gray pictures of 16 bits keep them; colours have 8, as Pillow has no more. ICC
+    profile, Exif and XMP are kept.
 
     Args:
         pictures: A list of paths, or a manifest: see the module.

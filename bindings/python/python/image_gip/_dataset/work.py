@@ -147,12 +147,15 @@ def _encode(data: bytes, **options: Any) -> Picture:
 
 def _decode(data: bytes, *, format: str) -> Picture:
     with _opened(data, ["GIP"]) as image:
+        # 8 bits, of gray pictures as well.
+        image.draft("L", image.size)
         ImageOps.exif_transpose(image, in_place=True)
         return _saved(image, format, **_metadata(image, "exif", "icc_profile"))
 
 
 def _thumbnail(data: bytes, *, size: list[int], format: str) -> Picture:
     with _opened(data, ["GIP"]) as image:
+        image.draft("L", image.size)
         width, height = size
         if image.getexif().get(_ORIENTATION, 1) >= _FIRST_TURNED:
             width, height = height, width

@@ -1,0 +1,155 @@
+//! Pictures with alpha, over a background.
+
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// The colour behind a picture, as the caller gives it: one sample, or one per channel.
+#[derive(Debug)]
+pub(crate) struct Background(Vec<f64>);
+
+impl Background {
+    /// Checks that an object is a number or several.
+    pub(crate) fn new(object: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let numbers = match object.extract() {
+            Ok(number) => Some(vec![number]),
+            Err(_) => object
+                .try_iter()
+                .and_then(|items| items.map(|item| item?.extract()).collect::<PyResult<_>>())
+                .ok(),
+        };
+        numbers.map(Self).ok_or_else(|| {
+            PyTypeError::new_err("background must be a number, or one for each colour channel")
+        })
+    }
+
+    /// The samples for so many channels of colour.
+    pub(crate) fn samples<T: Sample>(&self, channels: usize) -> PyResult<Vec<T>> {
+        let samples = self.0.iter().map(|&number| {
+            T::from_number(number).ok_or_else(|| {
+                let full = T::FULL;
+                PyValueError::new_err(format!("background {number}; it must be 0 to {full}"))
+            })
+        });
+        let samples: Vec<T> = samples.collect::<PyResult<_>>()?;
+        match *samples {
+            [gray] => Ok(vec![gray; channels]),
+            _ if samples.len() == channels => Ok(samples),
+            _ => Err(PyValueError::new_err(format!(
+                "background has {} numbers; it must be one, or one for each colour channel: \
+                 {channels}",
+                samples.len()
+            ))),
+        }
+    }
+}
+
+/// A type of samples.
+pub(crate) trait Sample: Copy + Default + core::fmt::Display {
+    /// White, or opaque.
+    const FULL: Self;
+    /// The sample that is this number; `None` if it is out of range.
+    fn from_number(number: f64) -> Option<Self>;
+    /// A sample of this opacity over one of the background.
+    fn over(self, opacity: Self, background: Self) -> Self;
+}
+
+impl Sample for u8 {
+    const FULL: Self = Self::MAX;
+
+    fn from_number(number: f64) -> Option<Self> {
+        (0.0..=255.0).contains(&number).then_some((number + 0.5) as Self)
+    }
+
+    fn over(self, opacity: Self, background: Self) -> Self {
+        let sum = u32::from(self) * u32::from(opacity)
+            + u32::from(background) * u32::from(Self::MAX - opacity);
+        ((sum + 127) / 255) as Self
+    }
+}
+
+impl Sample for u16 {
+    const FULL: Self = Self::MAX;
+
+    fn from_number(number: f64) -> Option<Self> {
+        (0.0..=65535.0).contains(&number).then_some((number + 0.5) as Self)
+    }
+
+    fn over(self, opacity: Self, background: Self) -> Self {
+        let sum = u32::from(self) * u32::from(opacity)
+            + u32::from(background) * u32::from(Self::MAX - opacity);
+        ((sum + 32767) / 65535) as Self
+    }
+}
+
+impl Sample for f32 {
+    const FULL: Self = 1.0;
+
+    fn from_number(number: f64) -> Option<Self> {
+        (0.0..=1.0).contains(&number).then_some(number as Self)
+    }
+
+    /// Of what shows: samples may be far outside of 0 to 1, where a decoder clamps them.
+    fn over(self, opacity: Self, background: Self) -> Self {
+        let opacity = opacity.clamp(0.0, 1.0);
+        self.clamp(0.0, 1.0) * opacity + background * (1.0 - opacity)
+    }
+}
+
+/// The channels of a picture on their way to the caller.
+#[derive(Debug)]
+pub(crate) struct Channels<'a> {
+    /// How many are rendered.
+    pub(crate) rendered: usize,
+    /// How many the caller gets.
+    pub(crate) returned: usize,
+    /// Whether the last one that is rendered is alpha, which the caller does not get.
+    pub(crate) drops_alpha: bool,
+    /// What the caller gives as the background; else it is white.
+    pub(crate) background: Option<&'a Background>,
+}
+
+/// The caller's samples, of one type.
+#[derive(Debug)]
+pub(crate) struct Pixels<'a, T> {
+    out: &'a mut [T],
+    rendered: usize,
+    /// What pixels with alpha are composed over.
+    background: Option<Vec<T>>,
+}
+
+impl Channels<'_> {
+    /// The samples `out`. A background that is wrong is refused, whether it shows or not.
+    pub(crate) fn pixels<'a, T: Sample>(&self, out: &'a mut [T]) -> PyResult<Pixels<'a, T>> {
+        let given = self.background.map(|given| given.samples(self.returned)).transpose()?;
+        let background = || given.unwrap_or_else(|| vec![T::FULL; self.returned]);
+        let background = self.drops_alpha.then(background);
+        Ok(Pixels { out, rendered: self.rendered, background })
+    }
+}
+
+impl<T: Sample> Pixels<'_, T> {
+    /// Has the samples rendered, given the number of their channels.
+    pub(crate) fn fill<E>(
+        self,
+        render: impl FnOnce(&mut [T], usize) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Self { out, rendered, background } = self;
+        let Some(background) = background else { return render(out, rendered) };
+        let mut pixels = vec![T::default(); out.len() / background.len() * rendered];
+        render(&mut pixels, rendered)?;
+        compose(&pixels, rendered, &background, out);
+        Ok(())
+    }
+}
+
+/// Composes pixels, whose last channel is alpha, over a background. `out` has as many channels as
+/// the background; gray is repeated.
+fn compose<T: Sample>(pixels: &[T], channels: usize, background: &[T], out: &mut [T]) {
+    let colors = channels - 1;
+    for (pixel, out) in pixels.chunks_exact(channels).zip(out.chunks_exact_mut(background.len())) {
+        let opacity = pixel[colors];
+        for (channel, (out, &background)) in out.iter_mut().zip(background).enumerate() {
+            *out = pixel[channel.min(colors - 1)].over(opacity, background);
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Metadata to store with a picture.
+
+use image_gip::{Metadata, Text};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyMapping, PyString};
+
+use crate::input;
+
+/// The metadata that the caller gives. The encoder checks what can be stored.
+pub(crate) fn of(
+    icc: Option<&Bound<'_, PyAny>>,
+    exif: Option<&Bound<'_, PyAny>>,
+    xmp: Option<&Bound<'_, PyAny>>,
+    texts: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Metadata> {
+    let blob = |name: &str, data: Option<&Bound<'_, PyAny>>| {
+        let bytes =
+            data.map(|data| Ok::<_, PyErr>(input::buffer(name, data)?.as_slice()?.to_vec()));
+        bytes.transpose()
+    };
+    let mut metadata = Metadata::default();
+    metadata.icc_profile = blob("icc", icc)?;
+    metadata.exif = blob("exif", exif)?.map(tiff_stream).transpose()?;
+    metadata.xmp = blob("xmp", xmp)?;
+    metadata.texts = texts.map(self::texts).transpose()?.unwrap_or_default();
+    Ok(metadata)
+}
+
+/// The TIFF stream of Exif data, without the prefix that it has in JPEG.
+fn tiff_stream(mut exif: Vec<u8>) -> PyResult<Vec<u8>> {
+    if exif.starts_with(b"Exif\0\0") {
+        exif.drain(..6);
+    }
+    if exif.starts_with(b"II") || exif.starts_with(b"MM") {
+        return Ok(exif);
+    }
+    Err(PyValueError::new_err("exif must be a TIFF stream, which begins with II or MM"))
+}
+
+/// Keywords and texts, of a mapping or of pairs.
+fn texts(object: &Bound<'_, PyAny>) -> PyResult<Vec<Text>> {
+    let wrong = || PyTypeError::new_err("texts must be a mapping of str to str, or pairs of str");
+    let pairs = match object.cast::<PyMapping>() {
+        Ok(mapping) => mapping.items()?.into_any(),
+        Err(_) => object.clone(),
+    };
+    let texts = pairs.try_iter().map_err(|_| wrong())?.map(|pair| {
+        let pair: (Bound<'_, PyString>, Bound<'_, PyString>) =
+            pair?.extract().map_err(|_| wrong())?;
+        Ok(Text::new(pair.0.to_cow()?, pair.1.to_cow()?))
+    });
+    texts.collect()
+}
