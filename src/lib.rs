@@ -78,6 +78,7 @@
 //! | `std` | yes | `Decoder`, and SIMD at the level that the machine supports |
 //! | `rayon` | yes | threads in the decoder; the output is the same bit for bit |
 //! | `encode` | yes | the encoder |
+//! | `metadata` | no | `MetadataPolicy`: what of a picture's metadata to keep |
 //! | `image` | no | hooks and an `ImageDecoder` for the `image` crate; with `encode` also an `ImageEncoder` |
 //! | `cli` | no | the command line tool `gip` |
 
@@ -110,6 +111,8 @@ mod layers;
 mod limits;
 #[cfg(feature = "decode")]
 mod math;
+#[cfg(feature = "metadata")]
+mod metadata;
 #[cfg(feature = "encode")]
 pub mod metrics;
 #[cfg(feature = "decode")]
@@ -158,6 +161,8 @@ pub use gaussian::{Gaussian, Parameterization};
 pub use kernel::Kernel;
 #[cfg(feature = "decode")]
 pub use limits::Limits;
+#[cfg(feature = "metadata")]
+pub use metadata::{MetadataLoss, MetadataPolicy};
 #[cfg(feature = "decode")]
 pub use orientation::Orientation;
 #[cfg(feature = "decode")]

@@ -10,24 +10,64 @@ const SHORT: u16 = 3;
 
 /// The orientation in Exif data; `None` if there is none, or none that Exif knows.
 pub(super) fn orientation(exif: &[u8]) -> Option<Orientation> {
-    let (u16_of, u32_of): (fn(_) -> _, fn(_) -> _) = match exif.first_chunk()? {
-        b"II*\0" => (u16::from_le_bytes, u32::from_le_bytes),
-        b"MM\0*" => (u16::from_be_bytes, u32::from_be_bytes),
+    let (at, order) = find_orientation(exif)?;
+    Orientation::from_exif(u8::try_from(order.short(exif, at)?).ok()?)
+}
+
+/// Makes the orientation in Exif data upright, if there is one.
+#[cfg(feature = "metadata")]
+pub(super) fn reset_orientation(exif: &mut [u8]) {
+    if let Some((at, order)) = find_orientation(exif) {
+        exif[at..at + 2].copy_from_slice(match order {
+            ByteOrder::Little => &[1, 0],
+            ByteOrder::Big => &[0, 1],
+        });
+    }
+}
+
+/// Where the value of the orientation is.
+fn find_orientation(exif: &[u8]) -> Option<(usize, ByteOrder)> {
+    let order = match exif.first_chunk()? {
+        b"II*\0" => ByteOrder::Little,
+        b"MM\0*" => ByteOrder::Big,
         _ => return None,
     };
-    let short = |at| exif.get(at..).and_then(<[u8]>::first_chunk).copied().map(u16_of);
-    let long = |at| exif.get(at..).and_then(<[u8]>::first_chunk).copied().map(u32_of);
-
     // The first directory is that of the picture. Files are untrusted, so that sums may overflow.
-    let directory = usize::try_from(long(4)?).ok()?;
+    let directory = usize::try_from(order.long(exif, 4)?).ok()?;
     let entries = directory.checked_add(2)?;
-    for entry in 0..usize::from(short(directory)?) {
+    for entry in 0..usize::from(order.short(exif, directory)?) {
         let at = entries.checked_add(entry * ENTRY)?;
-        if (short(at)?, short(at + 2)?, long(at + 4)?) == (ORIENTATION, SHORT, 1) {
-            return Orientation::from_exif(u8::try_from(short(at + 8)?).ok()?);
+        let head = (order.short(exif, at)?, order.short(exif, at + 2)?, order.long(exif, at + 4)?);
+        let value = at + 8;
+        if head == (ORIENTATION, SHORT, 1) {
+            return exif.get(value..value + 2).map(|_| (value, order));
         }
     }
     None
+}
+
+#[derive(Clone, Copy, Debug)]
+enum ByteOrder {
+    Little,
+    Big,
+}
+
+impl ByteOrder {
+    fn short(self, bytes: &[u8], at: usize) -> Option<u16> {
+        let bytes = *bytes.get(at..)?.first_chunk()?;
+        Some(match self {
+            Self::Little => u16::from_le_bytes(bytes),
+            Self::Big => u16::from_be_bytes(bytes),
+        })
+    }
+
+    fn long(self, bytes: &[u8], at: usize) -> Option<u32> {
+        let bytes = *bytes.get(at..)?.first_chunk()?;
+        Some(match self {
+            Self::Little => u32::from_le_bytes(bytes),
+            Self::Big => u32::from_be_bytes(bytes),
+        })
+    }
 }
 
 #[cfg(test)]

@@ -65,6 +65,14 @@ impl Metadata {
         self.exif.as_deref().and_then(exif::orientation).unwrap_or_default()
     }
 
+    /// Makes Exif say that the picture is upright. One that says nothing stays as it is.
+    #[cfg(feature = "metadata")]
+    pub(crate) fn reset_exif_orientation(&mut self) {
+        if let Some(exif) = &mut self.exif {
+            exif::reset_orientation(exif);
+        }
+    }
+
     /// Adds the payload of a metadata chunk. A second ICC profile, Exif or XMP is an error.
     pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
         let slot = match chunk {

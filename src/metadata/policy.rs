@@ -1,0 +1,111 @@
+//! Which metadata is kept.
+
+use core::fmt;
+
+use super::{exif, icc, xmp};
+use crate::container::Metadata;
+use crate::orientation::Orientation;
+
+/// Keywords of texts, as PNG registers them, whose texts an author wrote to be read by all.
+const SAFE_KEYWORDS: [&str; 6] =
+    ["Title", "Author", "Description", "Copyright", "Creation Time", "Disclaimer"];
+
+/// Which metadata to keep; see [`Metadata::retain`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MetadataPolicy {
+    /// All of it, as it is.
+    #[default]
+    All,
+    /// What serves the viewer and the author, and tells nothing that a person may not know is there.
+    ///
+    /// - The colour profile.
+    /// - Of Exif: orientation, colour space and resolution; copyright, artist and description; dates, with
+    ///   time zones and fractions of seconds. Position, maker notes, embedded thumbnails, camera, serial
+    ///   numbers, names of owners, user comments and all else are dropped.
+    /// - Of XMP: the same, title, creator, credit, and terms of use; as plain texts and lists.
+    /// - Texts with PNG's keywords `Title`, `Author`, `Description`, `Copyright`, `Creation Time` and
+    ///   `Disclaimer`.
+    Safe,
+    /// Nothing, not even the colour profile and the orientation.
+    None,
+}
+
+/// Something that a policy dropped, and that may be missed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MetadataLoss {
+    /// A colour profile that is not sRGB's: the same samples now stand for other colours.
+    ColorProfile,
+    /// Exif that is damaged, and therefore was dropped as a whole, but for its orientation.
+    DamagedExif,
+    /// XMP that is damaged, and therefore was dropped as a whole.
+    DamagedXmp,
+}
+
+impl Metadata {
+    /// Keeps what the policy says, and drops the rest. Returns what was dropped that may be missed.
+    ///
+    /// [`MetadataPolicy::None`] drops the orientation, too: turn the picture first.
+    ///
+    /// ```
+    /// use image_gip::{Metadata, MetadataPolicy, Text};
+    ///
+    /// let mut metadata = Metadata::default();
+    /// metadata.texts.push(Text::new("Author", "Emma"));
+    /// metadata.texts.push(Text::new("Comment", "taken at home"));
+    /// assert!(metadata.retain(MetadataPolicy::Safe).is_empty());
+    /// assert_eq!(metadata.texts, [Text::new("Author", "Emma")]);
+    /// ```
+    pub fn retain(&mut self, policy: MetadataPolicy) -> Vec<MetadataLoss> {
+        let mut losses = Vec::new();
+        match policy {
+            MetadataPolicy::All => {}
+            MetadataPolicy::Safe => {
+                let orientation = self.orientation();
+                if let Some(exif) = self.exif.take() {
+                    self.exif = exif::safe(exif).unwrap_or_else(|_| {
+                        losses.push(MetadataLoss::DamagedExif);
+                        (orientation != Orientation::default())
+                            .then(|| exif::of_orientation(orientation))
+                    });
+                }
+                if let Some(xmp) = self.xmp.take() {
+                    self.xmp = xmp::safe(&xmp).unwrap_or_else(|_| {
+                        losses.push(MetadataLoss::DamagedXmp);
+                        None
+                    });
+                }
+                self.texts.retain(|text| SAFE_KEYWORDS.contains(&&*text.keyword));
+            }
+            MetadataPolicy::None => {
+                let dropped = core::mem::take(self);
+                if dropped.icc_profile.is_some_and(|profile| !icc::is_srgb(&profile)) {
+                    losses.push(MetadataLoss::ColorProfile);
+                }
+            }
+        }
+        losses
+    }
+
+    /// Makes Exif and XMP say that the picture is upright, for whoever has turned its pixels. What they do
+    /// not say is not added.
+    pub fn reset_orientation(&mut self) {
+        self.reset_exif_orientation();
+        if let Some(xmp) = &mut self.xmp {
+            xmp::reset_orientation(xmp);
+        }
+    }
+}
+
+impl fmt::Display for MetadataLoss {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ColorProfile => {
+                "the colour profile was dropped, so the colours are taken for sRGB"
+            }
+            Self::DamagedExif => "the Exif is damaged and was dropped",
+            Self::DamagedXmp => "the XMP is damaged and was dropped",
+        })
+    }
+}
