@@ -40,7 +40,8 @@ use crate::threads;
 ///
 /// Returns:
 ///     height x width (mode "L") or height x width x channels samples, rows from the top: a new array,
-///     or `out`. Colours are sRGB unless the file has an ICC profile; alpha is straight.
+///     or `out`. Colours are sRGB unless the file has an ICC profile; alpha is straight. The picture is
+///     as it is stored, and so are size and region: `Info.orientation` tells how to turn it for display.
 ///
 /// Raises:
 ///     GipError: The file was refused; its subclasses say why.

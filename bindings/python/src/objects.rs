@@ -56,6 +56,7 @@ pub(crate) fn info<'py>(
     fields.set_item("height", header.height)?;
     fields.set_item("mode", request::mode_name(header.color))?;
     fields.set_item("depth", header.depth.bits())?;
+    fields.set_item("orientation", metadata.orientation().to_exif())?;
     fields.set_item("gaussians", header.gaussians)?;
     fields.set_item("layers", PyTuple::new(py, stream.layers())?)?;
     fields.set_item("version", header.version)?;

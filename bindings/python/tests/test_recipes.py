@@ -41,6 +41,13 @@ DATASET = "class Dataset:\n    pass\n"
 
 #: What a recipe does not show by itself.
 CHECKS = {
+    "Upright pictures": (
+        "for orientation in range(1, 9):\n"
+        "    image = Image.fromarray(image_gip.decode('photo.gip'))\n"
+        "    image.getexif()[0x0112] = orientation\n"
+        "    turned = upright(np.asarray(image), orientation)\n"
+        "    assert np.array_equal(turned, ImageOps.exif_transpose(image))\n"
+    ),
     "A torch `Dataset` that decodes at training size": (
         "pictures = Pictures('.', (64, 48))\n"
         "assert len(pictures) == 1\n"

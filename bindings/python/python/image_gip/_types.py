@@ -69,6 +69,9 @@ class Info:
     mode: Mode
     #: Bits per sample of the picture that was encoded: 8 or 16.
     depth: int
+    #: How the picture is turned for display, as Exif has it: 1 (not at all) to 8. Width, height and
+    #: all samples are those of the picture as it is stored.
+    orientation: int
     #: Number of Gaussians, as the header declares it.
     gaussians: int
     #: Number of Gaussians in each layer that was read, in the order of the file.
@@ -98,7 +101,7 @@ class Info:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
+        """Width and height in pixels, as the picture is stored."""
         return self.width, self.height
 
 
