@@ -9,7 +9,7 @@ use crate::input::{Bytes, FileObject};
 use crate::objects::{self, Limits};
 use crate::output::Output;
 use crate::request::Request;
-use crate::threads;
+use crate::{metadata, threads};
 
 /// Decodes a picture to an array.
 ///
@@ -143,6 +143,8 @@ pub(crate) fn gaussians<'py>(
 ///
 /// Args:
 ///     src: The file, as for `decode`.
+///     metadata: What the result has of the metadata: "all"; "safe", without what tells more than its
+///         author may know, as for `encode`; or "none".
 ///     limits: What the file may cost at most. Default: Limits().
 ///
 /// Returns:
@@ -152,13 +154,17 @@ pub(crate) fn gaussians<'py>(
 ///     GipError: The file was refused.
 ///     OSError: The file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (src, *, limits=None))]
+#[pyo3(signature = (src, *, metadata="all", limits=None))]
 pub(crate) fn info<'py>(
     py: Python<'py>,
     src: &Bound<'py, PyAny>,
+    metadata: &str,
     limits: Option<Limits>,
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
-    objects::info(py, &read_whole(py, src, limits)?)
+    let stream = read_whole(py, src, limits)?;
+    let mut kept = stream.metadata().clone();
+    metadata::retain(py, &mut kept, metadata)?;
+    objects::info(py, &stream, &kept)
 }
 
 /// The `Info` of a file object up to its first layer. No more than that is read.
@@ -170,5 +176,6 @@ pub(crate) fn read_header<'py>(
     limits: Option<Limits>,
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
     let decoder = Decoder::new_with_limits(FileObject(file.unbind()), Limits::of(limits));
-    objects::info(py, decoder.map_err(|error| decode_error(py, error))?.stream())
+    let decoder = decoder.map_err(|error| decode_error(py, error))?;
+    objects::info(py, decoder.stream(), decoder.metadata())
 }

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::array::Picture;
-use crate::errors::{encode_error, warn_of_shortfall};
+use crate::errors::{encode_error, warn};
 use crate::{metadata, threads};
 
 /// How long the calling thread waits before it looks for signals, such as that of Ctrl-C.
@@ -55,6 +55,10 @@ const NEWS: f64 = 0.002;
 ///     texts: Texts by their keywords, such as "Title", "Author" or "Copyright": a mapping, or pairs,
 ///         in the order in which they are stored. A keyword is 1 to 79 bytes of UTF-8; neither has a
 ///         NUL.
+///     metadata: What of these four is stored: "all"; "safe", which keeps the profile, orientation,
+///         copyright, artist, description and dates, and drops position, maker notes, thumbnails,
+///         serial numbers, names of owners, comments and all else; or "none". There is a
+///         MetadataWarning for a profile other than that of sRGB, and for damaged data.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
 ///         or raises an exception, the encoding is cancelled. None goes on.
 ///
@@ -67,7 +71,7 @@ const NEWS: f64 = 0.002;
 ///         option is out of range.
 ///     CancelledError: `progress` returned False.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, icc=None, exif=None, xmp=None, texts=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, icc=None, exif=None, xmp=None, texts=None, metadata="all", progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -86,19 +90,22 @@ pub(crate) fn encode<'py>(
     exif: Option<&Bound<'py, PyAny>>,
     xmp: Option<&Bound<'py, PyAny>>,
     texts: Option<&Bound<'py, PyAny>>,
+    metadata: &str,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let threads = threads::checked(threads)?;
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
     let effort = u8::try_from(effort)
         .map_err(|_| PyValueError::new_err(format!("effort {effort}; it must be 1 to 7")))?;
+    let mut stored = metadata::of(icc, exif, xmp, texts)?;
+    metadata::retain(py, &mut stored, metadata)?;
     let encoder = Encoder::new()
         .with_target(target)
         .with_tune(tuning(tune)?)
         .with_effort(effort)
         .with_precision(self::precision(precision)?)
         .with_seed(seed)
-        .with_metadata(metadata::of(icc, exif, xmp, texts)?);
+        .with_metadata(stored);
     let picture = Picture::new(array)?;
     let source = picture.source()?;
     let encoded = py
@@ -109,7 +116,7 @@ pub(crate) fn encode<'py>(
         && let Some(shortfall @ (Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })) =
             encoded.report.shortfall
     {
-        warn_of_shortfall(py, &shortfall.to_string())?;
+        warn(py, "ShortfallWarning", &shortfall.to_string())?;
     }
     Ok(PyBytes::new(py, &encoded.bytes))
 }

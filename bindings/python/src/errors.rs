@@ -1,6 +1,6 @@
 //! The crate's errors as the exceptions of `image_gip._errors`.
 
-use image_gip::{ChunkType, DecodeError, EncodeError, OptionError};
+use image_gip::{ChunkType, DecodeError, EncodeError, LimitKind, OptionError};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -27,17 +27,38 @@ pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
         DecodeError::Malformed { chunk, .. } => of_chunk("MalformedError", Some(chunk)),
         DecodeError::Unsupported { chunk, .. } => of_chunk("UnsupportedError", Some(chunk)),
         DecodeError::UnexpectedEnd { chunk } => of_chunk("UnexpectedEndError", chunk),
-        DecodeError::Limit { kind, wanted, allowed } => exception(py, "LimitError", message)
-            .and_then(|exception| {
-                exception.setattr("limit", kind.to_string())?;
-                exception.setattr("wanted", wanted)?;
-                exception.setattr("allowed", allowed)?;
-                Ok(exception)
-            }),
+        DecodeError::Limit { kind, wanted, allowed } => {
+            limit_error(py, &message, kind, wanted, allowed)
+        }
         DecodeError::Request(request) => return PyValueError::new_err(request.to_string()),
         DecodeError::Io(error) => return error.into(),
         _ => exception(py, "GipError", message),
     })
+}
+
+/// A `LimitError`, which says how to raise the limit.
+fn limit_error<'py>(
+    py: Python<'py>,
+    message: &str,
+    kind: LimitKind,
+    wanted: u64,
+    allowed: u64,
+) -> PyResult<Bound<'py, PyAny>> {
+    let field = match kind {
+        LimitKind::Width => "max_width",
+        LimitKind::Height => "max_height",
+        LimitKind::Pixels => "max_pixels",
+        LimitKind::Gaussians => "max_gaussians",
+        LimitKind::Memory => "max_memory",
+        LimitKind::Work => "max_work",
+        _ => "...",
+    };
+    let message = format!("{message}; limits=image_gip.Limits({field}=...) raises it");
+    let exception = exception(py, "LimitError", message)?;
+    exception.setattr("limit", kind.to_string())?;
+    exception.setattr("wanted", wanted)?;
+    exception.setattr("allowed", allowed)?;
+    Ok(exception)
 }
 
 /// The exception for an error of the encoder.
@@ -50,9 +71,9 @@ pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
     }
 }
 
-/// Warns that a file has less than its target asks for.
-pub(crate) fn warn_of_shortfall(py: Python<'_>, what: &str) -> PyResult<()> {
-    let class = py.import("image_gip._errors")?.getattr("ShortfallWarning")?;
+/// Warns the caller, with a class of `image_gip._errors`.
+pub(crate) fn warn(py: Python<'_>, class: &str, what: &str) -> PyResult<()> {
+    let class = py.import("image_gip._errors")?.getattr(class)?;
     py.import("warnings")?.call_method1("warn", (what, class, 1))?;
     Ok(())
 }

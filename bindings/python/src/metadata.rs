@@ -1,11 +1,28 @@
-//! Metadata to store with a picture.
+//! Metadata to store with a picture, and what of it is kept.
 
-use image_gip::{Metadata, Text};
+use image_gip::{Metadata, MetadataPolicy, Text};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 
+use crate::errors::warn;
 use crate::input;
+
+/// Keeps what the policy of this name says. There is a warning for what may be missed.
+pub(crate) fn retain(py: Python<'_>, metadata: &mut Metadata, policy: &str) -> PyResult<()> {
+    let policy = match policy {
+        "all" => MetadataPolicy::All,
+        "safe" => MetadataPolicy::Safe,
+        "none" => MetadataPolicy::None,
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "metadata {policy:?}; it must be \"all\", \"safe\" or \"none\""
+            )));
+        }
+    };
+    let losses = metadata.retain(policy);
+    losses.iter().try_for_each(|loss| warn(py, "MetadataWarning", &loss.to_string()))
+}
 
 /// The metadata that the caller gives. The encoder checks what can be stored.
 pub(crate) fn of(

@@ -1,7 +1,7 @@
 //! What the module takes from Python and gives to it besides samples: limits, `Info`, Gaussians.
 
 use image_gip::{
-    Coding, Gaussian, Kernel, Limits as DecoderLimits, Parameterization, StreamDecoder,
+    Coding, Gaussian, Kernel, Limits as DecoderLimits, Metadata, Parameterization, StreamDecoder,
 };
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -36,17 +36,17 @@ impl Limits {
     }
 }
 
-/// `image_gip.Info` of what has arrived; `None` without a header.
+/// `image_gip.Info` of what has arrived, with this metadata of it; `None` without a header.
 pub(crate) fn info<'py>(
     py: Python<'py>,
     stream: &StreamDecoder,
+    metadata: &Metadata,
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
     let Some(header) = stream.header() else { return Ok(None) };
     let types = py.import("image_gip._types")?;
     let chunk = types.getattr("Chunk")?;
     let chunks = stream.chunks().iter();
     let chunks = chunks.map(|c| chunk.call1((c.kind.to_string(), c.count, c.bytes)));
-    let metadata = stream.metadata();
     let blob = |blob: &Option<Vec<u8>>| blob.as_ref().map(|bytes| PyBytes::new(py, bytes));
     let texts = metadata.texts.iter().map(|text| (&text.keyword, &text.text));
     let channels = header.color.channels();
@@ -56,7 +56,7 @@ pub(crate) fn info<'py>(
     fields.set_item("height", header.height)?;
     fields.set_item("mode", request::mode_name(header.color))?;
     fields.set_item("depth", header.depth.bits())?;
-    fields.set_item("orientation", metadata.orientation().to_exif())?;
+    fields.set_item("orientation", stream.metadata().orientation().to_exif())?;
     fields.set_item("gaussians", header.gaussians)?;
     fields.set_item("layers", PyTuple::new(py, stream.layers())?)?;
     fields.set_item("version", header.version)?;

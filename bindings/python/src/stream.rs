@@ -168,6 +168,7 @@ impl StreamDecoder {
     /// first Gaussian has arrived.
     #[getter]
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        objects::info(py, &self.lock_attached(py))
+        let stream = self.lock_attached(py);
+        objects::info(py, &stream, stream.metadata())
     }
 }

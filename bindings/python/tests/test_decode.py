@@ -169,7 +169,9 @@ def test_out_that_does_not_fit(file: bytes) -> None:
 
 
 def test_limits(file: bytes) -> None:
-    with pytest.raises(image_gip.LimitError) as raised:
+    with pytest.raises(
+        image_gip.LimitError, match=r"96 required, 90 .*; limits=image_gip.Limits\(max_width="
+    ) as raised:
         image_gip.decode(file, limits=Limits(max_width=90))
     error = raised.value
     assert (error.limit, error.wanted, error.allowed) == ("width", 96, 90)

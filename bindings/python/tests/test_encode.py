@@ -162,26 +162,6 @@ def test_the_number_of_threads_does_not_show(photo: Picture) -> None:
     assert image_gip.encode(photo, effort=2, seed=1) not in files
 
 
-def test_metadata(photo: Picture) -> None:
-    exif = b"II*\0\x08\0\0\0\0\0\0\0\0\0"
-    prefixed = bytearray(b"Exif\0\0" + exif)
-    file = image_gip.encode(
-        photo, effort=1, icc=memoryview(b"profile"), exif=prefixed, xmp="<ä/>".encode()
-    )
-    info = image_gip.info(file)
-    assert (info.icc, info.exif, info.xmp) == (b"profile", exif, "<ä/>".encode())
-
-
-def test_texts(photo: Picture) -> None:
-    pairs = [("Title", "Dämmerung"), ("Author", ""), ("Title", "once more")]
-    for texts in (pairs, iter(pairs), tuple(pairs)):
-        file = image_gip.encode(photo, effort=1, texts=texts)
-        assert image_gip.info(file).texts == tuple(pairs)
-    texts_by_keyword = dict(pairs)
-    file = image_gip.encode(photo, effort=1, texts=texts_by_keyword)
-    assert image_gip.info(file).texts == tuple(texts_by_keyword.items())
-
-
 def test_precision(photo: Picture) -> None:
     codings = {"entropy": "entropy", "packed": "packed", "f32": "packed"}
     sizes = []

@@ -1,4 +1,4 @@
-"""Samples are those of the picture as it is stored; what turns it for display finds its orientation."""
+"""Pictures come as they are stored, and tell how to turn them for display."""
 
 import io
 from typing import Any

@@ -45,3 +45,7 @@ class CancelledError(GipError):
 
 class ShortfallWarning(UserWarning):
     """The file has a lower PSNR or quality than asked for: it is out of reach at this effort."""
+
+
+class MetadataWarning(UserWarning):
+    """Metadata that may be missed was dropped, as was asked for, or because it is damaged."""

@@ -5,7 +5,7 @@ from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 from numpy.typing import DTypeLike, NDArray
 from typing_extensions import Buffer
 
-from image_gip._types import Info, Limits, Mode, Precision, Progress, Tune
+from image_gip._types import Info, Limits, MetadataPolicy, Mode, Precision, Progress, Tune
 
 _Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
 _Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
@@ -59,10 +59,13 @@ def encode(
     exif: _Buffer | None = None,
     xmp: _Buffer | None = None,
     texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
+    metadata: MetadataPolicy = "all",
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
 def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
-def info(src: _Source, *, limits: Limits | None = None) -> Info: ...
+def info(
+    src: _Source, *, metadata: MetadataPolicy = "all", limits: Limits | None = None
+) -> Info: ...
 def read_header(file: _Readable, *, limits: Limits | None = None) -> Info: ...
 
 @final

@@ -9,6 +9,8 @@ Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
 Tune: TypeAlias = Literal["visual", "psnr"]
 #: How the Gaussians of a file are stored, as the tool names it.
 Precision: TypeAlias = Literal["entropy", "packed", "f32"]
+#: What of a picture's metadata is kept.
+MetadataPolicy: TypeAlias = Literal["all", "safe", "none"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

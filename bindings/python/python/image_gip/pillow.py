@@ -11,10 +11,15 @@ picture is rendered with 8 bits.
 
 Saving keeps the samples of these modes and those of I;16B, I (from 0 to 65535), 1, P, PA and RGBX.
 La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK by its ICC profile.
+
+As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
+turns them; ``save`` stores the ICC profile of the picture by itself, and takes ``icc_profile``,
+``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
 from typing import IO, Any, cast
 
@@ -33,21 +38,8 @@ _SIGNATURE = b"\xc7GIP\r\n\x1a\n"
 _LIMITS = Limits(max_width=2**32 - 1, max_height=2**32 - 1, max_pixels=2**64 - 1)
 #: Bytes of a file that are read at once for a draft.
 _PIECE = 1024
-#: What `save` passes on to the encoder.
-_OPTIONS = (
-    "bpp",
-    "bytes",
-    "effort",
-    "gaussians",
-    "precision",
-    "progress",
-    "psnr",
-    "quality",
-    "seed",
-    "texts",
-    "threads",
-    "tune",
-)
+#: What `save` passes on to the encoder; Pillow has names of its own for the rest.
+_OPTIONS = inspect.signature(encode).parameters.keys() - {"array", "icc", "exif", "xmp"}
 
 
 class GipImageFile(ImageFile.ImageFile):
@@ -187,7 +179,7 @@ def _accept(prefix: bytes) -> bool:
 
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
     asked = image.encoderinfo
-    options: dict[str, Any] = {name: asked[name] for name in _OPTIONS if name in asked}
+    options: dict[str, Any] = {name: asked[name] for name in _OPTIONS & asked.keys()}
     # As in Pillow's own formats, the profile goes with the picture, and the rest on request.
     profile = asked.get("icc_profile", image.info.get("icc_profile"))
     options["icc"] = _modes.stored_profile(image, profile)

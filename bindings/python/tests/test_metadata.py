@@ -1,0 +1,183 @@
+"""Metadata: what is stored, what Pillow makes of it, and what a policy keeps."""
+
+import io
+import warnings
+from typing import Any
+
+import pytest
+from conftest import VECTORS, Picture, draw, saved
+from PIL import ExifTags, Image, ImageCms
+
+import image_gip
+
+SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+#: A profile that says that it is another.
+OTHER = SRGB.replace("sRGB".encode("utf-16-be"), "wide".encode("utf-16-be"))
+XMP = (
+    '<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-'
+    'syntax-ns#"><rdf:Description rdf:about="" xmlns:tiff="http://ns.adobe.com/tiff/1.0/" '
+    'xmlns:exif="http://ns.adobe.com/exif/1.0/" tiff:Artist="Emma" exif:GPSLatitude="SECRET"/>'
+    "</rdf:RDF></x:xmpmeta>"
+)
+TEXTS = {"Author": "Emma", "Comment": "SECRET"}
+
+
+def described() -> Image.Exif:
+    made = Image.Exif()
+    made[ExifTags.Base.ImageDescription] = "a disc"
+    return made
+
+
+def exif() -> Image.Exif:
+    made = described()
+    made[ExifTags.Base.Orientation] = 6
+    made[ExifTags.Base.BodySerialNumber] = "SECRET"
+    made.get_ifd(ExifTags.IFD.GPSInfo)[ExifTags.GPS.GPSLatitudeRef] = "SECRET"
+    return made
+
+
+#: As bytes, without the prefix of JPEG.
+DESCRIBED = described().tobytes().removeprefix(b"Exif\0\0")
+TIFF = exif().tobytes().removeprefix(b"Exif\0\0")
+EVERYTHING: dict[str, Any] = {"icc": SRGB, "exif": TIFF, "xmp": XMP.encode(), "texts": TEXTS}
+
+
+def test_metadata(photo: Picture) -> None:
+    exif = b"II*\0\x08\0\0\0\0\0\0\0\0\0"
+    prefixed = bytearray(b"Exif\0\0" + exif)
+    file = image_gip.encode(
+        photo, effort=1, icc=memoryview(b"profile"), exif=prefixed, xmp="<ä/>".encode()
+    )
+    info = image_gip.info(file)
+    assert (info.icc, info.exif, info.xmp) == (b"profile", exif, "<ä/>".encode())
+
+
+def test_texts(photo: Picture) -> None:
+    pairs = [("Title", "Dämmerung"), ("Author", ""), ("Title", "once more")]
+    for texts in (pairs, iter(pairs), tuple(pairs)):
+        file = image_gip.encode(photo, effort=1, texts=texts)
+        assert image_gip.info(file).texts == tuple(pairs)
+    texts_by_keyword = dict(pairs)
+    file = image_gip.encode(photo, effort=1, texts=texts_by_keyword)
+    assert image_gip.info(file).texts == tuple(texts_by_keyword.items())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"exif": described()},
+        {"exif": DESCRIBED},
+        {"exif": b"Exif\0\0" + DESCRIBED},
+        {"exif": bytearray(DESCRIBED)},
+        {"exif": b""},
+        {"exif": Image.Exif()},
+        {"exif": None},
+        {"xmp": XMP},
+        {"xmp": XMP.encode()},
+        {"xmp": ""},
+        {"xmp": None},
+        {"icc_profile": SRGB},
+        {"icc_profile": b""},
+        {"icc_profile": None},
+        {},
+    ],
+    ids=lambda options: "".join(
+        f"{name} {type(value).__name__}" for name, value in options.items()
+    ),
+)
+@pytest.mark.parametrize("inherited", [{}, {"icc_profile": OTHER, "exif": TIFF, "xmp": b"<x/>"}])
+def test_pillow_keeps_what_avif_does(options: dict[str, Any], inherited: dict[str, Any]) -> None:
+    image = Image.fromarray(draw(20, 10, 3))
+    image.info.update(inherited)
+    avif = io.BytesIO()
+    image.save(avif, "AVIF", **options)
+    with Image.open(saved(image, **options)) as found, Image.open(avif) as expected:
+        for name in ("exif", "icc_profile", "xmp"):
+            # AVIF's keeps the prefix as it comes.
+            values = [image.info.get(name, b"") for image in (found, expected)]
+            assert len({value.removeprefix(b"Exif\0\0") for value in values}) == 1
+        assert found.getexif() == expected.getexif()
+        assert found.getxmp() == expected.getxmp()
+
+
+def test_there_and_back_in_pillow() -> None:
+    file = saved(Image.fromarray(draw(20, 10, 3)), exif=exif(), xmp=XMP, icc_profile=OTHER)
+    with Image.open(file) as opened:
+        assert opened.info["exif"] == b"Exif\0\0" + TIFF
+        assert opened.getexif()[ExifTags.Base.Orientation] == 6
+        gps = opened.getexif().get_ifd(ExifTags.IFD.GPSInfo)
+        assert gps[ExifTags.GPS.GPSLatitudeRef] == "SECRET"
+        assert opened.getxmp()["xmpmeta"]["RDF"]["Description"]["Artist"] == "Emma"
+        second = saved(opened, exif=opened.info["exif"], xmp=opened.info["xmp"])
+    first, again = image_gip.info(file.getvalue()), image_gip.info(second.getvalue())
+    assert (first.icc, first.exif, first.xmp) == (OTHER, TIFF, XMP.encode())
+    assert (first.icc, first.exif, first.xmp) == (again.icc, again.exif, again.xmp)
+    with Image.open(VECTORS / "metadata.gip") as opened:
+        assert opened.getexif()[ExifTags.Base.Orientation] == 6
+
+
+def test_a_thumbnail_has_the_metadata_of_its_picture() -> None:
+    file = saved(Image.fromarray(draw(40, 20, 3)), exif=exif(), xmp=XMP, icc_profile=OTHER)
+    with Image.open(file) as opened:
+        opened.thumbnail((20, 20))
+        assert opened.info["exif"] == b"Exif\0\0" + TIFF
+        # As with all formats of Pillow, the profile goes with it, and the rest on request.
+        info = image_gip.info(saved(opened).getvalue())
+    assert (info.size, info.icc, info.exif, info.xmp) == ((20, 10), OTHER, None, None)
+
+
+@pytest.mark.parametrize("way", ["encode", "info", "save"])
+def test_the_safe_policy(photo: Picture, way: str) -> None:
+    if way == "encode":
+        info = image_gip.info(image_gip.encode(photo, effort=1, **EVERYTHING, metadata="safe"))
+    elif way == "info":
+        file = image_gip.encode(photo, effort=1, **EVERYTHING)
+        assert image_gip.info(file) == image_gip.info(file, metadata="all")
+        info = image_gip.info(file, metadata="safe")
+    else:
+        options = {"icc_profile": SRGB, "exif": exif(), "xmp": XMP, "texts": TEXTS}
+        image = Image.fromarray(photo)
+        info = image_gip.info(saved(image, **options, metadata="safe").getvalue())
+    assert (info.icc, info.orientation, info.texts) == (SRGB, 6, (("Author", "Emma"),))
+    assert info.exif is not None
+    assert info.xmp is not None
+    assert b"Emma" in info.xmp
+    assert b"SECRET" not in info.exif + info.xmp
+    kept = Image.Exif()
+    kept.load(info.exif)
+    assert kept[ExifTags.Base.ImageDescription] == "a disc"
+    assert not kept.get_ifd(ExifTags.IFD.GPSInfo)
+
+
+def test_without_metadata(photo: Picture) -> None:
+    bare = image_gip.encode(photo, effort=1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert image_gip.encode(photo, effort=1, **EVERYTHING, metadata="none") == bare
+    everything = EVERYTHING | {"icc": OTHER}
+    with pytest.warns(image_gip.MetadataWarning, match="the colour profile was dropped") as raised:
+        assert image_gip.encode(photo, effort=1, **everything, metadata="none") == bare
+    assert raised[0].filename == __file__
+    file = image_gip.encode(photo, effort=1, **EVERYTHING)
+    info = image_gip.info(file, metadata="none")
+    assert (info.icc, info.exif, info.xmp, info.texts) == (None, None, None, ())
+    # It is what the file says of the picture.
+    assert info.orientation == 6
+
+
+def test_damaged_metadata(photo: Picture) -> None:
+    damaged = TIFF[:9]
+    with pytest.warns(image_gip.MetadataWarning, match="the Exif is damaged and was dropped"):
+        file = image_gip.encode(photo, effort=1, exif=damaged, metadata="safe")
+    assert image_gip.info(file).exif is None
+    assert image_gip.info(image_gip.encode(photo, effort=1, exif=damaged)).exif == damaged
+
+
+@pytest.mark.parametrize("policy", ["", "some", "SAFE"])
+def test_policies_that_are_refused(photo: Picture, file: bytes, policy: Any) -> None:
+    with pytest.raises(ValueError, match='it must be "all", "safe" or "none"'):
+        image_gip.encode(photo, metadata=policy)
+    with pytest.raises(ValueError, match='it must be "all", "safe" or "none"'):
+        image_gip.info(file, metadata=policy)
+    with pytest.raises(ValueError, match='it must be "all", "safe" or "none"'):
+        saved(Image.fromarray(photo), metadata=policy)
