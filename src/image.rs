@@ -385,7 +385,9 @@ mod encoder {
     impl From<EncodeError> for ImageError {
         fn from(error: EncodeError) -> Self {
             match error {
-                EncodeError::Source(_) | EncodeError::Option(_) => parameter(error.to_string()),
+                EncodeError::Source(_) | EncodeError::Option(_) | EncodeError::Limit { .. } => {
+                    parameter(error.to_string())
+                }
                 EncodeError::Cancelled => Self::Encoding(EncodingError::new(hint(), error)),
             }
         }

@@ -8,9 +8,9 @@ use image_gip::training::{
     Training,
 };
 use image_gip::{
-    ColorModel, EncodeError, Encoded, Encoder, Gaussian, Kernel, Limits, Metadata, MetadataError,
-    OptionError, Parameterization, Precision, RenderOptions, SampleDepth, Shortfall, Source,
-    SourceError, StreamDecoder, Target, Text, Threads, Tune, metrics,
+    ColorModel, Decoder, EncodeError, Encoded, Encoder, Gaussian, Kernel, LimitKind, Limits,
+    Metadata, MetadataError, OptionError, Parameterization, Precision, RenderOptions, SampleDepth,
+    Shortfall, Source, SourceError, StreamDecoder, Target, Text, Threads, Tune, metrics,
 };
 
 const COLORS: [ColorModel; 4] =
@@ -705,4 +705,58 @@ fn metadata_is_carried() {
     let encoder = quick(Target::Gaussians(10)).with_metadata(metadata.clone());
     let encoded = encoder.encode(&source).expect("it encodes");
     assert_eq!(decode(&encoded.bytes).metadata(), &metadata);
+}
+
+#[test]
+fn what_the_decoder_would_refuse_is_not_encoded() {
+    let pixels: Vec<u8> = (0..40 * 30).map(|at| (at * 7 % 251) as u8).collect();
+    let source = Source::new_u8(40, 30, ColorModel::Gray, &pixels).expect("the sizes agree");
+    let encode = |set: fn(&mut Limits), target| {
+        let mut limits = Limits::default();
+        set(&mut limits);
+        let mut metadata = Metadata::default();
+        metadata.exif = Some(vec![7; 1000]);
+        let encoder = Encoder::new().with_effort(1).with_target(target).with_metadata(metadata);
+        let mut calls = 0;
+        let encoded = encoder.with_limits(limits.clone()).encode_with(&source, &mut |_| {
+            calls += 1;
+            ControlFlow::Continue(())
+        });
+        if let Ok(encoded) = &encoded {
+            let mut decoder = Decoder::new_with_limits(&encoded.bytes[..], limits)
+                .expect("the limits are those of the encoder");
+            let mut out = vec![0; pixels.len()];
+            decoder.decode_into(&mut out).expect("the limits are those of the encoder");
+        }
+        match encoded {
+            Ok(_) => None,
+            Err(EncodeError::Limit { kind, wanted, allowed }) => {
+                assert!(wanted > allowed, "{kind}");
+                Some((kind, calls == 0))
+            }
+            Err(error) => panic!("{error}"),
+        }
+    };
+    let (few, more) = (Target::Gaussians(50), Target::Quality(70.0));
+    for target in [few, more] {
+        assert_eq!(encode(|_| {}, target), None);
+        // Before any work.
+        let refused = |kind| Some((kind, true));
+        assert_eq!(encode(|limits| limits.max_width = 39, target), refused(LimitKind::Width));
+        assert_eq!(encode(|limits| limits.max_height = 29, target), refused(LimitKind::Height));
+        assert_eq!(encode(|limits| limits.max_pixels = 1199, target), refused(LimitKind::Pixels));
+        assert_eq!(encode(|limits| limits.max_memory = 1500, target), refused(LimitKind::Memory));
+        // Only the Gaussians tell.
+        assert_eq!(encode(|limits| limits.max_work = 2000, target), Some((LimitKind::Work, false)));
+    }
+    let few_gaussians = |limits: &mut Limits| limits.max_gaussians = 49;
+    assert_eq!(encode(few_gaussians, few), Some((LimitKind::Gaussians, true)));
+
+    // By default those of every decoder.
+    let samples = vec![0; 65_537];
+    let error = image_gip::encode(1, 65_537, ColorModel::Gray, &samples).expect_err("too high");
+    assert!(error.to_string().contains("height: 65537 required, 65536 allowed"), "{error}");
+    let source = Source::new_u8(1, 65_537, ColorModel::Gray, &samples).expect("sizes agree");
+    let raised = Encoder::new().with_effort(1).with_limits(Limits::none()).encode(&source);
+    assert!(raised.is_ok_and(|encoded| encoded.report.psnr > 99.0));
 }

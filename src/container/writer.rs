@@ -34,6 +34,11 @@ impl ChunkWriter {
         self.file.extend_from_slice(&word);
     }
 
+    /// The file so far.
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        self.file
+    }
+
     /// Appends `GEND`, and returns the file.
     pub(crate) fn finish(mut self) -> Vec<u8> {
         self.chunk(ChunkType::GEND, &[]);

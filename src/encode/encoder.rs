@@ -14,6 +14,7 @@ use super::source::Source;
 use crate::color::ColorModel;
 use crate::container::Metadata;
 use crate::kernel::Kernel;
+use crate::limits::Limits;
 use crate::threads::Threads;
 
 /// For the efforts 1 to 7: iterations of training, and passes of rate-distortion optimization over
@@ -39,7 +40,8 @@ const MIN_ITERATIONS_BY_ERROR: u32 = 180;
 ///
 /// # Errors
 /// [`EncodeError::Source`] when a side is not 1 to 2^20 pixels long, or `samples` does not hold
-/// width x height x channels samples.
+/// width x height x channels samples; [`EncodeError::Limit`] when the picture exceeds the default
+/// [`Limits`].
 pub fn encode(
     width: u32,
     height: u32,
@@ -74,6 +76,7 @@ pub struct Encoder {
     precision: Precision,
     seed: u64,
     threads: Threads,
+    limits: Limits,
     pub(crate) metadata: Metadata,
     training: Option<Training>,
 }
@@ -95,6 +98,7 @@ impl Encoder {
             precision: Precision::Entropy,
             seed: 0,
             threads: Threads::Pool,
+            limits: Limits::default(),
             metadata: Metadata::default(),
             training: None,
         }
@@ -139,6 +143,13 @@ impl Encoder {
         self
     }
 
+    /// The limits of the decoder that is to read the file: what it would refuse is not encoded.
+    /// Default [`Limits::default`], those of every decoder that is not told otherwise.
+    pub fn with_limits(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self
+    }
+
     /// The ICC profile, Exif, XMP and texts to store with the picture. Default: none.
     pub fn with_metadata(mut self, metadata: Metadata) -> Self {
         self.metadata = metadata;
@@ -157,7 +168,9 @@ impl Encoder {
     ///
     /// # Errors
     /// [`EncodeError::Option`] when an option is out of range, when the target is a size smaller
-    /// than a file without Gaussians, or when no thread can be started.
+    /// than a file without Gaussians, or when no thread can be started. [`EncodeError::Limit`] when
+    /// the decoder would refuse the file: for the size of the picture, its metadata or the target's
+    /// number of Gaussians, before any work is done; for what the Gaussians take, at the end.
     pub fn encode(&self, source: &Source<'_>) -> Result<Encoded, EncodeError> {
         self.encode_with(source, &mut |_| ControlFlow::Continue(()))
     }
@@ -184,6 +197,7 @@ impl Encoder {
             seed: self.seed,
             metadata: &self.metadata,
             training: &training,
+            limits: &self.limits,
             passes,
         };
         let mut run = || pipeline::encode(&job, &mut observer);

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use crate::color::ColorModel;
 use crate::container::{MAX_SIDE, MetadataError};
+use crate::error::LimitKind;
 
 /// Why a picture could not be encoded.
 #[derive(Debug, Error)]
@@ -15,6 +16,20 @@ pub enum EncodeError {
     /// An option is out of range.
     #[error("invalid option: {0}")]
     Option(#[from] OptionError),
+    /// A decoder with the limits of [`Encoder::with_limits`](crate::Encoder::with_limits) would refuse
+    /// the file.
+    #[error(
+        "a decoder with these limits would refuse the file: {kind}: {wanted} required, {allowed} allowed; \
+         raise the limit for encoder and decoder alike"
+    )]
+    Limit {
+        /// Which limit.
+        kind: LimitKind,
+        /// What the file requires, in the unit of the limit; it may require more.
+        wanted: u64,
+        /// The limit.
+        allowed: u64,
+    },
     /// The progress callback cancelled the encoding.
     #[error("encoding was cancelled")]
     Cancelled,

@@ -5,6 +5,7 @@ use super::options::{Precision, Target, Tune};
 use super::source::Source;
 use super::workload::Workload;
 use crate::container::Metadata;
+use crate::limits::Limits;
 
 /// A picture to encode, and the options to encode it with.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +17,8 @@ pub(crate) struct Job<'a> {
     pub(crate) seed: u64,
     pub(crate) metadata: &'a Metadata,
     pub(crate) training: &'a Training,
+    /// The limits of the decoder that is to read the file.
+    pub(crate) limits: &'a Limits,
     /// Passes of rate-distortion optimization over the codes of an entropy-coded file.
     pub(crate) passes: u32,
 }

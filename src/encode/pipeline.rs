@@ -14,7 +14,7 @@ use super::rdo::SearchWork;
 use super::sensitivity::Sensitivity;
 use super::shortfall::{Reached, Shortfall};
 use super::verify::{FilePsnr, Verified};
-use super::{entropy, packed};
+use super::{entropy, packed, verify};
 
 /// A file for a size with more Gaussians than one for so many pixels is compared with one that has
 /// fewer: short runs may get nothing from the bits (kodim23, effort 1: 40.1 dB with 24 bits per pixel,
@@ -43,6 +43,7 @@ pub(crate) struct Outcome {
 
 /// The file for the target, or a smaller one where the target's size brings too little.
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
+    verify::check_limits(job)?;
     let outcome = encode_for_target(job, Work::default(), observer)?;
     let pixels = job.pixels();
     let is_large = outcome.gaussians as usize > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
@@ -96,7 +97,7 @@ fn encode_for_target(
 
     // The decoder needs memory, too.
     drop(raster);
-    let verified = Verified::new(&file, source, observer)?;
+    let verified = Verified::within(&file, source, job.limits, observer)?;
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());

@@ -5,14 +5,18 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::error::EncodeError;
+use super::file::FileLayout;
+use super::job::Job;
+use super::options::Target;
 use super::progress::Observer;
 use super::quality::Judgement;
 use super::source::{SPAN, Source};
 use super::strips;
 use crate::decode::StreamDecoder;
+use crate::error::DecodeError;
 use crate::limits::Limits;
 use crate::region::Region;
-use crate::render::Picture;
+use crate::render::{Picture, RenderOptions};
 
 /// Bytes of a file from one poll of the observer to the next.
 const PIECE: usize = 1 << 12;
@@ -35,7 +39,33 @@ pub(crate) struct FilePsnr {
     pub(crate) psnr_float: f64,
 }
 
+/// Refuses a picture that no file can hold within the limits, as far as this is known before the work.
+///
+/// # Errors
+/// [`EncodeError::Limit`] when a decoder would refuse every such file.
+pub(crate) fn check_limits(job: &Job<'_>) -> Result<(), EncodeError> {
+    let Job { source, target, training, metadata, limits, .. } = *job;
+    let (kernel, parameterization) = (training.kernel, training.parameterization);
+    let layout = FileLayout::new(source, [0.0; 4], kernel, parameterization, metadata);
+    let gaussians = if let Target::Gaussians(count) = target { count } else { 0 };
+    let mut stream = StreamDecoder::new().with_limits(limits.clone());
+    stream.feed(&layout.start(gaussians)).map_err(refusal)?;
+    Ok(())
+}
+
+/// The error of a decoder that refuses a file of the encoder: nothing but limits makes it do so.
+fn refusal(error: DecodeError) -> EncodeError {
+    match error {
+        DecodeError::Limit { kind, wanted, allowed } => {
+            EncodeError::Limit { kind, wanted, allowed }
+        }
+        error => unreachable!("the decoder reads what the encoder writes: {error}"),
+    }
+}
+
 impl<'a> Verified<'a> {
+    /// Decodes a file without limits, as a search does with all that it tries.
+    ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
@@ -43,13 +73,29 @@ impl<'a> Verified<'a> {
         source: &'a Source<'a>,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
-        let mut stream = StreamDecoder::new().with_limits(Limits::none());
+        Self::within(file, source, &Limits::none(), observer)
+    }
+
+    /// Decodes a file within limits.
+    ///
+    /// # Errors
+    /// [`EncodeError::Limit`] when a decoder with these limits refuses it, or its rendering at full
+    /// size, and [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn within(
+        file: &[u8],
+        source: &'a Source<'a>,
+        limits: &Limits,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
+        let mut stream = StreamDecoder::new().with_limits(limits.clone());
         for piece in file.chunks(PIECE) {
             observer.poll()?;
-            stream.feed(piece).expect("the decoder reads what the encoder writes");
+            stream.feed(piece).map_err(refusal)?;
         }
         assert!(stream.is_complete(), "the encoder writes whole files");
-        Ok(Self { stream, source })
+        let verified = Self { stream, source };
+        verified.picture().check(&RenderOptions::new()).map_err(refusal)?;
+        Ok(verified)
     }
 
     /// The decoded picture.

@@ -131,6 +131,15 @@ impl<'a> Picture<'a> {
         Ok(())
     }
 
+    /// Checks the request and the limits as rendering does.
+    ///
+    /// # Errors
+    /// As [`Picture::render_planes`].
+    #[cfg(feature = "encode")]
+    pub(crate) fn check(&self, options: &RenderOptions) -> Result<(), DecodeError> {
+        self.prepare(options).map(|_| ())
+    }
+
     /// Renders as [`Picture::render_planes`], but strip by strip from the top, each in the memory of the
     /// last one. Strips have `bands` times [`BAND_HEIGHT`] rows, except the last one. Every strip is
     /// shown to `visit` with its place in the region, until that returns an error.

@@ -66,6 +66,18 @@ impl<'a> FileLayout<'a> {
         self.header.base()
     }
 
+    /// What a file with so many Gaussians begins with, as far as its limits are concerned.
+    pub(crate) fn start(&self, gaussians: u32) -> Vec<u8> {
+        let layers = u16::from(gaussians > 0);
+        let header = Header { gaussians, layers, ..self.header.clone() };
+        let mut file = ChunkWriter::new();
+        file.chunk(ChunkType::GHDR, &header.to_payload());
+        for (kind, payload) in self.metadata.chunks() {
+            file.chunk(kind, &payload);
+        }
+        file.into_bytes()
+    }
+
     /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
     pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
         let PackedCodes { quantizers, codes } = self.ordered(packed);
