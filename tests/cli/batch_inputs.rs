@@ -3,6 +3,7 @@
 use std::fs;
 
 use image::ColorType;
+use serde_json::Value;
 
 use super::pictures;
 use super::room::{Room, by_input, text};
@@ -45,4 +46,81 @@ fn names_that_differ_in_bytes_that_are_not_text_have_a_line_each() {
     let lines = text(&room.read("m.jsonl"));
     assert_eq!(by_input(lines.as_bytes()).len(), names.len() + 1);
     assert!(lines.lines().next_back().expect("a line").contains(texts[1]), "{lines}");
+}
+
+#[test]
+fn pictures_that_are_not_read_are_named_and_other_files_counted() {
+    let room = Room::new();
+    for name in ["in/a.png", "in/2024/b.JPG"] {
+        room.save_picture(name, &pictures::picture((40, 32), ColorType::Rgb8));
+    }
+    for name in ["in/2024/c.HEIC", "in/d.cr3", "in/2024/e.avif", "in/f.txt", "in/g"] {
+        room.write(name, "not looked at");
+    }
+    let args = ["in", "--out", "out", "--manifest", "m.jsonl", "--resume"];
+    let run = |more: &[&str]| room.batch(0, &[&args[..], &QUICK, more].concat());
+    let (printed, errors) = run(&[]);
+    assert!(printed.starts_with("2 files: 2 written, 0 skipped, 0 failed, 0 left"), "{printed}");
+    let warning = "warning: 3 pictures of formats that are not read left out \
+                   (1 .avif, 1 .cr3, 1 .heic): in/2024/c.HEIC, in/2024/e.avif, in/d.cr3\n";
+    let note = "note: 2 other files left out (1 .txt, 1 without extension)\n";
+    assert_eq!(errors, format!("{warning}{note}"));
+    let first = text(&room.read("m.jsonl"));
+    let manifest = by_input(first.as_bytes());
+    let names = ["2024/b.JPG", "2024/c.HEIC", "2024/e.avif", "a.png", "d.cr3"];
+    assert!(manifest.keys().eq(&names.map(|name| format!("in/{name}"))), "{manifest:?}");
+    let line = &manifest["in/d.cr3"];
+    assert_eq!((&line["status"], &line["output"]), (&"ignored".into(), &Value::Null));
+    assert_eq!((&line["input_bytes"], &line["bytes"]), (&13.into(), &Value::Null));
+    let reason = line["error"].as_str().expect("a reason");
+    assert!(reason.starts_with("in/d.cr3: ") && reason.contains("not read"), "{reason}");
+
+    // They are told again, and there is a line of each still.
+    assert_eq!(run(&[]).1, errors);
+    assert_eq!(text(&room.read("m.jsonl")), first);
+    // What one leaves out oneself need not be told, and what is said of it is kept.
+    assert_eq!(
+        run(&["--exclude", "c.heic", "--exclude", "*.cr3", "--include", "*.*"]).1.lines().count(),
+        2
+    );
+    assert_eq!(run(&["--include", "*.png", "--include", "*.jpg"]).1, "");
+    assert_eq!(text(&room.read("m.jsonl")), first);
+    // One that is read after all has one line, too.
+    room.save_picture("in/d.png", &pictures::picture((40, 32), ColorType::Rgb8));
+    fs::rename(room.path("in/d.png"), room.path("in/d.cr3")).expect("in one folder");
+    let named = ["in/d.cr3", "--out", "out", "--manifest", "m.jsonl", "--resume"];
+    room.batch(0, &[&named[..], &QUICK].concat());
+    let manifest = by_input(&room.read("m.jsonl"));
+    assert_eq!((manifest.len(), &manifest["in/d.cr3"]["status"]), (names.len(), &"written".into()));
+
+    // Where .gip files are decoded, nothing else is expected to be.
+    let (_, errors) = room.batch(0, &["in", "out", "--decode", "--out", "back"]);
+    assert!(errors.starts_with("note: 7 other files left out (") && errors.lines().count() == 1);
+    let (_, errors) = room.batch(2, &["in", "--out", "out", "--include", "a["]);
+    assert!(errors.contains("a["), "{errors}");
+}
+
+#[test]
+#[cfg(unix)]
+fn folders_that_cannot_be_read_are_failures() {
+    let room = Room::new();
+    room.save_picture("in/a.png", &pictures::picture((40, 32), ColorType::Rgb8));
+    // A path that is too long for the system, whatever the rights are.
+    let script = "cd in; for i in $(seq 20); do mkdir $0 && cd -P $0 || exit; done";
+    let mut shell = std::process::Command::new("sh");
+    let made = shell.args(["-c", script, &"d".repeat(250)]).current_dir(room.path("")).status();
+    assert!(made.expect("there is a shell").success());
+    let args = ["in", "--out", "out", "--manifest", "m.jsonl", "--resume"];
+    for resumed in [false, true] {
+        let (printed, errors) = room.batch(3, &[&args[..], &QUICK].concat());
+        let done = if resumed { "0 written, 1 skipped" } else { "1 written, 0 skipped" };
+        assert!(printed.starts_with(&format!("2 files: {done}, 1 failed, 0 left")), "{printed}");
+        assert!(errors.starts_with("error: in/ddd") && errors.lines().count() == 1, "{errors}");
+        let manifest = by_input(&room.read("m.jsonl"));
+        let (_, line) = manifest.last_key_value().expect("a line");
+        assert_eq!((manifest.len(), &line["status"]), (2, &"failed".into()));
+        assert_eq!(format!("error: {}\n", line["error"].as_str().expect("a text")), errors);
+    }
+    fs::remove_dir_all(room.path("in").join("d".repeat(250))).expect("ours");
+    room.batch(0, &[&args[..], &QUICK].concat());
 }

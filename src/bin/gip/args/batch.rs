@@ -10,8 +10,13 @@ use super::values::{bounds, extension, number};
 /// Each INPUT is a file or a folder. A file becomes DIR/NAME.gip. Of a folder, every picture in it
 /// and in its subfolders is taken, in the order of their names, and keeps its path below DIR:
 /// `gip batch photos --out gips` makes gips/2024/a.gip of photos/2024/a.jpg. What is a picture is
-/// told by the extension; hidden files and links to folders are left out. Options of the encoder
-/// are those of `gip encode`.
+/// told by the extension, and its format by the contents. Pictures of formats that are not read, such
+/// as HEIC, AVIF and raw files of cameras, are named in a warning and in the manifest, and other files
+/// are counted. Hidden files are left out, links to folders are not followed, and a folder that cannot
+/// be read is a failure. Options of the encoder are those of `gip encode`.
+///
+/// In every folder of an INPUT, a file .gipignore may say what to leave out there and below, with
+/// patterns as in .gitignore, where upper and lower case are the same.
 ///
 /// If two results would get the same name, as those of a.png and a.jpg, or if a result would
 /// replace an INPUT, nothing is done. A picture that cannot be read is reported and skipped.
@@ -26,6 +31,7 @@ use super::values::{bounds, extension, number};
 Examples:
   gip batch photos --out gips --manifest gips.jsonl      a whole folder
   gip batch photos --out gips --resume                   what is missing or old there
+  gip batch photos --out gips --include '*.jpg' --exclude raw/
   gip batch gips --out back --decode --format webp
   gip batch gips --out thumbs --thumbnail 160 --format jpg
 
@@ -39,6 +45,16 @@ pub(crate) struct Batch {
     /// The folder of the results; it is made if there is none.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
+    /// Take only files that match GLOB, or any of several when given again: a pattern as in
+    /// .gitignore, of the path below INPUT. Upper and lower case are the same.
+    ///
+    /// *.jpg takes all JPEG files, 2024/ what is in folders of that name, and /2024/*.jpg the JPEG
+    /// files right in the folder 2024 of an INPUT.
+    #[arg(long, value_name = "GLOB")]
+    pub(crate) include: Vec<String>,
+    /// Leave out files and folders that match GLOB, even if --include takes them; may be given again.
+    #[arg(long, value_name = "GLOB")]
+    pub(crate) exclude: Vec<String>,
     /// Number of pictures that are worked on at the same time, from 1 to 1024; each takes one thread
     /// [default: one per core].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -59,16 +75,19 @@ pub(crate) struct Batch {
     pub(crate) resume: bool,
     /// Write a line of JSON for every file to FILE, or to standard output if it is `-`.
     ///
-    /// Fields: input, output, status ("written", "skipped" or "failed"), input_bytes, width, height,
-    /// bytes, gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of
-    /// SSIMULACRA2), seconds (from reading to the encoded result), shortfall (null, or why the target
-    /// was not met), warnings (an array of what of the input is lost, such as all frames but the first),
-    /// error (null, or why it failed). What is unknown or does not apply is null. In input and
-    /// output, a byte that is not UTF-8 is U+FFFD and two hexadecimal digits, and so are the bytes of
-    /// a U+FFFD in a name. Lines are written as files are finished, which is not the order of the inputs. An existing FILE is
-    /// replaced. With --resume, lines of files that are skipped are kept, and so are those of files
-    /// that this run does not know; an incomplete last line is dropped. So there is one line per
-    /// file. If a file is skipped that has no line, it gets one with what its result tells.
+    /// Fields: input, output (null if there is none), status ("written", "skipped", "failed", or
+    /// "ignored" of a picture in a format that is not read), input_bytes, width, height, bytes,
+    /// gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of SSIMULACRA2),
+    /// seconds (from reading to the encoded result), shortfall (null, or why the target was not met),
+    /// warnings (an array of what of the input is lost, such as all frames but the first), error (null,
+    /// or why there is no result). What is unknown or does not apply is null. In input and output, a
+    /// byte that is not UTF-8 is U+FFFD and two hexadecimal digits, and so are the bytes of a U+FFFD in
+    /// a name.
+    ///
+    /// Lines are written as files are finished, which is not the order of the inputs. An existing FILE
+    /// is replaced. With --resume, lines of files that are skipped are kept, and so are those of files
+    /// that this run does not know; an incomplete last line is dropped. So there is one line per file.
+    /// If a file is skipped that has no line, it gets one with what its result tells.
     #[arg(long, value_name = "FILE")]
     pub(crate) manifest: Option<PathBuf>,
     /// Decode .gip files; of a folder, only these are taken.

@@ -1,12 +1,20 @@
 //! The files of a batch, and the names of their results.
 
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use ignore::{DirEntry, WalkBuilder};
 
+use super::left_out::LeftOut;
+use super::selection::Selection;
 use crate::errors::WrongUsage;
 use crate::files;
+
+/// A file with patterns of what is to be left out, as in .gitignore, of the folder that it is in.
+const IGNORE_FILE: &str = ".gipignore";
 
 /// A file and its result.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,60 +23,132 @@ pub(crate) struct Item {
     pub(crate) output: PathBuf,
 }
 
-/// Finds the files of the inputs. `takes` tells which files of a folder are meant; a file that is an
-/// input itself is always meant. `extension` is that of the results.
+/// How a file of a folder is taken, by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// One to work on.
+    Taken,
+    /// A picture of a format that is not read.
+    Unread,
+    /// Something else.
+    Other,
+}
+
+/// What the inputs have besides the files to work on.
+#[derive(Debug, Default)]
+pub(crate) struct Rest {
+    pub(crate) left_out: LeftOut,
+    /// What could not be looked at, and why.
+    pub(crate) failed: BTreeMap<PathBuf, String>,
+    /// The folders that were looked at.
+    pub(crate) folders: Vec<PathBuf>,
+}
+
+/// Finds the files to work on: those of the inputs that `selection` takes. `kind` tells which files of a folder are
+/// meant; a file that is an input itself is of any kind. `output` names the result of a file by its
+/// path below the input.
 pub(crate) fn find(
     inputs: &[PathBuf],
-    out: &Path,
-    takes: impl Fn(&Path) -> bool,
-    extension: &str,
-) -> Result<Vec<Item>> {
-    let mut items = Vec::new();
-    let mut add = |source: &Path, name: &Path| {
-        let output = out.join(name).with_extension(extension);
-        items.push(Item { source: source.to_owned(), output });
-    };
+    selection: &Selection,
+    kind: impl Fn(&Path) -> Kind,
+    output: impl Fn(&Path) -> PathBuf,
+) -> Result<(Vec<Item>, Rest)> {
+    let (mut items, mut rest) = (Vec::new(), Rest::default());
     for input in inputs {
         let name = || input.display().to_string();
         if files::is_standard_stream(input) {
             bail!(WrongUsage("gip batch takes files and folders, not standard input".into()));
         }
-        let kind = fs::metadata(input).with_context(name)?;
-        if kind.is_dir() {
-            walk(input, Path::new(""), &takes, &mut add)?;
-        } else if kind.is_file() {
-            add(input, Path::new(input.file_name().unwrap_or_default()));
+        let metadata = fs::metadata(input).with_context(name)?;
+        if metadata.is_dir() {
+            let add = |source: &Path, below: &Path| {
+                items.push(Item { source: source.to_owned(), output: output(below) });
+            };
+            walk(input, selection, &kind, add, &mut rest)?;
+        } else if metadata.is_file() {
+            let file_name = Path::new(input.file_name().unwrap_or_default());
+            if selection.takes(file_name) {
+                items.push(Item { source: input.clone(), output: output(file_name) });
+            }
         } else {
             bail!("{}: neither a file nor a folder", name());
         }
     }
-    Ok(items)
+    Ok((items, rest))
 }
 
-/// Calls `add` with the files in a folder and in its subfolders, in the order of their names, and
-/// with their paths below the first folder. Hidden files and links to folders are left out.
+/// Calls `add` with the files to work on in a folder and in its subfolders, in the order of their
+/// names, and with their paths below the folder. Hidden files are left out, and links to folders are
+/// not followed: they may lead in a circle.
 fn walk(
     folder: &Path,
-    below: &Path,
-    takes: &impl Fn(&Path) -> bool,
-    add: &mut impl FnMut(&Path, &Path),
+    selection: &Selection,
+    kind: &impl Fn(&Path) -> Kind,
+    mut add: impl FnMut(&Path, &Path),
+    rest: &mut Rest,
 ) -> Result<()> {
-    let name = || folder.display().to_string();
-    let entries: Result<Vec<_>, _> = fs::read_dir(folder).with_context(name)?.collect();
-    let mut entries = entries.with_context(name)?;
-    entries.sort_by_key(fs::DirEntry::file_name);
-    for entry in entries {
-        let (path, name) = (entry.path(), entry.file_name());
-        if name.as_encoded_bytes().starts_with(b".") {
+    let is_folder = |entry: &DirEntry| entry.file_type().is_some_and(|kind| kind.is_dir());
+    let is_met = {
+        let (selection, folder) = (selection.clone(), folder.to_owned());
+        move |entry: &DirEntry| !is_folder(entry) || selection.enters(below(&folder, entry.path()))
+    };
+    let walk = WalkBuilder::new(folder)
+        // What git ignores are often pictures: they are too large for it.
+        .standard_filters(false)
+        .hidden(true)
+        .add_custom_ignore_filename(IGNORE_FILE)
+        .ignore_case_insensitive(true)
+        .filter_entry(is_met)
+        .sort_by_file_name(OsStr::cmp)
+        .build();
+    for entry in walk {
+        let entry = match entry {
+            Ok(entry) => entry,
+            Err(error) => {
+                let path = place(&error).unwrap_or(folder).to_owned();
+                rest.failed.insert(path, error.to_string());
+                continue;
+            }
+        };
+        if let Some(error) = entry.error() {
+            bail!("{error}");
+        }
+        let path = entry.path();
+        if entry.depth() == 0 || is_folder(&entry) {
+            rest.folders.push(path.to_owned());
             continue;
         }
-        if entry.file_type().with_context(|| path.display().to_string())?.is_dir() {
-            walk(&path, &below.join(name), takes, add)?;
-        } else if takes(&path) && path.is_file() {
-            add(&path, &below.join(name));
+        match fs::metadata(path) {
+            Ok(metadata) if metadata.is_dir() => rest.left_out.add(path, "links to folders"),
+            Ok(metadata) if !metadata.is_file() => rest.left_out.add(path, "devices and pipes"),
+            _ if !selection.takes(below(folder, path)) => {}
+            outcome => match (kind(path), outcome) {
+                (Kind::Taken, Ok(_)) => add(path, below(folder, path)),
+                (Kind::Taken, Err(error)) => {
+                    rest.failed.insert(path.to_owned(), format!("{}: {error}", path.display()));
+                }
+                (Kind::Unread, _) => drop(rest.left_out.pictures.insert(path.to_owned())),
+                (Kind::Other, _) => rest.left_out.add_file(path),
+            },
         }
     }
     Ok(())
+}
+
+/// The path of something in a folder below that folder.
+fn below<'a>(folder: &Path, path: &'a Path) -> &'a Path {
+    path.strip_prefix(folder).unwrap_or(path)
+}
+
+/// The path that an error is about.
+fn place(error: &ignore::Error) -> Option<&Path> {
+    match error {
+        ignore::Error::WithPath { path, .. } => Some(path),
+        ignore::Error::WithDepth { err, .. } | ignore::Error::WithLineNumber { err, .. } => {
+            place(err)
+        }
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -86,31 +166,85 @@ mod tests {
         for name in names.iter().chain(&[".hidden.png", ".git/x.png"]) {
             fs::write(path("in").join(name), "").expect("writable");
         }
-        let takes = |path: &Path| {
-            path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+        fs::write(path("in/a/raw.HEIC"), "").expect("writable");
+        let kind =
+            |path: &Path| match path.extension().map(|extension| extension.to_ascii_lowercase()) {
+                Some(extension) if extension == "png" => Kind::Taken,
+                Some(extension) if extension == "heic" => Kind::Unread,
+                _ => Kind::Other,
+            };
+        let find = |exclude: &[&str]| {
+            // A file that is an input itself may have any name.
+            let inputs = [path("in/a/note.txt"), path("in")];
+            let exclude: Vec<_> = exclude.iter().map(|&glob| glob.into()).collect();
+            let selection = Selection::new(&[], &exclude).expect("globs");
+            let output = |below: &Path| Path::new("out").join(below).with_extension("gip");
+            find(&inputs, &selection, kind, output).expect("readable")
         };
-        // A file that is an input itself may have any name.
-        let inputs = [path("in/a/note.txt"), path("in")];
-        let items = find(&inputs, Path::new("out"), takes, "gip").expect("readable");
-        let outputs: Vec<_> = items.iter().map(|item| item.output.display().to_string()).collect();
+        let outputs = |items: &[Item]| -> Vec<String> {
+            items.iter().map(|item| item.output.display().to_string()).collect()
+        };
+        let (items, rest) = find(&[]);
         let expected = ["note.gip", "a/deep/x.gip", "a.gip", "b/10.gip", "b/2.gip", "c.gip"];
-        assert_eq!(outputs, expected.map(|name| format!("out/{name}")));
+        assert_eq!(outputs(&items), expected.map(|name| format!("out/{name}")));
         assert_eq!(items[1].source, path("in/a/deep/x.png"));
+        assert!(rest.left_out.pictures.iter().eq([&path("in/a/raw.HEIC")]));
+        assert_eq!(rest.left_out.lines()[1], "note: 1 other file left out (1 .txt)");
+        assert!(rest.failed.is_empty());
+        assert_eq!(rest.folders, ["in", "in/a", "in/a/deep", "in/b"].map(path));
+
+        // Patterns hold for files that are named, too.
+        let (items, rest) = find(&["b/", "*.TXT", "raw.*"]);
+        assert_eq!(outputs(&items), ["a/deep/x", "a", "c"].map(|name| format!("out/{name}.gip")));
+        assert!(rest.left_out.lines().is_empty());
 
         #[cfg(unix)]
         {
             // No circle, but links to files are followed.
-            std::os::unix::fs::symlink(path("in"), path("in/b/circle")).expect("links exist");
-            std::os::unix::fs::symlink(path("in/a.png"), path("in/d.png")).expect("links exist");
-            let items = find(&inputs, Path::new("out"), takes, "gip").expect("readable");
+            let link = |to: &str, name: &str| {
+                std::os::unix::fs::symlink(path(to), path(name)).expect("links exist");
+            };
+            link("in", "in/b/circle");
+            link("in/a.png", "in/d.png");
+            link("in/none.png", "in/e.png");
+            let (items, rest) = find(&[]);
             assert_eq!(items.len(), expected.len() + 1);
+            assert!(rest.left_out.lines()[1].contains("1 links to folders"));
+            assert!(rest.failed.keys().eq([&path("in/e.png")]), "{:?}", rest.failed);
         }
     }
 
     #[test]
+    fn an_ignore_file_holds_for_its_folder_and_not_those_of_git() {
+        let room = tempfile::tempdir().expect("a place for temporary files");
+        let path = |name: &str| room.path().join(name);
+        for name in ["a.png", "b/a.png", "b/c/a.png", "b/c/d.png", "e/d.PNG"] {
+            fs::create_dir_all(path(name).parent().expect("a folder")).expect("writable");
+            fs::write(path(name), "").expect("writable");
+        }
+        fs::create_dir(path(".git")).expect("writable");
+        for name in [".gitignore", ".ignore"] {
+            fs::write(path(name), "*").expect("writable");
+        }
+        fs::write(path(".gipignore"), "d.png").expect("writable");
+        fs::write(path("b/.gipignore"), "# those of this folder\n/a.png\n!d.png")
+            .expect("writable");
+        let selection = Selection::new(&[], &[]).expect("globs");
+        let find = || find(&[room.path().into()], &selection, |_| Kind::Taken, Path::to_owned);
+        let (items, _) = find().expect("readable");
+        let found: Vec<_> = items.iter().map(|item| item.output.display().to_string()).collect();
+        assert_eq!(found, ["a.png", "b/c/a.png", "b/c/d.png"]);
+
+        fs::write(path("b/.gipignore"), "good\nbad{").expect("writable");
+        let error = find().expect_err("no glob").to_string();
+        assert!(error.contains(".gipignore") && error.contains("line 2"), "{error}");
+    }
+
+    #[test]
     fn standard_input_and_missing_files_are_refused() {
+        let selection = Selection::new(&[], &[]).expect("globs");
         for (input, is_wrong_usage) in [("-", true), ("/dev/stdin", true), ("missing", false)] {
-            let found = find(&[input.into()], Path::new("out"), |_| true, "gip");
+            let found = find(&[input.into()], &selection, |_| Kind::Taken, Path::to_owned);
             let error = found.expect_err("no such input");
             assert_eq!(error.is::<WrongUsage>(), is_wrong_usage, "{error}");
         }

@@ -1,7 +1,8 @@
 //! The manifest: a line of JSON for every file.
 
-use std::collections::{HashMap, HashSet};
-use std::fs::{File, OpenOptions};
+use core::mem;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -9,7 +10,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-use super::inputs::Item;
+use super::inputs::{Item, Rest};
 use super::task::Facts;
 use crate::files::{self, Output};
 
@@ -17,7 +18,7 @@ use crate::files::{self, Output};
 #[derive(Debug, Serialize)]
 pub(crate) struct Record {
     input: String,
-    output: String,
+    output: Option<String>,
     status: Status,
     input_bytes: Option<u64>,
     #[serde(flatten)]
@@ -31,6 +32,7 @@ enum Status {
     Written,
     Skipped,
     Failed,
+    Ignored,
 }
 
 impl Record {
@@ -46,10 +48,28 @@ impl Record {
         Self::new(item, Status::Failed, Facts::default(), Some(error))
     }
 
+    /// A picture of a format that is not read.
+    fn ignored(source: &Path) -> Self {
+        let error = format!("{}: pictures of this format are not read", source.display());
+        Self::without_output(source, Status::Ignored, error)
+    }
+
+    fn without_output(source: &Path, status: Status, error: String) -> Self {
+        let file = source.metadata().ok().filter(Metadata::is_file);
+        Self {
+            input: files::unique_text(source),
+            output: None,
+            status,
+            input_bytes: file.map(|metadata| metadata.len()),
+            facts: Facts::default(),
+            error: Some(error),
+        }
+    }
+
     fn new(item: &Item, status: Status, facts: Facts, error: Option<String>) -> Self {
         Self {
             input: files::unique_text(&item.source),
-            output: files::unique_text(&item.output),
+            output: Some(files::unique_text(&item.output)),
             status,
             input_bytes: item.source.metadata().ok().map(|metadata| metadata.len()),
             facts,
@@ -62,7 +82,7 @@ impl Record {
 #[derive(Debug, Deserialize)]
 struct Known {
     input: String,
-    output: String,
+    output: Option<String>,
     status: Status,
     bytes: Option<u64>,
 }
@@ -75,18 +95,19 @@ pub(crate) struct Manifest {
 
 impl Manifest {
     /// Begins a manifest with the lines of the files that are skipped, for each of which there are
-    /// facts. With `resume`, they and the lines of unknown files are taken from the manifest that is
+    /// facts, and of the rest of what was found. With `resume`, they and the lines of unknown files are taken from the manifest that is
     /// there, which is unchanged if this fails.
     pub(crate) fn begin(
         path: &Path,
         items: &[Item],
         skipped: &[Option<Facts>],
+        rest: &Rest,
         resume: bool,
     ) -> Result<Self> {
         let name = files::output_name(path);
         let begin = |file: &mut dyn Write, old: Option<File>| -> Result<()> {
             let mut file = BufWriter::new(file);
-            let mut lines = Lines::new(items, skipped);
+            let mut lines = Lines::new(items, skipped, rest);
             if let Some(old) = old {
                 lines.copy(BufReader::new(old), &mut file)?;
             }
@@ -133,13 +154,25 @@ struct Lines<'a> {
     numbers: HashMap<String, usize>,
     /// The results that have a line.
     added: HashSet<String>,
+    /// Lines of what has no result, by its name, and whether they are there.
+    others: BTreeMap<String, (Record, bool)>,
+    /// All that was found: what is said of it there holds no longer.
+    inputs: HashSet<String>,
 }
 
 impl<'a> Lines<'a> {
-    fn new(items: &'a [Item], skipped: &'a [Option<Facts>]) -> Self {
+    fn new(items: &'a [Item], skipped: &'a [Option<Facts>], rest: &Rest) -> Self {
         let output = |item: &Item| files::unique_text(&item.output);
         let numbers = items.iter().map(output).zip(0..).collect();
-        Self { items, skipped, numbers, added: HashSet::new() }
+        let ignored = rest.left_out.pictures.iter().map(|path| Record::ignored(path));
+        let failed = rest
+            .failed
+            .iter()
+            .map(|(path, error)| Record::without_output(path, Status::Failed, error.clone()));
+        let others = ignored.chain(failed).map(|record| (record.input.clone(), (record, false)));
+        let sources = items.iter().map(|item| &item.source);
+        let inputs = sources.chain(&rest.folders).map(|path| files::unique_text(path)).collect();
+        Self { items, skipped, numbers, added: HashSet::new(), others: others.collect(), inputs }
     }
 
     /// Copies the lines of an earlier manifest that still hold.
@@ -154,32 +187,46 @@ impl<'a> Lines<'a> {
             }
             let known: Known = serde_json::from_slice(&line)
                 .with_context(|| format!("line {number} is not one of a manifest of gip batch"))?;
-            if self.holds(&known) && self.added.insert(known.output) {
+            if self.keeps(known) {
                 file.write_all(&line)?;
             }
         }
         Ok(())
     }
 
-    /// Whether what a line says is still so. This is not known about files of other runs.
-    fn holds(&self, known: &Known) -> bool {
-        let Some(&number) = self.numbers.get(&known.output) else { return true };
-        self.skipped[number].as_ref().is_some_and(|facts| {
-            known.status != Status::Failed
-                && known.bytes == facts.bytes
-                && known.input == files::unique_text(&self.items[number].source)
-        })
+    /// Whether what a line says is still so, and new. This is not known about files of other runs.
+    fn keeps(&mut self, known: Known) -> bool {
+        if let Some((record, is_there)) = self.others.get_mut(&known.input) {
+            let statuses = [known.status, record.status];
+            return statuses == [Status::Ignored; 2] && !mem::replace(is_there, true);
+        }
+        let Some(output) = known.output else { return !self.inputs.contains(&known.input) };
+        let holds = match self.numbers.get(&output) {
+            None => true,
+            Some(&number) => self.skipped[number].as_ref().is_some_and(|facts| {
+                known.status != Status::Failed
+                    && known.bytes == facts.bytes
+                    && known.input == files::unique_text(&self.items[number].source)
+            }),
+        };
+        holds && self.added.insert(output)
     }
 
-    /// Writes a line for every skipped file that has none.
+    /// Writes a line for every skipped file and for all else that has none.
     fn add_missing(&self, file: &mut impl Write) -> Result<()> {
+        let mut add = |record: &Record| -> Result<()> {
+            serde_json::to_writer(&mut *file, record)?;
+            Ok(file.write_all(b"\n")?)
+        };
         for (item, facts) in self.items.iter().zip(self.skipped) {
             let Some(facts) = facts else { continue };
             if !self.added.contains(&files::unique_text(&item.output)) {
-                serde_json::to_writer(&mut *file, &Record::skipped(item, facts.clone()))?;
-                file.write_all(b"\n")?;
+                add(&Record::skipped(item, facts.clone()))?;
             }
         }
-        Ok(())
+        self.others
+            .values()
+            .filter(|(_, is_there)| !is_there)
+            .try_for_each(|(record, _)| add(record))
     }
 }

@@ -2,9 +2,11 @@
 
 mod budget;
 mod inputs;
+mod left_out;
 mod manifest;
 mod outputs;
 mod run;
+mod selection;
 mod stop;
 mod task;
 mod workers;

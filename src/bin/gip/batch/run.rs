@@ -16,9 +16,10 @@ use image_gip::EncodeError;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::budget::Budget;
-use super::inputs::{self, Item};
+use super::inputs::{self, Item, Rest};
 use super::manifest::{Manifest, Record};
 use super::outputs::Plan;
+use super::selection::Selection;
 use super::stop::{self, Stop};
 use super::task::{Facts, Task};
 use super::workers;
@@ -34,9 +35,10 @@ const SOME_FAILED: u8 = 3;
 pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let start = Instant::now();
     let task = Task::new(args);
-    let takes = |path: &Path| task.takes(path);
-    let found = inputs::find(&args.inputs, &args.out, takes, task.extension())?;
-    let Plan { items, folders } = Plan::new(found, args.manifest.as_deref())?;
+    let selection = Selection::new(&args.include, &args.exclude)?;
+    let output = |below: &Path| args.out.join(below).with_extension(task.extension());
+    let (items, rest) = inputs::find(&args.inputs, &selection, |path| task.kind(path), output)?;
+    let Plan { items, folders } = Plan::new(items, args.manifest.as_deref())?;
     let jobs = match args.jobs {
         Some(jobs) => usize::from(jobs),
         None => thread::available_parallelism().map_or(1, usize::from),
@@ -45,24 +47,26 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
         Some(megapixels) => (megapixels * 1e6) as u64,
         None => PIXELS_PER_JOB * jobs as u64,
     };
-    let batch = Batch { task, items, jobs, budget: Budget::new(pixels), stop: Stop::on_signals()? };
+    let (budget, stop) = (Budget::new(pixels), Stop::on_signals()?);
+    let batch = Batch { task, items, rest, jobs, budget, stop };
 
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     for folder in &folders {
         files::remove_leftovers(folder);
     }
     let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
+    batch.tell_rest();
     let mut tally = Tally::default();
     // The manifest that is there needs all that was found out about the files that are skipped.
     if !batch.stop.is_asked_for() {
-        let begin = |path| Manifest::begin(path, &batch.items, &skipped, args.resume);
+        let begin = |path| Manifest::begin(path, &batch.items, &skipped, &batch.rest, args.resume);
         let manifest = args.manifest.as_deref().map(begin).transpose()?;
         tally = batch.work(&skipped, manifest.as_ref())?;
     }
     files::print(&batch.summary(&skipped, &tally, start), args.manifest.as_deref())?;
     Ok(ExitCode::from(match batch.stop.signal() {
         Some(signal) => stop::end_by(signal),
-        None if tally.failed.into_inner() > 0 => SOME_FAILED,
+        None if tally.failed.into_inner() > 0 || !batch.rest.failed.is_empty() => SOME_FAILED,
         None => 0,
     }))
 }
@@ -71,6 +75,7 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
 struct Batch {
     task: Task,
     items: Vec<Item>,
+    rest: Rest,
     jobs: usize,
     budget: Budget,
     stop: Stop,
@@ -86,6 +91,16 @@ struct Tally {
 }
 
 impl Batch {
+    /// Tells what will not be done.
+    fn tell_rest(&self) {
+        for line in self.rest.left_out.lines() {
+            eprintln!("{line}");
+        }
+        for error in self.rest.failed.values() {
+            eprintln!("error: {error}");
+        }
+    }
+
     /// For each file whose result is whole and newer than the file, what the result tells.
     fn up_to_date(&self) -> Result<Vec<Option<Facts>>> {
         let found: Vec<OnceLock<Facts>> = self.items.iter().map(|_| OnceLock::new()).collect();
@@ -169,9 +184,10 @@ impl Batch {
 
     /// The last words.
     fn summary(&self, skipped: &[Option<Facts>], tally: &Tally, start: Instant) -> String {
-        let all = self.items.len();
+        let all = self.items.len() + self.rest.failed.len();
         let skipped = skipped.iter().flatten().count();
         let [written, failed] = [&tally.written, &tally.failed].map(|n| n.load(Ordering::Relaxed));
+        let failed = failed + self.rest.failed.len();
         let left = all - written - skipped - failed;
         let bytes = tally.bytes.load(Ordering::Relaxed);
         let seconds = start.elapsed().as_secs_f64();
@@ -267,7 +283,7 @@ mod tests {
         let room = tempfile::tempdir().expect("a place for temporary files");
         let task = Task::Decode { extension: "png".into(), bounds: None };
         let (budget, stop) = (Budget::new(1), Stop::default());
-        let batch = Batch { task, items: Vec::new(), jobs: 1, budget, stop };
+        let batch = Batch { task, items: Vec::new(), rest: Rest::default(), jobs: 1, budget, stop };
         let item = |name: &str| Item {
             source: room.path().join(name),
             output: room.path().join("out").join(name).with_extension("png"),

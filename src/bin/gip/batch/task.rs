@@ -13,7 +13,8 @@ use image_gip::{Decoder, EncodeError, Encoder, Header, RenderOptions, StreamDeco
 use serde::Serialize;
 
 use super::budget::Budget;
-use super::inputs::Item;
+use super::inputs::{Item, Kind};
+use super::left_out;
 use super::stop::Stop;
 use crate::args;
 use crate::codec::Codec;
@@ -63,15 +64,20 @@ impl Task {
         }
     }
 
-    /// Whether a file of a folder is one to work on, by its name.
-    pub(crate) fn takes(&self, path: &Path) -> bool {
-        match self {
+    /// How a file of a folder is taken, by its name.
+    pub(crate) fn kind(&self, path: &Path) -> Kind {
+        let is_taken = match self {
             Self::Encode(_) => {
                 ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled())
             }
             Self::Decode { .. } => {
                 path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gip"))
             }
+        };
+        match self {
+            _ if is_taken => Kind::Taken,
+            Self::Encode(_) if left_out::is_unread_picture(path) => Kind::Unread,
+            _ => Kind::Other,
         }
     }
 
