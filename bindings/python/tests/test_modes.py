@@ -1,6 +1,7 @@
 """Pillow's modes in `Image.save`, and 16 bits in both directions."""
 
 import io
+import struct
 import warnings
 from typing import Any
 
@@ -17,11 +18,6 @@ GRAY16 = draw(40, 30, 1)[..., 0].astype(np.uint16) * 250 + 77
 
 def profile(space: Any) -> bytes:
     return ImageCms.ImageCmsProfile(ImageCms.createProfile(space)).tobytes()
-
-
-def of_inks(data: bytes) -> bytes:
-    """The profile as one for CMYK, as far as its header goes."""
-    return data[:16] + b"CMYK" + data[20:]
 
 
 def stored(image: Image.Image, **options: Any) -> image_gip.Info:
@@ -140,16 +136,57 @@ def test_modes_that_are_refused(image: Image.Image, message: str) -> None:
         saved(image)
 
 
+def inks() -> bytes:
+    """A profile for CMYK whose colours are those of the simplest formula, in a table of corners."""
+    corners = np.array(list(np.ndindex(2, 2, 2, 2)))
+    rgb = (255 * (1 - corners[:, :3]) * (1 - corners[:, 3:])).astype(np.uint8)
+    srgb, lab = ImageCms.createProfile("sRGB"), ImageCms.createProfile("LAB")
+    colors = ImageCms.profileToProfile(Image.fromarray(rgb[None]), srgb, lab, outputMode="LAB")
+    # Pillow has a and b with sign, the profile with an offset.
+    values = (np.asarray(colors) ^ np.array([0, 128, 128], np.uint8)).tobytes()
+    linear, matrix = bytes(range(256)), struct.pack(">9i", *np.eye(3, dtype=int).ravel() << 16)
+    white = struct.pack(">3i", 63190, 65536, 54061)
+    tags = {
+        b"A2B0": b"mft1" + bytes(4) + b"\4\3\2\0" + matrix + 4 * linear + values + 3 * linear,
+        b"desc": b"desc" + bytes(4) + struct.pack(">I", 5) + b"inks" + bytes(79),
+        b"wtpt": b"XYZ " + bytes(4) + white,
+    }
+    index, data = struct.pack(">I", len(tags)), b""
+    for name, tag in tags.items():
+        index += name + struct.pack(">2I", 128 + 4 + 12 * len(tags) + len(data), len(tag))
+        data += tag + bytes(-len(tag) % 4)
+    length = struct.pack(">I", 128 + len(index) + len(data))
+    header = length + b"lcms\2\x10\0\0prtrCMYKLab " + bytes(12) + b"acsp" + bytes(28) + white
+    return header.ljust(128, b"\0") + index + data
+
+
+@pytest.mark.parametrize("explicit", [False, True])
+def test_inks_become_srgb_by_their_profile(explicit: bool) -> None:
+    image = Image.new("CMYK", (60, 20))
+    colors = {
+        (0, 0, 0, 0): (255, 255, 255),
+        (0, 255, 0, 0): (255, 0, 255),
+        (0, 0, 0, 255): (0,) * 3,
+    }
+    for index, ink in enumerate(colors):
+        image.paste(ink, (20 * index, 0, 20 * index + 20, 20))
+    image.info["icc_profile"] = None if explicit else inks()
+    file = saved(image, **({"icc_profile": inks()} if explicit else {}), quality=90).getvalue()
+    info = image_gip.info(file)
+    assert (info.mode, info.icc) == ("RGB", None)
+    found = image_gip.decode(file)[10, 10::20].astype(int)
+    assert np.abs(found - list(colors.values())).max() < 12
+
+
 def test_inks_with_a_profile_that_is_damaged() -> None:
-    image = Image.new("CMYK", (9, 9))
     with pytest.raises(OSError, match=r"mode CMYK as GIP: .+; convert it to RGB"):
-        saved(image, icc_profile=of_inks(profile("sRGB")))
+        saved(Image.new("CMYK", (9, 9)), icc_profile=inks()[:200])
 
 
 def test_profiles_of_other_colours() -> None:
     gray, color = Image.fromarray(draw(20, 10, 1)[..., 0]), Image.fromarray(draw(20, 10, 3))
     srgb = profile("sRGB")
-    for image, data in [(gray, srgb), (color, of_inks(srgb))]:
+    for image, data in [(gray, srgb), (color, inks())]:
         image.info["icc_profile"] = data
         with pytest.warns(UserWarning, match=r"does not fit mode .*, and is not stored") as raised:
             assert stored(image).icc is None

@@ -256,6 +256,19 @@ def test_gray_pictures_of_16_bits(format: str, tmp_path: Path) -> None:
     assert np.abs(error).mean() < 3
 
 
+@pytest.mark.parametrize(("policy", "tags"), [("all", 2), ("safe", 1), ("none", 0)])
+def test_metadata(policy: str, tags: int, tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x8298] = "Copyright"
+    exif[0xA431] = "serial number"
+    draw(1).save(tmp_path / "photo.jpg", exif=exif)
+    options = OPTIONS | {"metadata": policy}
+    out = run_serially([tmp_path / "photo.jpg"], tmp_path / "out", options=options)
+    ((_, file),) = containers.pictures(out / "shard-000000.parquet")
+    with Image.open(io.BytesIO(file)) as image:
+        assert len(image.getexif()) == tags
+
+
 def test_folders(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"
     folder.begin(out, {"effort": 1, "seed": 0})

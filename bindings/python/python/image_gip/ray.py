@@ -41,7 +41,7 @@ import image_gip
 from image_gip._dataset import folder, shards
 from image_gip._dataset.shards import Pictures, Shard
 from image_gip._dataset.work import SUFFIXES, Container, Job, Operation
-from image_gip._types import Tune
+from image_gip._types import MetadataPolicy, Tune
 
 __all__ = ["Summary", "decode_dataset", "encode_dataset", "thumbnail_dataset"]
 
@@ -74,11 +74,12 @@ def encode_dataset(
     effort: int = 4,
     tune: Tune = "visual",
     seed: int = 0,
+    metadata: MetadataPolicy = "all",
 ) -> Summary:
     """Encodes pictures of the formats that Pillow reads to ``.gip``.
 
     Gray pictures of 16 bits keep them; colours have 8, as Pillow has no more. ICC
-    profile, Exif and XMP are kept.
+    profile, Exif and XMP are kept, or what ``metadata`` says.
 
     Args:
         pictures: A list of paths, or a manifest: see the module.
@@ -94,6 +95,7 @@ def encode_dataset(
         effort: As in :func:`image_gip.encode`.
         tune: As in :func:`image_gip.encode`.
         seed: As in :func:`image_gip.encode`.
+        metadata: As in :func:`image_gip.encode`.
 
     Raises:
         ValueError: An argument, a line of the manifest or a key is wrong, or the folder holds
@@ -103,7 +105,7 @@ def encode_dataset(
     """
     targets = {"bpp": bpp, "bytes": bytes, "quality": quality, "psnr": psnr, "gaussians": gaussians}
     options: dict[str, Any] = {name: v for name, v in targets.items() if v is not None}
-    options |= {"effort": effort, "tune": tune, "seed": seed}
+    options |= {"effort": effort, "tune": tune, "seed": seed, "metadata": metadata}
     _check_encoder_options(options)
     return _run("encode", options, pictures, out_uri, container, shard_size)
 
@@ -144,6 +146,8 @@ def thumbnail_dataset(
     format: PictureFormat = "png",
 ) -> Summary:
     """Decodes ``.gip`` pictures to thumbnails, from as much of each file as they need.
+
+    Of the metadata, they have the ICC profile alone.
 
     Args:
         pictures: As in :func:`decode_dataset`.
