@@ -14,6 +14,7 @@ use pyo3::types::PyBytes;
 
 use crate::array::Picture;
 use crate::errors::{encode_error, warn};
+use crate::objects::Limits;
 use crate::{metadata, threads};
 
 /// How long the calling thread waits before it looks for signals, such as that of Ctrl-C.
@@ -59,6 +60,8 @@ const NEWS: f64 = 0.002;
 ///         copyright, artist, description and dates, and drops position, maker notes, thumbnails,
 ///         serial numbers, names of owners, comments and all else; or "none". There is a
 ///         MetadataWarning for a profile other than that of sRGB, and for damaged data.
+///     limits: Those of the decoder that is to read the file: what it would refuse is not encoded.
+///         Default: Limits(), with which `decode` reads every file that is encoded.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
 ///         or raises an exception, the encoding is cancelled. None goes on.
 ///
@@ -69,9 +72,11 @@ const NEWS: f64 = 0.002;
 ///     TypeError: The array is no array of a type above, or more than one target is given.
 ///     ValueError: The array has another shape, strides, or floats that are out of range or NaN; an
 ///         option is out of range.
+///     LimitError: A decoder with these limits would refuse the file: for the size of the picture, its
+///         metadata or `gaussians`, before any work is done; for the work of decoding, at the end.
 ///     CancelledError: `progress` returned False.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, icc=None, exif=None, xmp=None, texts=None, metadata="all", progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -91,6 +96,7 @@ pub(crate) fn encode<'py>(
     xmp: Option<&Bound<'py, PyAny>>,
     texts: Option<&Bound<'py, PyAny>>,
     metadata: &str,
+    limits: Option<Limits>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let threads = threads::checked(threads)?;
@@ -105,6 +111,7 @@ pub(crate) fn encode<'py>(
         .with_effort(effort)
         .with_precision(self::precision(precision)?)
         .with_seed(seed)
+        .with_limits(Limits::of(limits))
         .with_metadata(stored);
     let picture = Picture::new(array)?;
     let source = picture.source()?;

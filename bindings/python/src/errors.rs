@@ -65,6 +65,9 @@ fn limit_error<'py>(
 pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
     match error {
         EncodeError::Source(error) => PyValueError::new_err(error.to_string()),
+        EncodeError::Limit { kind, wanted, allowed } => {
+            raised(limit_error(py, &error.to_string(), *kind, *wanted, *allowed))
+        }
         EncodeError::Option(OptionError::Threads(_)) => PyRuntimeError::new_err(error.to_string()),
         EncodeError::Option(error) => PyValueError::new_err(error.to_string()),
         _ => raised(exception(py, "CancelledError", error.to_string())),

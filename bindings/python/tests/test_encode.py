@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import image_gip
-from image_gip import Progress
+from image_gip import LimitError, Limits, Progress
 
 #: What a test waits for before it fails, in seconds.
 PATIENCE = 60
@@ -147,6 +147,30 @@ def test_targets(photo: Picture) -> None:
     file = image_gip.encode(photo, psnr=40, effort=1)
     assert 40 <= psnr(image_gip.decode(file), photo) <= 40.05
     assert image_gip.info(image_gip.encode(photo, gaussians=30, effort=1)).gaussians <= 30
+
+
+def test_what_a_decoder_would_refuse_is_not_encoded(photo: Picture) -> None:
+    called: list[Progress] = []
+    tall = np.zeros((65537, 2), np.uint8)
+    refused: list[tuple[dict[str, Any], Picture, str, int]] = [
+        ({}, tall, "height", 65537),
+        ({"limits": Limits(max_pixels=6000)}, photo, "pixels", 96 * 64),
+        ({"limits": Limits(max_gaussians=9), "gaussians": 10}, photo, "Gaussians", 10),
+        ({"limits": Limits(max_memory=1000), "xmp": bytes(2000)}, photo, "bytes of memory", 2000),
+    ]
+    for keywords, picture, limit, wanted in refused:
+        with pytest.raises(LimitError, match=r"limits=image_gip.Limits\(max_\w+=...\)") as raised:
+            image_gip.encode(picture, effort=1, **keywords, progress=called.append)
+        assert raised.value.limit == limit
+        assert raised.value.wanted >= wanted > raised.value.allowed
+    # It was known before the work.
+    assert not called
+    with pytest.raises(LimitError, match=r"max_work=...\)"):
+        image_gip.encode(photo, effort=1, limits=Limits(max_work=10))
+    file = image_gip.encode(tall, effort=1, limits=Limits(max_height=1 << 20))
+    with pytest.raises(LimitError, match="height"):
+        image_gip.decode(file)
+    assert image_gip.decode(file, limits=Limits(max_height=1 << 20)).shape == tall.shape
 
 
 def test_a_target_out_of_reach(photo: Picture) -> None:

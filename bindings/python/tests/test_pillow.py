@@ -166,6 +166,17 @@ def test_pillow_has_a_limit_of_its_own(
     assert outcomes[0] == outcomes[1]
 
 
+def test_what_decode_would_refuse_is_not_saved() -> None:
+    image = Image.new("L", (2, 65537))
+    with pytest.raises(OSError, match=r"height: 65537 .* limits=image_gip.Limits\(max_height="):
+        saved(image)
+    file = saved(image, limits=image_gip.Limits(max_height=65537))
+    # Pillow has a limit for the number of pixels only.
+    with Image.open(file) as opened:
+        opened.load()
+        assert opened.size == (2, 65537)
+
+
 def test_a_cancelled_save_leaves_no_file(tmp_path: Path, photo: Picture) -> None:
     path = tmp_path / "picture.gip"
     with pytest.raises(OSError, match="cancelled"):

@@ -194,6 +194,9 @@ def test_1000_decodes_leak_nothing(file: bytes) -> None:
     assert_no_leak(decode, 1000)
 
 
+CUT_OUT = (VECTORS / "entropy-rgba8.gip").read_bytes()
+
+
 def thumbnail(file: bytes) -> None:
     with Image.open(io.BytesIO(file)) as opened:
         opened.thumbnail((20, 20))
@@ -206,11 +209,17 @@ def thumbnail(file: bytes) -> None:
         image_gip.gaussians,
         lambda file: image_gip.StreamDecoder().feed(file).image(threads=2),
         lambda file: image_gip.encode(
-            np.zeros((8, 8, 3), np.uint8), effort=1, icc=file, progress=lambda _: None
+            np.zeros((8, 8, 3), np.uint8),
+            effort=1,
+            icc=file,
+            texts={"Title": "a"},
+            metadata="safe",
+            progress=lambda _: None,
         ),
+        lambda file: image_gip.decode(CUT_OUT, background=(1, 2, 3)),
         thumbnail,
     ],
-    ids=["info", "gaussians", "stream", "encode", "thumbnail"],
+    ids=["info", "gaussians", "stream", "encode", "background", "thumbnail"],
 )
 def test_nothing_else_leaks(work: Callable[[bytes], object], file: bytes) -> None:
     assert_no_leak(lambda: work(file), 300)

@@ -28,7 +28,7 @@ class UnexpectedEndError(GipError):
 
 
 class LimitError(GipError):
-    """The file or the request requires more than one of the :class:`Limits` allows."""
+    """The file, the request or the picture requires more than one of the :class:`Limits` allows."""
 
     #: What is limited: ``"width"``, ``"height"``, ``"pixels"``, ``"Gaussians"``,
     #: ``"bytes of memory"`` or ``"kernel evaluations"``.

@@ -60,6 +60,7 @@ def encode(
     xmp: _Buffer | None = None,
     texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
     metadata: MetadataPolicy = "all",
+    limits: Limits | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
 def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
