@@ -108,7 +108,7 @@ impl Orientation {
         if samples.is_empty() {
             return Vec::new();
         }
-        assert_eq!(samples.len() % (width * channels), 0, "no whole number of rows");
+        assert!(samples.len().is_multiple_of(width * channels), "no whole number of rows");
         let height = samples.len() / (width * channels);
         let (columns, rows) = if self.exchanges_axes() { (height, width) } else { (width, height) };
         let mut turned = Vec::with_capacity(samples.len());
@@ -117,8 +117,7 @@ impl Orientation {
                 let (x, y) = if self.exchanges_axes() { (row, column) } else { (column, row) };
                 let x = if self.mirrors_columns() { width - 1 - x } else { x };
                 let y = if self.mirrors_rows() { height - 1 - y } else { y };
-                let pixel = (y * width + x) * channels;
-                turned.extend_from_slice(&samples[pixel..pixel + channels]);
+                turned.extend_from_slice(&samples[(y * width + x) * channels..][..channels]);
             }
         }
         turned

@@ -1,4 +1,5 @@
-//! Renders a `.gip` file on the GPU and saves it as PNG, at any size and in any part.
+//! Renders a `.gip` file on the GPU and saves it as PNG, at any size and in any part. The picture is
+//! upright, as its Exif says, and so are the size and the part.
 //!
 //!     cargo run --release --example gip_to_png -- photo.gip photo.png
 //!     cargo run --release --example gip_to_png -- photo.gip large.png 3072x2048
@@ -18,12 +19,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let [input, output, rest @ ..] = arguments.as_slice() else {
         return Err("usage: gip_to_png INPUT.gip OUTPUT.png [SIZE [REGION_SIZE X,Y]]".into());
     };
-    let view = match rest {
-        [] => View::new(),
-        [size] => sized(size)?,
+    let (size, region) = match rest {
+        [] => (None, None),
+        [size] => (Some(pair(size, 'x')?), None),
         [size, part, at] => {
             let ((width, height), (x, y)) = (pair(part, 'x')?, pair(at, ',')?);
-            sized(size)?.with_region(Region { x, y, width, height })
+            (Some(pair(size, 'x')?), Some(Region { x, y, width, height }))
         }
         _ => return Err("a region is given by its size and its corner".into()),
     };
@@ -31,20 +32,27 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut decoder = StreamDecoder::new();
     decoder.feed(&fs::read(input)?)?;
     decoder.finish()?;
+    let orientation = decoder.metadata().orientation();
     let picture = decoder.picture().ok_or("there is no header")?;
+    // The renderer knows the picture as stored.
+    let mut view = View::new();
+    if let Some((width, height)) = size {
+        let (stored_width, stored_height) = orientation.turned_size(width, height);
+        view = view.with_size(stored_width, stored_height);
+        if let Some(region) = region {
+            view = view.with_region(orientation.stored_region(region, width, height)?);
+        }
+    }
 
     let (renderer, name) = adapter::renderer()?;
     println!("on {name}");
     let texture = renderer.render(&picture, &view)?;
     let samples = renderer.read(&texture)?;
-    fs::write(output, png(texture.width(), texture.height(), &samples)?)?;
-    println!("{output}: {} x {} pixels", texture.width(), texture.height());
+    let samples = orientation.apply(&samples, texture.width() as usize, 4);
+    let (width, height) = orientation.turned_size(texture.width(), texture.height());
+    fs::write(output, png(width, height, &samples)?)?;
+    println!("{output}: {width} x {height} pixels");
     Ok(())
-}
-
-fn sized(size: &str) -> Result<View, Box<dyn Error>> {
-    let (width, height) = pair(size, 'x')?;
-    Ok(View::new().with_size(width, height))
 }
 
 /// Two numbers with a separator.

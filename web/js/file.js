@@ -23,12 +23,12 @@ export async function fromUrl(address, signal) {
 }
 
 /**
- * Decodes a file as it arrives. `onProgress` gets { size, header, gaussians, complete } after each
+ * Decodes a file as it arrives. `onProgress` gets { size, picture, gaussians, complete } after each
  * piece, where `size` is that of the file so far; so does the caller in the end, with the `error` that
  * a damaged file ends with.
  */
 export async function decode({ stream }, pool, { signal, onProgress }) {
-  let progress = { size: 0, header: null, gaussians: 0, complete: false, error: null };
+  let progress = { size: 0, picture: null, gaussians: 0, complete: false, error: null };
   const reader = stream.getReader();
   const stop = () => void reader.cancel().catch(() => {});
   signal.addEventListener('abort', stop, { once: true });
@@ -39,9 +39,9 @@ export async function decode({ stream }, pool, { signal, onProgress }) {
       signal.throwIfAborted();
       if (done) break;
       progress.size += piece.length;
-      const { header, gaussians, complete } = await pool.tell('feed', piece);
+      const arrived = await pool.tell('feed', piece);
       signal.throwIfAborted();
-      progress = { ...progress, header, gaussians, complete };
+      progress = { ...progress, ...arrived };
       onProgress(progress);
     }
     await pool.tell('finish');

@@ -50,7 +50,7 @@ export class GpuPainter {
     this.#place = device.createBuffer({ size: 16, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   }
 
-  /** Takes a picture: its header, and nine numbers for each Gaussian. Returns whether it can. */
+  /** Takes a picture: its header and nine numbers for each Gaussian, both turned. Returns whether it can. */
   setPicture(header, numbers) {
     this.#free();
     return this.#renderer.setPicture(header, numbers);

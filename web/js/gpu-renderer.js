@@ -55,7 +55,7 @@ export class GpuRenderer {
     this.#view = device.createBuffer({ size: 64, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   }
 
-  /** Takes a picture: its header, and nine numbers for each Gaussian. Returns whether it can. */
+  /** Takes a picture: its header and nine numbers for each Gaussian, both turned. Returns whether it can. */
   setPicture(header, numbers) {
     this.clear();
     const count = Math.max(1, numbers.length / 9);

@@ -83,48 +83,48 @@ function close() {
 }
 
 /** Shows what has arrived of a file. */
-function show({ name }, { header, gaussians }) {
-  if (!header) return;
+function show({ name }, { picture, gaussians }) {
+  if (!picture) return;
   if (!stage.hasPicture) {
     document.body.classList.remove('empty');
-    stage.setPicture(header);
+    stage.setPicture(picture);
     document.title = `${name} - gip viewer`;
     find('#name').textContent = name;
-    stageElement.setAttribute('aria-label', `${name}, ${header.width} by ${header.height} pixels`);
+    stageElement.setAttribute('aria-label', `${name}, ${picture.width} by ${picture.height} pixels`);
     stageElement.focus({ preventScroll: true });
   }
   stage.showGaussians(gaussians);
 }
 
 /** What is shown of a damaged file. */
-function keptOf(header, gaussians) {
+function keptOf(picture, gaussians) {
   if (gaussians === 0) return 'Only the base colour can be shown.';
-  return `What is shown came before that: ${integer(gaussians)} of ${integer(header.gaussians)} Gaussians.`;
+  return `What is shown came before that: ${integer(gaussians)} of ${integer(picture.gaussians)} Gaussians.`;
 }
 
 /** What needs the whole file, or what there is of it. */
-async function finish({ name }, { size, header, gaussians, error }, signal) {
+async function finish({ name }, { size, picture, gaussians, error }, signal) {
   if (error) {
-    tell(`${name}: ${error.message}.${header ? ` ${keptOf(header, gaussians)}` : ''}`);
+    tell(`${name}: ${error.message}.${picture ? ` ${keptOf(picture, gaussians)}` : ''}`);
   }
-  if (!header) return;
+  if (!picture) return;
   const about = await pool.ask('about');
   signal.throwIfAborted();
-  showPanel(panel, { name, size, header, about, arrived: gaussians });
+  showPanel(panel, { name, size, picture, about, arrived: gaussians });
   scrubber.setFile({ size, gaussians, layers: about.statistics.layers });
   stage.draw();
   announce(`${name} is open.`);
   // The shader knows nothing of colour profiles.
-  if (!about.metadata.iccProfile) await useGpu(header, signal);
+  if (!about.metadata.iccProfile) await useGpu(picture, signal);
 }
 
 /** Paints with the GPU, if there is one that can. */
-async function useGpu(header, signal) {
+async function useGpu(picture, signal) {
   const painter = await gpu;
   if (!painter) return;
   const numbers = await pool.ask('gaussians');
   signal.throwIfAborted();
-  stage.setGpu(painter.setPicture(header, numbers) ? painter : null);
+  stage.setGpu(painter.setPicture(picture, numbers) ? painter : null);
 }
 
 /** Files that a person gave: a .gip to open, and a picture of another kind to compare with. */

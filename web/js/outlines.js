@@ -15,10 +15,10 @@ const COLORS = { more: '255, 186, 73', less: '73, 198, 255' };
  * Draws the outlines at one standard deviation of those Gaussians that show in a region of the
  * output with the size `level`.
  */
-export function drawOutlines(context, numbers, { level, region, ratio, header }) {
-  const sx = level.width / header.width;
-  const sy = level.height / header.height;
-  const channels = Math.min(3, header.channels < 3 ? 1 : 3);
+export function drawOutlines(context, numbers, { level, region, ratio, picture }) {
+  const sx = level.width / picture.width;
+  const sy = level.height / picture.height;
+  const channels = Math.min(3, picture.channels < 3 ? 1 : 3);
   const paths = {};
   for (let at = 0; at < numbers.length; at += NUMBERS) {
     const l11 = numbers[at + 2] * sx;

@@ -22,6 +22,17 @@ const KERNELS = {
   quartic: 'quartic, (1 - q / 4)²',
 };
 
+/** What Exif has turned, by its value. */
+const ORIENTATIONS = {
+  2: 'mirrored',
+  3: 'turned by 180°',
+  4: 'mirrored, then turned by 180°',
+  5: 'mirrored, then turned by 270°',
+  6: 'turned by 90°',
+  7: 'mirrored, then turned by 90°',
+  8: 'turned by 270°',
+};
+
 /** A list of names and values. Values that are `null` are left out. */
 function facts(rows) {
   const list = element('dl', { className: 'facts' });
@@ -53,21 +64,22 @@ function baseColor({ baseColor: values, channels }) {
   return element('span', {}, patch, numbers);
 }
 
-function picture({ name, size, header }) {
-  const pixels = header.width * header.height;
+function ofPicture({ name, size, picture }) {
+  const pixels = picture.width * picture.height;
   return facts([
     ['Name', name],
     ['File', bytes(size)],
-    ['Picture', `${integer(header.width)} × ${integer(header.height)} pixels`],
+    ['Picture', `${integer(picture.width)} × ${integer(picture.height)} pixels`],
+    ['Orientation', ORIENTATIONS[picture.orientation] ?? null],
     ['Rate', `${decimal((size * 8) / pixels, 3)} bits per pixel`],
-    ['Colour', `${COLORS[header.color] ?? header.color}, ${header.depth} bits`],
-    ['Gaussians', `${integer(header.gaussians)} in ${count(header.layers, 'layer')}`],
-    ['Coding', header.coding],
-    ['Kernel', KERNELS[header.kernel] ?? header.kernel],
-    ['Cut-off', `q = ${decimal(header.cutoff, header.cutoff % 1 ? 2 : 0)}`],
-    ['Shape', header.parameterization],
-    ['Base colour', baseColor(header)],
-    ['Version', String(header.version)],
+    ['Colour', `${COLORS[picture.color] ?? picture.color}, ${picture.depth} bits`],
+    ['Gaussians', `${integer(picture.gaussians)} in ${count(picture.layers, 'layer')}`],
+    ['Coding', picture.coding],
+    ['Kernel', KERNELS[picture.kernel] ?? picture.kernel],
+    ['Cut-off', `q = ${decimal(picture.cutoff, picture.cutoff % 1 ? 2 : 0)}`],
+    ['Shape', picture.parameterization],
+    ['Base colour', baseColor(picture)],
+    ['Version', String(picture.version)],
   ]);
 }
 
@@ -112,7 +124,7 @@ function metadata({ iccProfile, exif, xmp, texts }) {
 }
 
 /** Fills the panel. `about` has `metadata` and `statistics`; `arrived` counts Gaussians. */
-export function showPanel(panel, { name, size, header, about, arrived }) {
+export function showPanel(panel, { name, size, picture, about, arrived }) {
   const { statistics } = about;
   const chunks = statistics.chunks.map(({ type, count: times, bytes: length }) => ({
     name: times > 1 ? `${type} × ${integer(times)}` : type,
@@ -122,7 +134,7 @@ export function showPanel(panel, { name, size, header, about, arrived }) {
   }));
   const parts = [
     element('h2', {}, 'Details'),
-    picture({ name, size, header }),
+    ofPicture({ name, size, picture }),
     attributes(statistics, arrived),
     bars('Bytes by chunk', chunks),
     steps(statistics),

@@ -22,8 +22,8 @@ export class Stage {
   #outlineCanvas;
   #comparison;
   #checkers;
-  /** That of the file; `null` without a picture. */
-  #header = null;
+  /** The header of the file with the size of the upright picture; `null` without a picture. */
+  #picture = null;
   /** How many Gaussians are shown. */
   #gaussians = 0;
   #outlines = false;
@@ -62,7 +62,7 @@ export class Stage {
 
   /** Starts with another file: nothing is shown until `setPicture`. */
   reset() {
-    this.#header = null;
+    this.#picture = null;
     this.#gaussians = 0;
     this.#gpu = null;
     this.#tiles.reset();
@@ -70,15 +70,15 @@ export class Stage {
     this.draw();
   }
 
-  setPicture(header) {
-    this.#header = header;
-    this.#checkers.hidden = header.channels % 2 === 1;
-    this.view.setPicture(header);
+  setPicture(picture) {
+    this.#picture = picture;
+    this.#checkers.hidden = picture.channels % 2 === 1;
+    this.view.setPicture(picture);
     this.draw();
   }
 
   get hasPicture() {
-    return this.#header !== null;
+    return this.#picture !== null;
   }
 
   /** Shows the first Gaussians of the file. */
@@ -113,7 +113,7 @@ export class Stage {
   #frame(now) {
     this.#isAsked = false;
     this.motion.step(now);
-    if (this.#header) this.#paint();
+    if (this.#picture) this.#paint();
     this.onFrame(this.view);
     if (this.motion.isMoving) this.draw();
     this.#element.setAttribute('aria-busy', !this.#isComplete);
@@ -123,7 +123,7 @@ export class Stage {
     const { frame } = this.view;
     const scene = {
       frame,
-      picture: this.#header,
+      picture: this.#picture,
       gaussians: this.#gaussians,
       ratio: this.view.window.ratio,
       kinds: this.#outlines ? ['outlines'] : [],

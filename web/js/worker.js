@@ -11,6 +11,16 @@ let decoder = null;
 /** The Gaussians for the outlines, when they were last needed. */
 let gaussians = null;
 
+/** What has arrived. `picture` is the header with the size of the upright picture, once that is known. */
+function progress() {
+  const { header, orientation, gaussians, complete } = decoder.progress;
+  const { naturalWidth: width, naturalHeight: height } = decoder;
+  const picture = orientation && { ...header, orientation, width, height };
+  return { picture, gaussians, complete };
+}
+
+const uprightGaussians = () => decoder.gaussians({ orientation: 'from-image' });
+
 const render = {
   async picture({ level, region, gaussians }) {
     const options = { ...level, region, gaussians };
@@ -22,12 +32,11 @@ const render = {
     return createImageBitmap(new ImageData(data, width, height));
   },
   outlines({ level, region, gaussians: count, ratio }) {
-    if (gaussians?.arrived !== decoder.progress.gaussians) {
-      gaussians = { arrived: decoder.progress.gaussians, numbers: decoder.gaussians() };
-    }
+    const { picture, gaussians: arrived } = progress();
+    if (gaussians?.arrived !== arrived) gaussians = { arrived, numbers: uprightGaussians() };
     const canvas = new OffscreenCanvas(region.width, region.height);
     const numbers = gaussians.numbers.subarray(0, 9 * count);
-    drawOutlines(canvas.getContext('2d'), numbers, { level, region, ratio, header: decoder.header });
+    drawOutlines(canvas.getContext('2d'), numbers, { level, region, ratio, picture });
     return canvas.transferToImageBitmap();
   },
 };
@@ -38,18 +47,23 @@ const methods = {
     decoder = new Decoder({ statistics: true, limits: { work: MOST_WORK } });
     gaussians = null;
   },
-  feed: (bytes) => decoder.feed(bytes),
+  feed(bytes) {
+    decoder.feed(bytes);
+    return progress();
+  },
   finish: () => decoder.finish(),
   // What a damaged file has kept, too.
-  progress: () => decoder.progress,
+  progress,
   about: () => ({ metadata: decoder.metadata, statistics: decoder.statistics() }),
   gaussiansIn: (bytes) => decoder.gaussiansIn(bytes),
-  gaussians: () => decoder.gaussians(),
+  gaussians: uprightGaussians,
   render: (job) => render[job.kind](job),
 };
 
 /** What the page is told: the decoder's own errors have a kind, and are written for people. */
-function describe({ kind, message }) {
+function describe({ kind, message, limit, wanted, allowed }) {
+  // The decoder's message is for programs, which can raise its limits.
+  if (kind === 'limit') return `limit exceeded: ${limit}: ${wanted} required, ${allowed} allowed`;
   return kind || !decoder ? message : `the decoder failed: ${message}`;
 }
 

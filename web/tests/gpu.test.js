@@ -3,6 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { exif, makePicture } from '../../bindings/wasm/tests/picture.js';
 import { missing, openViewer, sampleBytes, settled, start, vectorBytes } from './viewer.js';
 
 const FLAGS = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader', '--disable-gpu-watchdog'];
@@ -19,6 +20,10 @@ const SAMPLE_FRAMES = [
   { scale: 9, left: -2700, top: -2500, first: 0.2 },
 ];
 const SMALL_FRAMES = [{ scale: 5, left: 30, top: 20, first: 1 }];
+const TURNED_FRAMES = [
+  { scale: 0.5, left: 30, top: 20, first: 1 },
+  { scale: 3, left: -20, top: -30, first: 1 },
+];
 
 /**
  * In the page: paints frames of files to a texture. For each there is the largest difference from what
@@ -79,10 +84,12 @@ async function paint({ files, size }) {
     for (const { name, bytes, frames } of files) {
       const decoder = new Decoder();
       decoder.feed(Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0)));
-      const { header, progress } = decoder;
-      if (!painter.setPicture(header, decoder.gaussians())) throw new Error(`${name} is refused`);
+      const { header, progress, naturalWidth, naturalHeight } = decoder;
+      const picture = { ...header, width: naturalWidth, height: naturalHeight };
+      const numbers = decoder.gaussians({ orientation: 'from-image' });
+      if (!painter.setPicture(picture, numbers)) throw new Error(`${name} is refused`);
       for (const { scale, left, top, first } of frames) {
-        const level = { width: Math.ceil(header.width * scale), height: Math.ceil(header.height * scale) };
+        const level = { width: Math.ceil(picture.width * scale), height: Math.ceil(picture.height * scale) };
         const frame = { window: size, level, left, top };
         if (!painter.canPaint({ frame })) throw new Error(`${name} is too much work`);
         const gaussians = Math.ceil(progress.gaussians * first);
@@ -107,6 +114,11 @@ test('WebGPU paints what the decoder renders', { skip: missing, timeout: 180_000
     { name: 'sample', bytes: await encoded(sampleBytes()), frames: SAMPLE_FRAMES },
     { name: 'alpha', bytes: await encoded(vectorBytes('rgba8.gip')), frames: SMALL_FRAMES },
     { name: 'gray', bytes: await encoded(vectorBytes('gray8.gip')), frames: SMALL_FRAMES },
+    ...[2, 4, 6, 7].map((orientation) => ({
+      name: `orientation ${orientation}`,
+      bytes: makePicture({ layers: [200], chunks: [['eXIf', exif(orientation)]] }).toString('base64'),
+      frames: TURNED_FRAMES,
+    })),
   ];
   let results = null;
   for (let attempt = 0; attempt < ATTEMPTS && !results; attempt += 1) {
@@ -122,7 +134,7 @@ test('WebGPU paints what the decoder renders', { skip: missing, timeout: 180_000
     context.skip('Chromium has no WebGPU here');
     return;
   }
-  assert.equal(results.length, 4);
+  assert.equal(results.length, 12);
   for (const { name, scale, worst, beside, samples } of results) {
     assert.ok(worst <= 2, `${name}, ${scale}: ${worst} steps`);
     assert.equal(beside, 0, `${name}, ${scale}`);

@@ -1,5 +1,6 @@
 // What the tests of the viewer share: a browser on the built page, and pictures.
 
+import assert from 'node:assert/strict';
 import { mkdtemp, readFile, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -130,4 +131,10 @@ export function difference(page, shot, view, bytes, { gaussians, from = 0, order
     },
     { shot, frame: view.frame, file, gaussians, from, order },
   );
+}
+
+/** The page shows what the decoder renders for a view; `options` are those of `difference`. */
+export async function assertShows(page, view, bytes, options) {
+  const { mean, far } = await difference(page, await screenshot(page), view, bytes, options);
+  assert.ok(mean < 0.5 && far < 0.01, `mean ${mean}, far ${far}`);
 }

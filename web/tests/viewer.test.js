@@ -5,8 +5,8 @@ import { after, before, test } from 'node:test';
 
 import { makePicture } from '../../bindings/wasm/tests/picture.js';
 import { swappedProfile } from '../../bindings/wasm/tests/profile.js';
-import { difference, drop, missing, openViewer, sampleBytes, screenshot } from './viewer.js';
-import { settled, start, vectorBytes, viewOf } from './viewer.js';
+import { assertShows, difference, drop, missing, openViewer, sampleBytes } from './viewer.js';
+import { screenshot, settled, start, vectorBytes, viewOf } from './viewer.js';
 
 const SAMPLE = { width: 576, height: 576 };
 
@@ -38,11 +38,6 @@ function onPage(name, { path = '/?src=sample/sumac.gip', ...options }, run) {
       await close();
     }
   });
-}
-
-async function assertShows(page, view, bytes, options) {
-  const { mean, far } = await difference(page, await screenshot(page), view, bytes, options);
-  assert.ok(mean < 0.5 && far < 0.01, `mean ${mean}, far ${far}`);
 }
 
 const textOf = (page, selector) => page.locator(selector).textContent();

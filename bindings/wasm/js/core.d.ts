@@ -1,7 +1,7 @@
 /** The decoder on the calling thread: nothing is asynchronous but loading it. For workers. */
 
-import type { Gaussian9, Limits, Progress, RenderOptions, SampleOptions, Samples } from './types.js';
-import type { Header, Metadata, Statistics } from './types.js';
+import type { Gaussian9, GaussianOptions, Header, Limits, Metadata, Orientation } from './types.js';
+import type { Progress, RenderOptions, SampleOptions, Samples, Statistics } from './types.js';
 
 export type * from './types.js';
 
@@ -30,6 +30,11 @@ export class Decoder {
 
   /** The header; `null` until it has arrived. */
   readonly header: Header | null;
+  /** How the picture is turned; `null` until it is known, at the latest with the first Gaussian. */
+  readonly orientation: Orientation | null;
+  /** The size of the upright picture in pixels; 0 until the orientation is known. */
+  readonly naturalWidth: number;
+  readonly naturalHeight: number;
   /** The metadata that has arrived. It is complete when the first Gaussian has arrived. */
   readonly metadata: Metadata;
   readonly progress: Progress;
@@ -38,16 +43,16 @@ export class Decoder {
   gaussiansFor(width: number, height: number): number;
   /** How many Gaussians a decoder has after the first `bytes` of the file. */
   gaussiansIn(bytes: number): number;
-  /** The Gaussians that have arrived, or some of them, in the order of the file. */
-  gaussians(range?: { start?: number; end?: number }): Gaussian9;
+  /** The Gaussians that have arrived, or some of them, by default as stored. */
+  gaussians(options?: GaussianOptions): Gaussian9;
   /** Chunks, layers, bits per attribute. */
   statistics(): Statistics;
 
-  /** Renders 8-bit RGBA samples with straight alpha. */
+  /** Renders 8-bit RGBA samples with straight alpha, by default upright. */
   render(options?: RenderOptions): { width: number; height: number; data: Uint8ClampedArray };
-  /** Renders the samples as the format specifies them, bit for bit. */
+  /** Renders the samples as the format specifies them, bit for bit, by default as stored. */
   samples(options?: SampleOptions): Samples;
-  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile, by default upright. */
   png(options?: SampleOptions): Promise<Uint8Array>;
 
   /** Frees the memory. Nothing else may be called after this. */

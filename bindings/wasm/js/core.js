@@ -2,6 +2,7 @@
 
 import init, { Decoder as Native } from './image_gip.js';
 import { defaultLimits } from './limits.js';
+import { naturalSize, turnedSize, turnGaussians } from './orientation.js';
 
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
@@ -34,15 +35,23 @@ function integer(value, name, least, most = all) {
   return value;
 }
 
+/** Whether a picture is turned as its Exif says. */
+function isTurned(orientation) {
+  if (orientation !== 'from-image' && orientation !== 'none') {
+    throw new RangeError(`orientation is ${orientation}; it must be from-image or none`);
+  }
+  return orientation === 'from-image';
+}
+
 /** The size of the whole output, with the picture's proportions where one side is missing. */
-function outputSize(header, { width, height } = {}) {
+function outputSize(picture, { width, height }) {
   const other = (side, from, to) => Math.min(mostSide, Math.max(1, Math.round((side * to) / from)));
-  if (width === undefined && height === undefined) return [header.width, header.height];
+  if (width === undefined && height === undefined) return [picture.width, picture.height];
   if (width !== undefined) integer(width, 'width', 1, mostSide);
   if (height !== undefined) integer(height, 'height', 1, mostSide);
   return [
-    width ?? other(height, header.height, header.width),
-    height ?? other(width, header.width, header.height),
+    width ?? other(height, picture.height, picture.width),
+    height ?? other(width, picture.width, picture.height),
   ];
 }
 
@@ -50,10 +59,11 @@ function outputSize(header, { width, height } = {}) {
 export class Decoder {
   #native;
   #header = null;
+  #orientation = null;
 
   constructor({ limits = {}, statistics = false } = {}) {
-    const { pixels, outputPixels, gaussians, memory, work } = { ...defaultLimits, ...limits };
-    this.#native = new Native(statistics, pixels, outputPixels, gaussians, memory, work);
+    const numbers = Object.entries(defaultLimits).map(([name, value]) => limits[name] ?? value);
+    this.#native = new Native(statistics, ...numbers);
   }
 
   /** Takes the next bytes of the file. Bytes after its end are ignored. */
@@ -73,14 +83,33 @@ export class Decoder {
     return this.#header;
   }
 
+  /** The value in the Exif, 1 to 8; `null` until it is known. */
+  get orientation() {
+    this.#orientation ??= this.#native.orientation() ?? null;
+    return this.#orientation;
+  }
+
+  get naturalWidth() {
+    return this.#natural.width;
+  }
+
+  get naturalHeight() {
+    return this.#natural.height;
+  }
+
+  get #natural() {
+    return naturalSize(this.header, this.orientation);
+  }
+
   get metadata() {
     return this.#native.metadata();
   }
 
-  /** Header, number of Gaussians that have arrived, and whether the file is complete. */
+  /** Header, orientation, number of Gaussians that have arrived, and whether the file is complete. */
   get progress() {
     const native = this.#native;
-    return { header: this.header, gaussians: native.arrived(), complete: native.complete() };
+    const [gaussians, complete] = [native.arrived(), native.complete()];
+    return { header: this.header, orientation: this.orientation, gaussians, complete };
   }
 
   /** How many Gaussians are enough for an output of this size in pixels. */
@@ -102,8 +131,10 @@ export class Decoder {
   }
 
   /** Nine numbers for each Gaussian; see the declarations. */
-  gaussians({ start = 0, end = all } = {}) {
-    return this.#native.gaussians(integer(start, 'start', 0), integer(end, 'end', 0));
+  gaussians({ start = 0, end = all, orientation = 'none' } = {}) {
+    const turned = isTurned(orientation);
+    const numbers = this.#native.gaussians(integer(start, 'start', 0), integer(end, 'end', 0));
+    return turned && this.orientation > 1 ? turnGaussians(numbers, this.header, this.orientation) : numbers;
   }
 
   /** Chunks, layers, bits per attribute. */
@@ -111,16 +142,16 @@ export class Decoder {
     return this.#native.statistics();
   }
 
-  /** Renders 8-bit RGBA: what an `ImageData` is made of. */
+  /** Renders 8-bit RGBA, upright by default: what an `ImageData` is made of. */
   render(options = {}) {
-    const request = this.#request({ ...options, color: 'rgba' });
+    const request = this.#request('from-image', { ...options, color: 'rgba' });
     const data = this.#native.render8(request);
     return { width: request[4], height: request[5], data };
   }
 
-  /** Renders the samples as they are specified, in the file's colour model and depth by default. */
+  /** Renders the samples as they are specified: by default as stored, in the file's colour model and depth. */
   samples(options = {}) {
-    const request = this.#request(options);
+    const request = this.#request('none', options);
     const color = options.color ?? this.header.color;
     const depth = options.depth ?? this.header.depth;
     if (depth !== 8 && depth !== 16) throw new RangeError(`depth is ${depth}; it must be 8 or 16`);
@@ -128,10 +159,10 @@ export class Decoder {
     return { width: request[4], height: request[5], color, channels: channelsOf[color], depth, data };
   }
 
-  /** Renders a PNG file with the picture's ICC profile, which a browser then converts. */
-  async png(options = {}) {
+  /** Renders a PNG file, upright by default, with the picture's ICC profile, which a browser then converts. */
+  async png({ orientation = 'from-image', ...options } = {}) {
     const { encodePng } = await import('./png.js');
-    return encodePng(this.samples({ ...options, depth: 8 }), this.metadata.iccProfile);
+    return encodePng(this.samples({ ...options, orientation, depth: 8 }), this.metadata.iccProfile);
   }
 
   /** Frees the memory. Nothing else may be called after this. */
@@ -140,12 +171,15 @@ export class Decoder {
     this.#native = null;
   }
 
-  #request({ width, height, region, gaussians = all, color }) {
+  /** The numbers for a rendering, with the orientation that it has by default. */
+  #request(byDefault, { width, height, region, gaussians = all, color, orientation = byDefault }) {
     if (color !== undefined && !(color in channelsOf)) {
       throw new RangeError(`color is ${color}; it must be one of ${Object.keys(channelsOf)}`);
     }
+    const turned = isTurned(orientation);
     // Before the header, the decoder refuses whatever it is asked for.
-    const size = outputSize(this.header ?? { width: 1, height: 1 }, { width, height });
+    const picture = turnedSize(this.header ?? { width: 1, height: 1 }, turned ? this.orientation : 1);
+    const size = outputSize(picture, { width, height });
     const part = region ?? { x: 0, y: 0, width: size[0], height: size[1] };
     return Uint32Array.of(
       ...size,
@@ -155,6 +189,7 @@ export class Decoder {
       integer(part.height, 'region.height', 1),
       integer(gaussians, 'gaussians', 0),
       channelsOf[color] ?? 0,
+      Number(turned),
     );
   }
 }

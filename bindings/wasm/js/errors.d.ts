@@ -1,3 +1,5 @@
+import type { Limits } from './types.js';
+
 /** Why a file was not decoded. `kind` is for programs, `message` for people. */
 export class GipError extends Error {
   readonly kind:
@@ -23,7 +25,8 @@ export class UnexpectedEndError extends GipError {}
 
 /** The file or the request requires more than a limit allows. */
 export class LimitError extends GipError {
-  readonly limit: string;
+  /** Which one, as the option `limits` names it. */
+  readonly limit: keyof Limits;
   readonly wanted: number;
   readonly allowed: number;
 }

@@ -39,7 +39,7 @@ export class UnexpectedEndError extends GipError {
   }
 }
 
-/** The file or the request requires more than a limit allows. */
+/** The file or the request requires more than a limit allows; `limit` is its name in `defaultLimits`. */
 export class LimitError extends GipError {
   get name() {
     return 'LimitError';
@@ -81,7 +81,7 @@ export function decodeError(kind, message, chunk = null) {
 
 /** The decoder calls this. */
 export function limitError(message, limit, wanted, allowed) {
-  return new LimitError(message, limit, wanted, allowed);
+  return new LimitError(`${message}; limits: { ${limit}: ... } raises it`, limit, wanted, allowed);
 }
 
 /** A plain object for an error. */
@@ -97,6 +97,6 @@ export function pack(error) {
 
 /** The error of a plain object. */
 export function unpack({ kind, message, chunk, limit, wanted, allowed }) {
-  if (kind === 'limit') return limitError(message, limit, wanted, allowed);
+  if (kind === 'limit') return new LimitError(message, limit, wanted, allowed);
   return decodeError(kind, message, chunk);
 }

@@ -1,5 +1,7 @@
 /** Registers the element `<gip-image>`; also exports all of `index.js`. */
 
+import type { Limits } from './index.js';
+
 export * from './index.js';
 
 /**
@@ -7,6 +9,9 @@ export * from './index.js';
  *
  * Attributes: `src`, `alt`, `width`, `height`, `loading` (`eager` or `lazy`), `crossorigin`
  * (`use-credentials` sends cookies to other origins), `referrerpolicy`, `fetchpriority`.
+ *
+ * The picture is upright, as its Exif says, and so are its natural size and the layout that follows from
+ * it. With the CSS property `image-orientation: none` it is laid out and shown as stored.
  *
  * Events, none of which bubble: `load`, once the picture is shown with what its size needs; `error`, an
  * `ErrorEvent` whose `error` is mostly a `GipError`; `progress`, a `ProgressEvent` with the bytes that
@@ -23,9 +28,11 @@ export class GipImageElement extends HTMLElement {
   width: number;
   /** The height of the content box in CSS pixels; setting it sets the attribute. */
   height: number;
-  /** The stored size in pixels; 0 until the header has arrived. */
+  /** The size of the upright picture in pixels; 0 until it is known. */
   readonly naturalWidth: number;
   readonly naturalHeight: number;
+  /** What a file may cost at most. It counts from the next setting of `src` on. */
+  limits: Limits | undefined;
   readonly currentSrc: string;
   /** Whether the picture is shown, is broken, or there is none. */
   readonly complete: boolean;

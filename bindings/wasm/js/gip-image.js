@@ -4,6 +4,7 @@ import { ImageAttributes } from './image-attributes.js';
 import { plan } from './layout.js';
 import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
+import { naturalSize } from './orientation.js';
 import { Painting } from './painting.js';
 import { commonSheet, contentSize, layOut, ownSheet } from './styles.js';
 
@@ -17,6 +18,8 @@ const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 export class GipImageElement extends ImageAttributes {
   static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'crossorigin'];
 
+  /** What a file may cost at most. A page may have set it before this script has come. */
+  limits = this.limits;
   #internals;
   #style = ownSheet();
   #painting = new Painting();
@@ -25,8 +28,12 @@ export class GipImageElement extends ImageAttributes {
   /** `waiting` for a reason to load, `loading`, `complete`, or `broken`. */
   #state = 'waiting';
   #loader = null;
-  /** The header that the layout follows. */
+  /** The header of the picture that the layout follows. */
   #header = null;
+  /** The size of the upright picture. */
+  #natural = null;
+  /** Whether it is shown upright; as stored only where the page's styles want that. */
+  #orientation = 'from-image';
   /** The ICC profile; `undefined` as long as it is not known. */
   #profile = undefined;
   /** Whether the element is on the screen, or close to it; `undefined` as long as that is not known. */
@@ -53,11 +60,11 @@ export class GipImageElement extends ImageAttributes {
   // What `<img>` tells of its picture.
 
   get naturalWidth() {
-    return this.#header?.width ?? 0;
+    return this.#natural?.width ?? 0;
   }
 
   get naturalHeight() {
-    return this.#header?.height ?? 0;
+    return this.#natural?.height ?? 0;
   }
 
   get currentSrc() {
@@ -125,11 +132,16 @@ export class GipImageElement extends ImageAttributes {
     this.#alternative.textContent = alt ?? '';
   }
 
+  /** The size that the picture has in the layout. */
+  get #size() {
+    return this.#orientation === 'none' ? this.#header : this.#natural;
+  }
+
   #layOut() {
     layOut(this.#style, {
       width: this.getAttribute('width'),
       height: this.getAttribute('height'),
-      header: this.#header,
+      natural: this.#size,
       broken: this.#state === 'broken',
     });
   }
@@ -138,7 +150,7 @@ export class GipImageElement extends ImageAttributes {
   #reset() {
     this.#loader?.close();
     this.#loader = null;
-    this.#header = null;
+    this.#header = this.#natural = null;
     this.#profile = undefined;
     this.#state = 'waiting';
     this.#painting.clear();
@@ -183,6 +195,7 @@ export class GipImageElement extends ImageAttributes {
         referrerPolicy: this.getAttribute('referrerpolicy') ?? '',
         priority: this.getAttribute('fetchpriority') ?? 'auto',
       },
+      this.limits,
       () => this.#arrived(loader),
       (error) => {
         if (this.#loader === loader) this.#fail(error);
@@ -194,9 +207,11 @@ export class GipImageElement extends ImageAttributes {
 
   /** Something has arrived. */
   async #arrived(loader) {
-    if (this.#loader !== loader || !loader.header) return;
+    if (this.#loader !== loader || loader.orientation === null) return;
     if (loader.header !== this.#header) {
       this.#header = loader.header;
+      this.#natural = naturalSize(loader.header, loader.orientation);
+      this.#orientation = getComputedStyle(this).imageOrientation === 'none' ? 'none' : 'from-image';
       this.#asked = null;
       this.#layOut();
       this.#measure();
@@ -224,7 +239,7 @@ export class GipImageElement extends ImageAttributes {
   #fail(error) {
     this.#loader?.close();
     this.#loader = null;
-    this.#header = null;
+    this.#header = this.#natural = null;
     this.#state = 'broken';
     this.#painting.clear();
     this.shadowRoot.replaceChildren(this.#alternative);
@@ -241,7 +256,7 @@ export class GipImageElement extends ImageAttributes {
       width: Math.round(this.#device.width * scale),
       height: Math.round(this.#device.height * scale),
     };
-    return plan({ css: this.#css, device, natural: this.#header, fit: objectFit, position: objectPosition });
+    return plan({ css: this.#css, device, natural: this.#size, fit: objectFit, position: objectPosition });
   }
 
   /** Puts what has been drawn where it belongs now, until it is rendered anew. */
@@ -293,9 +308,10 @@ export class GipImageElement extends ImageAttributes {
       const { iccProfile } = await loader.metadata();
       if (this.#loader === loader) this.#profile = iccProfile;
     }
-    if (!this.#profile) return loader.render({ width, height, region });
+    const options = { width, height, region, orientation: this.#orientation };
+    if (!this.#profile) return loader.render(options);
     // The browser knows how to convert colours.
-    return createImageBitmap(await loader.png({ width, height, region }));
+    return createImageBitmap(await loader.png(options));
   }
 
   #show(image, drawn) {

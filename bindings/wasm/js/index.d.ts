@@ -1,7 +1,7 @@
 /** The package `image-gip` for scripts. The work is done in workers, where they can be had. */
 
-import type { Gaussian9, Header, Limits, Metadata, Progress } from './types.js';
-import type { RenderOptions, SampleOptions, Samples, Statistics } from './types.js';
+import type { Gaussian9, GaussianOptions, Header, Limits, Metadata, Orientation } from './types.js';
+import type { Progress, RenderOptions, SampleOptions, Samples, Statistics } from './types.js';
 
 export type * from './types.js';
 export * from './errors.js';
@@ -28,7 +28,7 @@ export interface OpenOptions {
 }
 
 /**
- * Reads a file and renders it. Colours are those of the file: sRGB, unless `open` gives an ICC
+ * Reads a file and renders it, upright unless the option `orientation` is `none`. Colours are those of the file: sRGB, unless `open` gives an ICC
  * profile in `metadata()`.
  *
  * Rejects with a `GipError` for a file that is refused or cannot be fetched, a `RangeError` for a size
@@ -48,23 +48,28 @@ interface Renderable {
   readonly complete: boolean;
   /** The number of Gaussians that have arrived. */
   readonly arrived: number;
+  /** How the picture is turned; `null` until it is known, at the latest with the first Gaussian. */
+  readonly orientation: Orientation | null;
+  /** The size of the upright picture in pixels; 0 until the orientation is known. */
+  readonly naturalWidth: number;
+  readonly naturalHeight: number;
 
   /** The metadata that has arrived. It is complete when the first Gaussian has arrived. */
   metadata(): Promise<Metadata>;
   /** Chunks, layers, bits per attribute. */
   statistics(): Promise<Statistics>;
-  /** The Gaussians that have arrived, or some of them, in the order of the file. */
-  gaussians(range?: { start?: number; end?: number }): Promise<Gaussian9>;
+  /** The Gaussians that have arrived, or some of them, by default as stored. */
+  gaussians(options?: GaussianOptions): Promise<Gaussian9>;
   /** How many Gaussians are enough for an output of this size in pixels. */
   gaussiansFor(width: number, height: number): Promise<number>;
   /** How many Gaussians a decoder has after the first `bytes` of the file. */
   gaussiansIn(bytes: number): Promise<number>;
 
-  /** Renders 8-bit RGBA with straight alpha. */
+  /** Renders 8-bit RGBA with straight alpha, by default upright. */
   render(options?: RenderOptions & { signal?: AbortSignal }): Promise<ImageData>;
-  /** Renders the samples as the format specifies them, bit for bit. */
+  /** Renders the samples as the format specifies them, bit for bit, by default as stored. */
   samples(options?: SampleOptions & { signal?: AbortSignal }): Promise<Samples>;
-  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile. */
+  /** Renders a PNG file of 8 bits per sample with the picture's ICC profile, by default upright. */
   png(options?: SampleOptions & { signal?: AbortSignal }): Promise<Blob>;
 
   /** Frees the memory. Nothing else may be called after this. */
@@ -74,6 +79,7 @@ interface Renderable {
 /** A whole file. */
 export interface Picture extends Renderable {
   readonly header: Header;
+  readonly orientation: Orientation;
 }
 
 export interface StreamDecoder extends Renderable {}

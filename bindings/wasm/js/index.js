@@ -1,5 +1,6 @@
 // The package's interface for scripts. It works in a worker of its own, and never blocks the page.
 
+import { naturalSize } from './orientation.js';
 import { RemoteDecoder } from './remote.js';
 import { read } from './source.js';
 
@@ -28,7 +29,7 @@ function abortable(promise, signal) {
 /** Decodes bytes as they arrive, and renders what has arrived. */
 export class StreamDecoder {
   #remote;
-  #progress = { header: null, gaussians: 0, complete: false };
+  #progress = { header: null, orientation: null, gaussians: 0, complete: false };
 
   constructor({ limits, statistics } = {}) {
     this.#remote = new RemoteDecoder({ limits, statistics });
@@ -36,6 +37,22 @@ export class StreamDecoder {
 
   get header() {
     return this.#progress.header;
+  }
+
+  get orientation() {
+    return this.#progress.orientation;
+  }
+
+  get naturalWidth() {
+    return this.#natural.width;
+  }
+
+  get naturalHeight() {
+    return this.#natural.height;
+  }
+
+  get #natural() {
+    return naturalSize(this.header, this.orientation);
   }
 
   get complete() {
@@ -67,8 +84,8 @@ export class StreamDecoder {
     return this.#remote.call('gaussiansIn', bytes);
   }
 
-  gaussians({ start, end } = {}) {
-    return this.#remote.call('gaussians', { start, end });
+  gaussians({ start, end, orientation } = {}) {
+    return this.#remote.call('gaussians', { start, end, orientation });
   }
 
   gaussiansFor(width, height) {

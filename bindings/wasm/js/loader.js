@@ -7,10 +7,12 @@ import { StreamDecoder } from './index.js';
 export class Loader {
   /** The latest progress of the decoder. */
   header = null;
+  orientation = null;
   arrived = 0;
   complete = false;
   #download;
-  #decoder = new StreamDecoder();
+  #limits;
+  #decoder;
   #abort = new AbortController();
   #wanted = 0;
   #fed = false;
@@ -20,11 +22,13 @@ export class Loader {
   #onerror;
 
   /**
-   * `init` is that of `fetch`. `onprogress` is called after every piece, and waited for: in it, `want`
+   * `init` is that of `fetch`, `limits` those of the decoder. `onprogress` is called after every piece, and waited for: in it, `want`
    * can say how far to go on. `onerror` is called with the error that ends it.
    */
-  constructor(url, init, onprogress, onerror) {
+  constructor(url, init, limits, onprogress, onerror) {
     this.#download = new Download(url, init);
+    this.#limits = limits;
+    this.#decoder = new StreamDecoder({ limits });
     this.#onprogress = onprogress;
     this.#onerror = onerror;
   }
@@ -36,10 +40,10 @@ export class Loader {
 
   /** Whether more is to arrive. */
   get lacking() {
-    return !this.complete && (this.header === null || this.arrived < this.#wanted);
+    return !this.complete && (this.orientation === null || this.arrived < this.#wanted);
   }
 
-  /** Goes on, or stops, when this many Gaussians have arrived, and at least the header. */
+  /** Goes on, or stops, when this many Gaussians have arrived, and at least header and orientation. */
   want(gaussians) {
     this.#wanted = gaussians;
     if (this.lacking && !this.#running && !this.#failed) void this.#run();
@@ -93,10 +97,10 @@ export class Loader {
     for await (const { bytes, first } of this.#download.pieces(signal)) {
       if (first && this.#fed) this.#begin();
       this.#fed = true;
-      const { header, gaussians, complete } = await this.#decoder.feed(bytes);
+      const { header, orientation, gaussians, complete } = await this.#decoder.feed(bytes);
       if (signal.aborted) return;
       this.header ??= header;
-      Object.assign(this, { arrived: gaussians, complete });
+      Object.assign(this, { orientation, arrived: gaussians, complete });
       await this.#onprogress();
       if (!this.lacking) return;
     }
@@ -106,7 +110,7 @@ export class Loader {
   /** A decoder for a file from its beginning. */
   #begin() {
     this.#decoder.close();
-    this.#decoder = new StreamDecoder();
-    Object.assign(this, { header: null, arrived: 0, complete: false });
+    this.#decoder = new StreamDecoder({ limits: this.#limits });
+    Object.assign(this, { header: null, orientation: null, arrived: 0, complete: false });
   }
 }

@@ -30,25 +30,25 @@ function length(attribute) {
 }
 
 /**
- * Makes the element's size that of an `<img>`: from the attributes, from the header once it has arrived,
- * and from the alternative text if there is no picture.
+ * Makes the element's size that of an `<img>`: from the attributes, from the picture's natural size once
+ * it is known, and from the alternative text if there is no picture.
  */
-export function layOut(own, { width, height, header, broken }) {
+export function layOut(own, { width, height, natural, broken }) {
   const [w, h] = [length(width), length(height)];
   const rules = [];
   // A block is to be as wide as the picture, not as the page.
   rules.push(`width: ${w?.css ?? 'max-content'}`);
   if (h) rules.push(`height: ${h.css}`);
   if (!broken) {
-    const natural = header ?? { width: 0, height: 0 };
+    const intrinsic = natural ?? { width: 0, height: 0 };
     // The contents are placed by hand. What would be their size is the picture's.
     rules.push(
       'contain: size layout paint',
-      `contain-intrinsic-size: ${natural.width}px ${natural.height}px`,
+      `contain-intrinsic-size: ${intrinsic.width}px ${intrinsic.height}px`,
       'min-width: 0',
       'min-height: 0',
     );
-    if (header) rules.push(`aspect-ratio: auto ${header.width} / ${header.height}`);
+    if (natural) rules.push(`aspect-ratio: auto ${natural.width} / ${natural.height}`);
     else if (w?.value && h?.value && !w.percent && !h.percent) {
       rules.push(`aspect-ratio: auto ${w.value} / ${h.value}`);
     }

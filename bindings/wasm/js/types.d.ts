@@ -2,9 +2,9 @@
 export interface Header {
   version: number;
   coding: 'packed' | 'entropy' | 'unknown';
-  /** In pixels. */
+  /** In pixels, as stored: before the picture is turned. */
   width: number;
-  /** In pixels. */
+  /** In pixels, as stored. */
   height: number;
   color: 'gray' | 'gray-alpha' | 'rgb' | 'rgba' | 'unknown';
   /** The number of channels, 1 to 4. */
@@ -33,14 +33,25 @@ export interface Metadata {
   texts: { keyword: string; text: string }[];
 }
 
+/**
+ * How the picture is turned for display: the value in its Exif, 1 to 8, or 1 without one. It is 6 if the
+ * picture is turned by 90 degrees clockwise. From 5 on, width and height are exchanged.
+ */
+export type Orientation = 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8;
+
 /** What has arrived. */
 export interface Progress {
   header: Header | null;
+  /** `null` until it is known, which may be later than the header, but before the first Gaussian. */
+  orientation: Orientation | null;
   /** The number of Gaussians that have arrived. */
   gaussians: number;
   /** Whether the whole file has arrived. */
   complete: boolean;
 }
+
+/** Whether the output is upright, as `createImageBitmap` has it in `imageOrientation`, or as stored. */
+export type OrientationOption = 'from-image' | 'none';
 
 /** A rectangle in pixels of the output, inside of it. */
 export interface Region {
@@ -53,8 +64,8 @@ export interface Region {
 export interface RenderOptions {
   /**
    * The size in pixels at which the whole picture is rendered, 1 to 2^23: the Gaussians are
-   * evaluated there, and nothing is resampled. Default: the stored size; with one of them, the other
-   * follows from the proportions.
+   * evaluated there, and nothing is resampled. Default: the picture's own size; with one of them, the
+   * other follows from the proportions.
    */
   width?: number;
   height?: number;
@@ -62,6 +73,19 @@ export interface RenderOptions {
   region?: Region;
   /** Render only the first Gaussians of the file. Default: all that have arrived. */
   gaussians?: number;
+  /**
+   * `from-image`: the output is upright, and so are the sizes and the region above. `none`: all are as
+   * stored. Default: `from-image` for pictures, `none` for `samples`.
+   */
+  orientation?: OrientationOption;
+}
+
+export interface GaussianOptions {
+  /** Which ones, in the order of the file. Default: all that have arrived. */
+  start?: number;
+  end?: number;
+  /** The frame of their places: that of the upright picture, or as stored. Default `none`. */
+  orientation?: OrientationOption;
 }
 
 export interface SampleOptions extends RenderOptions {
@@ -85,7 +109,8 @@ export interface Samples {
 /**
  * Nine numbers for each Gaussian:
  *
- * - 0, 1: x and y of its centre, in pixels of the stored size; that of the first pixel is (0.5, 0.5);
+ * - 0, 1: x and y of its centre, in pixels of the picture's own size; that of the first pixel is
+ *   (0.5, 0.5);
  * - 2, 3, 4: l11, l21 and l22 of the Cholesky factor L of its covariance L L^T, in pixels. The
  *   covariance is (l11 l11, l11 l21, l21 l21 + l22 l22) as (xx, xy, yy). The outline of the
  *   Mahalanobis distance r is the centre plus r L (cos t, sin t): x = l11 cos t,
@@ -112,15 +137,22 @@ export interface Statistics {
   } | null;
 }
 
-/** What a file may cost at most. What is left out has the value of `defaultLimits`. */
+/**
+ * What a file may cost at most. What is left out has the value of `defaultLimits`, which are those of the
+ * other decoders of the format; `Infinity` removes a limit. A `LimitError` names the one to raise.
+ */
 export interface Limits {
-  /** Most pixels that the header may declare. Default 2^28. */
+  /** Largest width in pixels, of the file and of one rendering, as stored. Default 65,536. */
+  width?: number;
+  /** Largest height in pixels, of the file and of one rendering, as stored. Default 65,536. */
+  height?: number;
+  /** Most pixels, of the file and of one rendering. Default 2^28. */
   pixels?: number;
   /** Most pixels of one rendering. Default 2^26: 256 MiB of RGBA. */
   outputPixels?: number;
-  /** Default 2^21. */
+  /** Default 2^22. */
   gaussians?: number;
-  /** Bytes that the decoder may hold, the output not counted. Default 256 MiB. */
+  /** Bytes that the decoder may hold, the output not counted. Default 512 MiB. */
   memory?: number;
   /** Kernel evaluations of one rendering. Default 2^32: some ten seconds. */
   work?: number;

@@ -1,6 +1,6 @@
 //! The push decoder and its renderings.
 
-use image_gip::{DecodeError, Limits, StreamDecoder};
+use image_gip::{DecodeError, Limits, Orientation, StreamDecoder};
 use js_sys::{Float32Array, Uint8ClampedArray, Uint16Array};
 use wasm_bindgen::prelude::*;
 
@@ -26,32 +26,31 @@ pub struct Decoder {
 
 #[wasm_bindgen]
 impl Decoder {
-    /// A decoder with limits as `Limits` has them, and for the pixels of one rendering.
+    /// A decoder with the limits of `js/limits.js`, in the order that they have there.
     #[wasm_bindgen(constructor)]
+    #[expect(clippy::too_many_arguments, reason = "an array would take more code")]
     pub fn new(
         statistics: bool,
-        max_pixels: f64,
+        width: f64,
+        height: f64,
+        pixels: f64,
         max_output: f64,
-        max_gaussians: f64,
-        max_memory: f64,
-        max_work: f64,
+        gaussians: f64,
+        memory: f64,
+        work: f64,
     ) -> Self {
         let mut limits = Limits::default();
         // These casts clamp.
-        limits.max_pixels = max_pixels as u64;
-        limits.max_gaussians = max_gaussians as u32;
-        limits.max_memory = max_memory as u64;
-        limits.max_work = max_work as u64;
-        limits.max_width = 1 << 20;
-        limits.max_height = 1 << 20;
+        limits.max_width = width as u32;
+        limits.max_height = height as u32;
+        limits.max_pixels = pixels as u64;
+        limits.max_gaussians = gaussians as u32;
+        limits.max_memory = memory as u64;
+        limits.max_work = work as u64;
         let stream = StreamDecoder::new().with_limits(limits.clone());
         let stream = if statistics { stream.with_statistics() } else { stream };
-        Self {
-            stream,
-            limits,
-            max_output: max_output as u64,
-            layer_extents: LayerExtents::default(),
-        }
+        let max_output = max_output as u64;
+        Self { stream, limits, max_output, layer_extents: LayerExtents::default() }
     }
 
     /// Takes the next bytes of the file.
@@ -79,6 +78,11 @@ impl Decoder {
     /// The header; `undefined` until it has arrived.
     pub fn header(&self) -> JsValue {
         self.stream.header().map_or(JsValue::UNDEFINED, objects::header)
+    }
+
+    /// How the picture is to be turned, as the value that Exif has; `undefined` until it is known.
+    pub fn orientation(&self) -> Option<u8> {
+        self.stream.orientation().map(Orientation::to_exif)
     }
 
     /// The metadata that has arrived.
@@ -126,15 +130,17 @@ impl Decoder {
 impl Decoder {
     fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
         let Some(header) = self.stream.header() else { return Err(no_header()) };
-        let numbers = request.try_into().map_err(|_| JsValue::from("eight numbers"))?;
-        let request = Request::new(numbers, header);
+        let numbers = request.try_into().map_err(|_| JsValue::from("nine numbers"))?;
+        let orientation = self.stream.orientation().unwrap_or_default();
+        let request = Request::new(numbers, header, orientation);
         // All strips together may take the work that is allowed.
         let mut limits = self.limits.clone();
         limits.max_work /= u64::from(samples::strips(&request).1.max(1));
         self.stream.set_limits(limits).map_err(|error| exception(&error))?;
         let Some(picture) = self.stream.picture() else { return Err(no_header()) };
         // This checks that the region is inside the output.
-        picture.output_len(&request.options()).map_err(|error| exception(&error))?;
+        let options = request.options().map_err(|error| exception(&error))?;
+        picture.output_len(&options).map_err(|error| exception(&error))?;
         if request.pixels() > self.max_output {
             return Err(too_many_pixels(request.pixels(), self.max_output));
         }

@@ -1,6 +1,6 @@
 //! The crate's errors as those of `js/errors.js`.
 
-use image_gip::DecodeError;
+use image_gip::{DecodeError, LimitKind};
 use wasm_bindgen::prelude::*;
 
 #[wasm_bindgen(raw_module = "./errors.js")]
@@ -9,7 +9,7 @@ extern "C" {
     #[wasm_bindgen(js_name = decodeError)]
     fn new_error(kind: &str, message: &str, chunk: Option<String>) -> JsValue;
 
-    /// Makes the error object for a limit.
+    /// Makes the error object for a limit, which is named as in `js/limits.js`.
     #[wasm_bindgen(js_name = limitError)]
     fn new_limit_error(message: &str, limit: &str, wanted: f64, allowed: f64) -> JsValue;
 }
@@ -23,7 +23,16 @@ pub(crate) fn exception(error: &DecodeError) -> JsValue {
         DecodeError::Unsupported { chunk, .. } => ("unsupported", Some(chunk)),
         DecodeError::UnexpectedEnd { chunk } => ("unexpected-end", chunk.as_ref()),
         DecodeError::Limit { kind, wanted, allowed } => {
-            return new_limit_error(&message, &kind.to_string(), *wanted as f64, *allowed as f64);
+            let limit = match kind {
+                LimitKind::Width => "width",
+                LimitKind::Height => "height",
+                LimitKind::Pixels => "pixels",
+                LimitKind::Gaussians => "gaussians",
+                LimitKind::Memory => "memory",
+                LimitKind::Work => "work",
+                _ => "unknown",
+            };
+            return new_limit_error(&message, limit, *wanted as f64, *allowed as f64);
         }
         DecodeError::Request(_) => ("request", None),
         _ => ("failed", None),
@@ -35,5 +44,5 @@ pub(crate) fn exception(error: &DecodeError) -> JsValue {
 pub(crate) fn too_many_pixels(wanted: u64, allowed: u64) -> JsValue {
     let message =
         format!("limit exceeded: pixels of one rendering: {wanted} required, {allowed} allowed");
-    new_limit_error(&message, "pixels of one rendering", wanted as f64, allowed as f64)
+    new_limit_error(&message, "outputPixels", wanted as f64, allowed as f64)
 }

@@ -1,20 +1,26 @@
 //! What to render.
 
-use image_gip::{ColorModel, Header, Region, RenderOptions};
+use image_gip::{ColorModel, DecodeError, Header, Orientation, Region, RenderOptions};
 
-/// The output that is wanted: the size of the whole, the part of it, and how many Gaussians.
+/// The output that is wanted: the size of the whole, the part of it, and how many Gaussians. Size and
+/// region are those after turning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request {
     size: (u32, u32),
     pub(crate) region: Region,
     gaussians: u32,
-    color: ColorModel,
+    pub(crate) color: ColorModel,
+    /// How to turn what the decoder renders.
+    pub(crate) orientation: Orientation,
 }
 
 impl Request {
-    /// From the numbers that `js/core.js` sends. 0 channels are those of the file.
-    pub(crate) fn new(numbers: [u32; 8], header: &Header) -> Self {
-        let [width, height, x, y, region_width, region_height, gaussians, channels] = numbers;
+    /// From the numbers that `js/core.js` sends: the sizes, the number of Gaussians, the channels,
+    /// of which 0 are those of the file, and whether the output is turned by the `orientation` of
+    /// the file.
+    pub(crate) fn new(numbers: [u32; 9], header: &Header, orientation: Orientation) -> Self {
+        let [width, height, x, y, region_width, region_height, gaussians, channels, turned] =
+            numbers;
         let color = match channels {
             0 => header.color,
             1 => ColorModel::Gray,
@@ -23,7 +29,8 @@ impl Request {
             _ => ColorModel::Rgba,
         };
         let region = Region { x, y, width: region_width, height: region_height };
-        Self { size: (width, height), region, gaussians, color }
+        let orientation = if turned == 0 { Orientation::NoTransforms } else { orientation };
+        Self { size: (width, height), region, gaussians, color, orientation }
     }
 
     /// The number of pixels.
@@ -31,13 +38,17 @@ impl Request {
         u64::from(self.region.width) * u64::from(self.region.height)
     }
 
-    /// The options for all of it.
-    pub(crate) fn options(&self) -> RenderOptions {
-        RenderOptions::new()
-            .with_size(self.size.0, self.size.1)
-            .with_region(self.region)
+    /// The options for all of it, before turning.
+    #[inline(never)] // Once is enough of what a page loads.
+    pub(crate) fn options(&self) -> Result<RenderOptions, DecodeError> {
+        let (width, height) = self.size;
+        let region = self.orientation.stored_region(self.region, width, height)?;
+        let (width, height) = self.orientation.turned_size(width, height);
+        Ok(RenderOptions::new()
+            .with_size(width, height)
+            .with_region(region)
             .with_prefix(self.gaussians)
-            .with_color(self.color)
+            .with_color(self.color))
     }
 
     /// The same for some of its rows, which must be inside.

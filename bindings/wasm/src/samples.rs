@@ -1,6 +1,6 @@
 //! Rendering to typed arrays, in strips.
 
-use image_gip::{DecodeError, Picture, RenderOptions};
+use image_gip::{DecodeError, Orientation, Picture, RenderOptions};
 use js_sys::{Uint8ClampedArray, Uint16Array};
 
 use crate::request::Request;
@@ -10,7 +10,7 @@ use crate::request::Request;
 const STRIP_PIXELS: u64 = 1 << 22;
 
 /// A sample, 0 to its largest value.
-pub(crate) trait Sample: Clone + Default {
+pub(crate) trait Sample: Copy + Default {
     /// The typed array of such samples.
     type Array;
 
@@ -67,16 +67,23 @@ pub(crate) fn render<T: Sample>(
     picture: &Picture<'_>,
     request: &Request,
 ) -> Result<T::Array, DecodeError> {
-    let length = picture.output_len(&request.options())?;
+    let length = picture.output_len(&request.options()?)?;
     let out = T::allocate(length as u32);
     let (rows, _) = strips(request);
     let mut samples = Vec::new();
     let mut at = 0;
     for first in (0..request.region.height).step_by(rows as usize) {
-        let options = request.rows(first, rows.min(request.region.height - first)).options();
+        let strip = request.rows(first, rows.min(request.region.height - first));
+        let options = strip.options()?;
         samples.resize(picture.output_len(&options)?, T::default());
         T::render(picture, &options, &mut samples)?;
-        T::copy(&out, at, &samples);
+        if strip.orientation == Orientation::NoTransforms {
+            T::copy(&out, at, &samples);
+        } else {
+            let (columns, _) = options.output_size(picture.header());
+            let channels = strip.color.channels();
+            T::copy(&out, at, &strip.orientation.apply(&samples, columns as usize, channels));
+        }
         at += samples.len() as u32;
     }
     Ok(out)

@@ -152,7 +152,15 @@ test('limits', () => {
   assert.throws(limited({ gaussians: 100 }), LimitError);
   assert.throws(limited({ memory: 1000 }), LimitError);
   assert.throws(limited({ work: 1000 }), LimitError);
-  assert.throws(limited({ outputPixels: 100 }), { limit: 'pixels of one rendering', wanted: 6144, allowed: 100 });
+  assert.throws(limited({ outputPixels: 100 }), { limit: 'outputPixels', wanted: 6144, allowed: 100 });
+  // Which one it was can be raised by its name.
+  for (const [limit, size] of [['height', { width: 2, height: 65_537 }], ['width', { width: 65_537, height: 2 }]]) {
+    const long = makePicture({ ...size, layers: [3] });
+    const error = { limit, wanted: 65_537, allowed: 65_536, message: new RegExp(`${limit}: 65537 required.*limits: { ${limit}: ... }`) };
+    assert.throws(() => opened(long), error);
+    const { data } = opened(long, { limits: { [limit]: 65_537 } }).render();
+    assert.equal(data.length, 4 * 2 * 65_537);
+  }
 });
 
 test('after an error there is what came before it', () => {

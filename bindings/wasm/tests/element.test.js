@@ -181,6 +181,27 @@ for (const [name, [kind, bytes]] of Object.entries(broken)) {
   });
 }
 
+test('what exceeds a limit is refused, until a page raises it', async () => {
+  harness.routes['/tall.gip'] = file(makePicture({ width: 2, height: 65_537, layers: [3] }));
+  await withPage(element('alt="Tall"'), async (page) => {
+    const outcomes = await page.evaluate(async () => {
+      await customElements.whenDefined('gip-image');
+      const image = document.querySelector('gip-image');
+      const outcome = () =>
+        new Promise((resolve) => {
+          image.addEventListener('load', () => resolve(image.naturalHeight), { once: true });
+          image.addEventListener('error', ({ error }) => resolve([error.limit, error.message]), { once: true });
+          image.src = '/tall.gip';
+        });
+      const refused = await outcome();
+      image.limits = { [refused[0]]: 70_000 };
+      return [refused, await outcome()];
+    });
+    const message = 'limit exceeded: height: 65537 required, 65536 allowed; limits: { height: ... } raises it';
+    assert.deepEqual(outcomes, [['height', message], 65_537]);
+  });
+});
+
 test('an empty source, and one that is no URL', async () => {
   for (const src of ['', 'http://[']) {
     await withPage(element(`src="${src}" alt="None"`), async (page) => {

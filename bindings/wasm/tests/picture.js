@@ -12,6 +12,24 @@ function chunk(type, payload) {
   return out;
 }
 
+/** Exif data with an orientation, 1 to 8, as the chunk `['eXIf', exif(6)]`. */
+export function exif(orientation) {
+  const bytes = Buffer.from('4d4d002a00000008000101120003000000010000000000000000', 'hex');
+  bytes.writeUInt16BE(orientation, 18);
+  return bytes;
+}
+
+/** A PNG file with Exif data. */
+export function withExif(png, exif) {
+  const body = Buffer.concat([Buffer.from('eXIf'), exif]);
+  const chunk = Buffer.alloc(4 + body.length + 4);
+  chunk.writeUInt32BE(exif.length);
+  body.copy(chunk, 4);
+  chunk.writeUInt32BE(crc32(body), 4 + body.length);
+  // After the signature and the header.
+  return Buffer.concat([png.subarray(0, 33), chunk, png.subarray(33)]);
+}
+
 /** Random numbers from 0 to 1, the same in every run. */
 function random(seed) {
   let state = seed;

@@ -16,6 +16,8 @@ export function crc32(bytes) {
 
 /** The vectors are to be decoded whatever they cost. */
 export const unlimited = {
+  width: 2 ** 32 - 1,
+  height: 2 ** 32 - 1,
   pixels: 2 ** 40,
   outputPixels: 2 ** 40,
   gaussians: 2 ** 32,
