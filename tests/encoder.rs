@@ -487,12 +487,12 @@ fn options_out_of_range_are_refused_with_what_is_allowed() {
     }
     // No file of this picture is that small: signature, header, end.
     let error = refused(quick(Target::Bytes(20)));
-    let OptionError::Size { bytes: 20, least } = error else { panic!("{error}") };
+    let OptionError::Size { bytes: 20, least, metadata: 0 } = error else { panic!("{error}") };
     let smallest = quick(Target::Bytes(least)).encode(&source).expect("it encodes");
     assert!(smallest.bytes.len() as u64 <= least);
     assert_eq!(
         refused(quick(Target::Bytes(least - 1))),
-        OptionError::Size { bytes: least - 1, least }
+        OptionError::Size { bytes: least - 1, least, metadata: 0 }
     );
 
     for (keyword, text, expected) in [

@@ -261,3 +261,22 @@ fn damaged_files_are_errors() {
     let refused = GipDecoder::new_with_limits(&file[..], limits);
     assert!(matches!(refused, Err(ImageError::Limits(_))));
 }
+
+#[test]
+fn the_orientation_is_told_and_the_samples_are_as_stored() {
+    let little_endian = b"II\x2a\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\0\0\0\0\0\0\0\0";
+    for value in 0..=9 {
+        let (mut big, mut little) = (EXIF_ROTATE_90.to_vec(), little_endian.to_vec());
+        (big[19], little[18]) = (value, value);
+        for exif in [big, little] {
+            let mut file = Vec::new();
+            let mut gip = GipEncoder::with_encoder(&mut file, encoder());
+            gip.set_exif_metadata(exif).expect(".gip has Exif");
+            picture(ColorType::L8).write_with_encoder(gip).expect("in memory");
+            let mut decoder = GipDecoder::new(&file[..]).expect("a sound file");
+            let expected = Orientation::from_exif(value).unwrap_or(Orientation::NoTransforms);
+            assert_eq!(decoder.orientation().expect("a sound file"), expected, "{value}");
+            assert_eq!(decoder.dimensions(), (WIDTH, HEIGHT), "{value}");
+        }
+    }
+}

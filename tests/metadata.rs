@@ -382,3 +382,42 @@ fn without_its_profile_a_picture_has_other_colours_unless_it_is_srgb() {
         assert_eq!(lost(profile), [MetadataLoss::ColorProfile]);
     }
 }
+
+#[test]
+fn xmp_in_two_parts_is_put_together() {
+    const NOTE: &str = "xmlns:xmpNote=\"http://ns.adobe.com/xmp/note/\"";
+    let second = "<?xpacket begin=\"\"?><x:xmpmeta xmlns:x=\"adobe:ns:meta/\" xmlns:t=\"tools\">\
+         <rdf:RDF xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" \
+         xmlns:dc=\"http://purl.org/dc/elements/1.1/\"><rdf:Description rdf:about=\"\" \
+         xmlns:t = \"mine\"><dc:source>long</dc:source></rdf:Description></rdf:RDF></x:xmpmeta>";
+    let whole = packet(&format!("{NOTE} "), "<dc:title>short</dc:title>").replace(
+        "</rdf:RDF>",
+        "<rdf:Description xmlns:rdf=\"http://www.w3.org/1999/02/22-rdf-syntax-ns#\" \
+         xmlns:dc=\"http://purl.org/dc/elements/1.1/\" xmlns:x=\"adobe:ns:meta/\" rdf:about=\"\" \
+         xmlns:t = \"mine\"><dc:source>long</dc:source></rdf:Description></rdf:RDF>",
+    );
+    for (attribute, element) in [
+        ("xmpNote:HasExtendedXMP='A1'", ""),
+        ("", "<xmpNote:HasExtendedXMP>A1</xmpNote:HasExtendedXMP>"),
+    ] {
+        let of = |attribute: &str, element: &str| {
+            let attributes = format!("{NOTE} {attribute}");
+            of_xmp(&packet(&attributes, &format!("<dc:title>short</dc:title>{element}")))
+        };
+        let mut metadata = of(attribute, element);
+        let loss = metadata.join_xmp(|name| (name == "A1").then(|| second.into()));
+        assert_eq!(loss, None);
+        assert_eq!(metadata, of_xmp(&whole));
+
+        for second in [None, Some(""), Some("no XML"), Some("<a/>"), Some(&second[..200])] {
+            let mut metadata = of(attribute, element);
+            let loss = metadata.join_xmp(|_| second.map(Into::into));
+            assert_eq!(loss, Some(MetadataLoss::XmpExtension));
+            assert_eq!(metadata, of("", ""), "the first part remains, without the name");
+        }
+    }
+    let mut metadata = of_xmp(&packet(NOTE, ""));
+    let before = metadata.clone();
+    assert_eq!(metadata.join_xmp(|_| panic!("there is no second part")), None);
+    assert_eq!(metadata, before);
+}

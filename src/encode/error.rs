@@ -83,12 +83,17 @@ pub enum OptionError {
         most: f64,
     },
     /// The target is a size smaller than a file without Gaussians.
-    #[error("a size of {bytes} bytes; this picture takes at least {least} without any Gaussian")]
+    #[error(
+        "a size of {bytes} bytes; this picture takes at least {least} without any Gaussian, of which \
+         {metadata} are metadata"
+    )]
     Size {
         /// The target in bytes.
         bytes: u64,
         /// Size in bytes of the file without Gaussians.
         least: u64,
+        /// Size in bytes of the metadata in it.
+        metadata: u64,
     },
     /// The metadata cannot be stored.
     #[error(transparent)]

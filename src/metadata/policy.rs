@@ -41,6 +41,8 @@ pub enum MetadataLoss {
     DamagedExif,
     /// XMP that is damaged, and therefore was dropped as a whole.
     DamagedXmp,
+    /// The second part of XMP that is in two; see [`Metadata::join_xmp`].
+    XmpExtension,
 }
 
 impl Metadata {
@@ -87,15 +89,6 @@ impl Metadata {
         }
         losses
     }
-
-    /// Makes Exif and XMP say that the picture is upright, for whoever has turned its pixels. What they do
-    /// not say is not added.
-    pub fn reset_orientation(&mut self) {
-        self.reset_exif_orientation();
-        if let Some(xmp) = &mut self.xmp {
-            xmp::reset_orientation(xmp);
-        }
-    }
 }
 
 impl fmt::Display for MetadataLoss {
@@ -106,6 +99,9 @@ impl fmt::Display for MetadataLoss {
             }
             Self::DamagedExif => "the Exif is damaged and was dropped",
             Self::DamagedXmp => "the XMP is damaged and was dropped",
+            Self::XmpExtension => {
+                "the second part of the XMP is missing or damaged and was dropped"
+            }
         })
     }
 }

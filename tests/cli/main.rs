@@ -7,6 +7,9 @@ mod commands;
 #[path = "../common/mod.rs"]
 mod common;
 mod frames;
+mod jpeg;
+mod metadata;
+mod orientation;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod room;

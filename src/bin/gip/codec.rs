@@ -6,11 +6,13 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
 use image::{DynamicImage, ImageEncoder};
-use image_gip::{ColorModel, SampleDepth};
+use image_gip::{ColorModel, Metadata, SampleDepth};
 
 use crate::files;
 use crate::picture::{SampleSlice, StillImage};
 
+/// Most bytes of Exif in a JPEG: its segment also has a length, and a prefix of 6 bytes.
+const MAX_JPEG_EXIF: usize = u16::MAX as usize - 2 - 6;
 /// Quality of JPEG files: high, because the picture has coding errors already.
 const JPEG_QUALITY: u8 = 95;
 
@@ -122,6 +124,32 @@ impl Codec {
         Ok((chosen, if depths.contains(&depth) { depth } else { depths[0] }))
     }
 
+    /// Drops the metadata that the format has no place for, or that `image` does not write to it. Returns
+    /// what it was.
+    pub(crate) fn drop_unwritable(self, metadata: &mut Metadata) -> Vec<String> {
+        let takes_profile = matches!(self, Self::Png | Self::Jpeg | Self::WebP | Self::Tiff);
+        let takes_exif = |exif: &Vec<u8>| match self {
+            Self::Png | Self::WebP => true,
+            Self::Jpeg => exif.len() <= MAX_JPEG_EXIF,
+            _ => false,
+        };
+        let mut dropped = Vec::new();
+        if !takes_profile && metadata.icc_profile.take().is_some() {
+            dropped.push("colour profile");
+        }
+        if metadata.exif.take_if(|exif| !takes_exif(exif)).is_some() {
+            dropped.push("Exif");
+        }
+        if metadata.xmp.take().is_some() {
+            dropped.push("XMP");
+        }
+        if !std::mem::take(&mut metadata.texts).is_empty() {
+            dropped.push("text");
+        }
+        let warn = |what| format!("the {what} is not written to {self:?}");
+        dropped.into_iter().map(warn).collect()
+    }
+
     /// Encodes a picture of the colour model and depth that [`Codec::choose`] returned.
     pub(crate) fn encode(self, picture: &StillImage) -> Result<Vec<u8>> {
         let mut out = Cursor::new(Vec::new());
@@ -175,12 +203,12 @@ impl Codec {
 }
 
 fn write(mut encoder: impl ImageEncoder, picture: &StillImage) -> Result<()> {
-    // An encoder that does not support a kind of metadata refuses it here; it is not written then.
+    // What the format does not take has been dropped.
     if let Some(profile) = &picture.metadata.icc_profile {
-        let _ = encoder.set_icc_profile(profile.clone());
+        encoder.set_icc_profile(profile.clone())?;
     }
     if let Some(exif) = &picture.metadata.exif {
-        let _ = encoder.set_exif_metadata(exif.clone());
+        encoder.set_exif_metadata(exif.clone())?;
     }
     Ok(DynamicImage::write_with_encoder(&picture.image, encoder)?)
 }

@@ -6,8 +6,8 @@ use anyhow::{Context, Result, anyhow};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, Pixel};
 use image_gip::{
-    ColorModel, DecodeError, Decoder, Header, Metadata, Picture, RenderOptions, SampleDepth,
-    StreamDecoder,
+    ColorModel, DecodeError, Decoder, Header, Metadata, MetadataPolicy, Picture, RenderOptions,
+    RequestError, SampleDepth, StreamDecoder,
 };
 
 use crate::args;
@@ -18,13 +18,15 @@ use crate::picture::StillImage;
 pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
     let codec = Codec::of(&args.output)?;
+    let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let file = files::read(&args.input)?;
-    let picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
+    let mut picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
         Err(_) if args.allow_partial => decode_partial(args, codec, &file),
         decoded => decoded,
     })?;
+    finish(&mut picture, codec, Some(args.keep.policy().unwrap_or_default()));
     files::warn(&args.input, &picture.warnings);
-    output.write(&codec.encode(&upright(picture))?)
+    output.write(&codec.encode(&picture)?, times)
 }
 
 /// Decodes a valid file. Layers that are not visible in the region are skipped.
@@ -32,7 +34,8 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let context = || files::input_name(&args.input);
     let mut decoder = Decoder::new(file).with_context(context)?;
     let metadata = decoder.metadata().clone();
-    let wanted = Wanted::new(render_options(args, decoder.header()), codec, decoder.header())?;
+    let options = render_options(args, decoder.header(), &metadata).with_context(context)?;
+    let wanted = Wanted::new(options, codec, decoder.header())?;
     let image = wanted.decode(&mut decoder).with_context(context)?;
     Ok(StillImage { image, metadata, warnings: Vec::new() })
 }
@@ -49,22 +52,25 @@ fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<Stil
     };
     let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
     let warnings = vec![format!("{error}; showing {shown} of {all} Gaussians")];
-    let wanted = Wanted::new(render_options(args, picture.header()), codec, picture.header())?;
-    let (image, metadata) = (wanted.render(&picture)?, stream.metadata().clone());
+    let metadata = stream.metadata().clone();
+    let options = render_options(args, picture.header(), &metadata)?;
+    let wanted = Wanted::new(options, codec, picture.header())?;
+    let image = wanted.render(&picture)?;
     Ok(StillImage { image, metadata, warnings })
 }
 
-/// The orientation that the Exif of a file asks for.
-pub(crate) fn orientation(metadata: &Metadata) -> Orientation {
-    let orientation = metadata.exif.as_deref().and_then(Orientation::from_exif_chunk);
-    orientation.unwrap_or(Orientation::NoTransforms)
-}
-
-/// A decoded picture as it is written: upright, and with a profile only if it fits the samples.
-pub(crate) fn upright(mut picture: StillImage) -> StillImage {
-    picture.make_upright(orientation(&picture.metadata));
+/// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, and with such
+/// metadata as was asked for and the format takes. Without a policy, which is for thumbnails, it has what is safe,
+/// and nobody misses what the format does not take.
+pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
+    let orientation = picture.metadata.orientation().to_exif();
+    picture.make_upright(Orientation::from_exif(orientation).expect("both have those of Exif"));
+    picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));
     picture.drop_foreign_profile();
-    picture
+    let dropped = codec.drop_unwritable(&mut picture.metadata);
+    if policy.is_some() {
+        picture.warnings.extend(dropped);
+    }
 }
 
 /// The options of the rendering, with the colour model and depth that the output format has.
@@ -151,19 +157,22 @@ impl Wanted {
     }
 }
 
-/// Size and region of the rendering.
-fn render_options(args: &args::Decode, header: &Header) -> RenderOptions {
+/// Size and region of the rendering, which is turned upright afterwards, as the arguments are.
+fn render_options(
+    args: &args::Decode,
+    header: &Header,
+    metadata: &Metadata,
+) -> Result<RenderOptions, RequestError> {
+    let orientation = metadata.orientation();
+    let whole = orientation.turned_size(header.width, header.height);
     // The cast of a side that is too long saturates, and the limits refuse it.
     let scaled = |side: u32, scale: f64| (f64::from(side) * scale).round().max(1.0) as u32;
-    let size = args
-        .size
-        .or(args.scale.map(|scale| (scaled(header.width, scale), scaled(header.height, scale))));
-    let mut options = RenderOptions::new();
-    if let Some((width, height)) = size {
-        options = options.with_size(width, height);
-    }
+    let scale = |scale| (scaled(whole.0, scale), scaled(whole.1, scale));
+    let (width, height) = args.size.or(args.scale.map(scale)).unwrap_or(whole);
+    let (stored_width, stored_height) = orientation.turned_size(width, height);
+    let mut options = RenderOptions::new().with_size(stored_width, stored_height);
     if let Some(region) = args.region {
-        options = options.with_region(region);
+        options = options.with_region(orientation.stored_region(region, width, height)?);
     }
-    options
+    Ok(options)
 }

@@ -3,8 +3,8 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Result, bail};
-use image_gip::{EncodeError, Encoded, Encoder, Progress, Source};
+use anyhow::{Error, Result, bail};
+use image_gip::{EncodeError, Encoded, Encoder, OptionError, Progress, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -23,11 +23,13 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     if !args.force {
         check_name(&output)?;
     }
+    let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let mut picture = source::read(&args.input)?;
+    picture.retain_metadata(args.keep.policy().unwrap_or_default());
     files::warn(&args.input, &picture.warnings);
     let pool = args.threads.pool()?;
     let encoded = pool.install(|| encode_with_bar(args.encoder.encoder(), &mut picture))?;
-    output.write(&encoded.bytes)?;
+    output.write(&encoded.bytes, times)?;
 
     let report = JsonReport::new(&picture, &encoded);
     let text = if args.json {
@@ -65,22 +67,34 @@ fn encode_with_bar(encoder: Encoder, picture: &mut StillImage) -> Result<Encoded
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    Ok(encoded?)
+    encoded
 }
 
 /// Encodes a picture with its metadata. An alpha channel that is opaque everywhere is dropped.
+///
+/// # Errors
+/// Those of the encoder.
 pub(crate) fn encode(
     encoder: Encoder,
     picture: &mut StillImage,
     progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
-) -> Result<Encoded, EncodeError> {
+) -> Result<Encoded> {
     picture.drop_opaque_alpha();
     let (width, height) = (picture.image.width(), picture.image.height());
     let source = match picture.samples() {
         SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
         SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
     }?;
-    encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress)
+    let encoded = encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress);
+    encoded.map_err(|error| {
+        let is_by_metadata = matches!(
+            error,
+            EncodeError::Option(OptionError::Size { bytes, least, metadata })
+                if bytes >= least - metadata
+        );
+        let error = Error::new(error);
+        if is_by_metadata { error.context("--metadata safe or none leaves room") } else { error }
+    })
 }
 
 /// What `--json` prints.

@@ -1,12 +1,14 @@
 //! Reading and writing whole files; `-` is standard input or output.
 
 use std::ffi::OsStr;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, FileTimes, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use tempfile::NamedTempFile;
+
+use crate::errors::WrongUsage;
 
 /// How the names of temporary files begin and end.
 const TEMPORARY: (&str, &str) = (".gip-", ".tmp");
@@ -66,6 +68,15 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).with_context(|| input_name(path))
 }
 
+/// When a file was changed and read last.
+pub(crate) fn times(path: &Path) -> Result<FileTimes> {
+    let context = || input_name(path);
+    let metadata = fs::metadata(path).with_context(context)?;
+    let times = FileTimes::new().set_modified(metadata.modified().with_context(context)?);
+    // Not every system knows when a file was read.
+    Ok(metadata.accessed().map_or(times, |accessed| times.set_accessed(accessed)))
+}
+
 /// Prints text to standard output, or to standard error if the output file goes to standard output.
 /// It is not an error if the reader has closed the pipe.
 pub(crate) fn print(text: &str, output: Option<&Path>) -> Result<()> {
@@ -117,8 +128,19 @@ impl Output {
         Ok(Self::Regular { path, directory })
     }
 
-    /// Writes the whole result.
-    pub(crate) fn write(&self, bytes: &[u8]) -> Result<()> {
+    /// The times of the source, for this result.
+    ///
+    /// # Errors
+    /// When the source has no times, or this cannot have them.
+    pub(crate) fn times_of(&self, source: &Path) -> Result<FileTimes> {
+        if is_standard_stream(source) || !matches!(self, Self::Regular { .. }) {
+            bail!(WrongUsage("--preserve-times needs files as input and output".into()));
+        }
+        times(source)
+    }
+
+    /// Writes the whole result, and gives it these times if it is a regular file.
+    pub(crate) fn write(&self, bytes: &[u8], times: Option<FileTimes>) -> Result<()> {
         match self {
             Self::Standard => {
                 let mut stdout = io::stdout().lock();
@@ -130,9 +152,11 @@ impl Output {
                 .and_then(|mut file| file.write_all(bytes))
                 .with_context(|| output_name(path)),
             Self::Regular { path, directory } => {
-                replace(path, directory, |file| Ok(file.write_all(bytes)?))
-                    .map(|_| ())
-                    .with_context(|| output_name(path))
+                let write = |file: &mut File| {
+                    file.write_all(bytes)?;
+                    Ok(times.map_or(Ok(()), |times| file.set_times(times))?)
+                };
+                replace(path, directory, write).map(|_| ()).with_context(|| output_name(path))
             }
         }
     }

@@ -32,6 +32,10 @@ struct FileInfo {
     coding: &'static str,
     width: u32,
     height: u32,
+    /// As Exif counts it.
+    orientation: u8,
+    upright_width: u32,
+    upright_height: u32,
     color: &'static str,
     channels: usize,
     depth: u8,
@@ -131,6 +135,8 @@ impl FileInfo {
             color: bits.color / gaussians,
         };
         let metadata = stream.metadata();
+        let orientation = metadata.orientation();
+        let (upright_width, upright_height) = orientation.turned_size(header.width, header.height);
         let size = |blob: &Option<Vec<u8>>| blob.as_ref().map(Vec::len);
         Self {
             bytes,
@@ -143,6 +149,9 @@ impl FileInfo {
             },
             width: header.width,
             height: header.height,
+            orientation: orientation.to_exif(),
+            upright_width,
+            upright_height,
             color: match header.color {
                 ColorModel::Gray => "gray",
                 ColorModel::GrayAlpha => "gray-alpha",
@@ -232,6 +241,13 @@ impl Display for FileInfo {
         let bits = &self.bits_per_gaussian;
         let mut row = |name: &str, value: &dyn Display| writeln!(f, "{name:<18}{value}");
         row("size", &format_args!("{width}x{height}, {color}, {depth} bits per sample"))?;
+        if self.orientation != 1 {
+            let Self { orientation, upright_width: width, upright_height: height, .. } = self;
+            row(
+                "upright",
+                &format_args!("{width}x{height}, by orientation {orientation} of Exif"),
+            )?;
+        }
         row("file", &format_args!("{} bytes, {:.3} bits per pixel", self.bytes, self.bpp))?;
         row("version", &self.version)?;
         row("Gaussians", &format_args!("{} in {} layers", self.gaussians, self.layers))?;

@@ -2,7 +2,7 @@
 
 use image::DynamicImage;
 use image::metadata::Orientation;
-use image_gip::{ColorModel, Metadata, SampleDepth};
+use image_gip::{ColorModel, Metadata, MetadataPolicy, SampleDepth};
 
 /// An upright picture, its metadata, and what was lost on the way to it.
 #[derive(Debug)]
@@ -22,13 +22,19 @@ pub(crate) enum SampleSlice<'a> {
 }
 
 impl StillImage {
-    /// Applies an orientation to the pixels, and resets the orientation in the Exif, so that it is
-    /// not applied again.
+    /// Applies an orientation to the pixels, and resets it in the metadata, so that it is not applied
+    /// again. Metadata of a picture that is upright stays as it is.
     pub(crate) fn make_upright(&mut self, orientation: Orientation) {
-        self.image.apply_orientation(orientation);
-        if let Some(exif) = &mut self.metadata.exif {
-            let _reset = Orientation::remove_from_exif_chunk(exif);
+        if orientation != Orientation::NoTransforms {
+            self.image.apply_orientation(orientation);
+            self.metadata.reset_orientation();
         }
+    }
+
+    /// Keeps only such metadata, with a warning of what may be missed.
+    pub(crate) fn retain_metadata(&mut self, policy: MetadataPolicy) {
+        let losses = self.metadata.retain(policy);
+        self.warnings.extend(losses.iter().map(ToString::to_string));
     }
 
     /// Drops an ICC profile for another colour space than that of the samples, such as the profile

@@ -7,7 +7,7 @@ pub(crate) use layers::packed_layers_length;
 use super::error::{EncodeError, OptionError};
 use super::progress::Observer;
 use super::source::Source;
-use crate::chunk::ChunkType;
+use crate::chunk::{ChunkType, FRAMING};
 use crate::coding::entropy::{Code, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
@@ -151,7 +151,9 @@ impl<'a> FileLayout<'a> {
     /// Gaussians.
     pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), OptionError> {
         if bytes < least {
-            return Err(OptionError::Size { bytes, least });
+            let lengths = self.metadata.chunks().map(|(_, payload)| payload.len() + FRAMING);
+            let metadata = lengths.sum::<usize>() as u64;
+            return Err(OptionError::Size { bytes, least, metadata });
         }
         Ok(())
     }

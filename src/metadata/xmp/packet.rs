@@ -1,6 +1,6 @@
 //! Reading a packet of XMP.
 
-use roxmltree::{Document, ParsingOptions};
+use roxmltree::{Document, Node, ParsingOptions};
 
 pub(super) const RDF: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
 pub(super) const TIFF: &str = "http://ns.adobe.com/tiff/1.0/";
@@ -27,6 +27,27 @@ pub(super) fn parse(xmp: &[u8]) -> Result<Document<'_>, Damaged> {
     }
     let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
     Document::parse_with_options(text, options).map_err(|_| Damaged)
+}
+
+/// The element that holds the properties of a packet.
+pub(super) fn rdf<'a>(document: &'a Document<'_>) -> Option<Node<'a, 'a>> {
+    document.descendants().find(|node| node.has_tag_name((RDF, "RDF")))
+}
+
+/// A text as it is written in XML.
+pub(super) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\r' => out.push_str("&#xD;"),
+            other => out.push(other),
+        }
+    }
+    out
 }
 
 /// Whether a text can be parsed in a time that its length leads to expect.

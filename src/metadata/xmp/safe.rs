@@ -4,7 +4,7 @@ use core::fmt::Write as _;
 
 use roxmltree::{Document, Node};
 
-use super::packet::{Damaged, RDF, TIFF, XML, parse};
+use super::packet::{Damaged, RDF, TIFF, XML, escaped, parse, rdf};
 
 /// The properties that are safe: namespace, its usual prefix, names.
 const SAFE: [(&str, &str, &[&str]); 6] = [
@@ -81,8 +81,7 @@ fn value(document: &Document<'_>, uri: &str, name: &str) -> Option<String> {
 
 /// The elements that hold the properties of the picture.
 fn descriptions<'a>(document: &'a Document<'_>) -> impl Iterator<Item = Node<'a, 'a>> {
-    let rdf = document.descendants().find(|node| node.has_tag_name((RDF, "RDF")));
-    let children = rdf.into_iter().flat_map(|rdf| rdf.children());
+    let children = rdf(document).into_iter().flat_map(|rdf| rdf.children());
     children.filter(|node| node.has_tag_name((RDF, "Description")))
 }
 
@@ -111,20 +110,4 @@ fn text(node: Node<'_, '_>) -> Option<String> {
     let text: String = node.children().filter_map(|child| child.text()).collect();
     let text = if text.is_empty() { node.attribute((RDF, "resource"))? } else { &text };
     Some(escaped(text))
-}
-
-/// A text as it is written in XML.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\r' => out.push_str("&#xD;"),
-            other => out.push(other),
-        }
-    }
-    out
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::encode::EncoderArgs;
+use super::keep::Keep;
 use super::values::{bounds, extension, number};
 
 /// Encodes or decodes many files and whole folders, one picture per core.
@@ -70,7 +71,8 @@ pub(crate) struct Batch {
     /// Skip files whose result is whole and newer than they are.
     ///
     /// A result is whole if it can be decoded. Options are not compared: to make results anew with
-    /// other ones, leave --resume out. If both times are equal, the result is made again.
+    /// other ones, leave --resume out. If both times are equal, the result is made again, but not with
+    /// --preserve-times, which makes them equal.
     #[arg(long)]
     pub(crate) resume: bool,
     /// Write a line of JSON for every file to FILE, or to standard output if it is `-`.
@@ -106,6 +108,8 @@ pub(crate) struct Batch {
     #[arg(long, help_heading = "Decoding", value_name = "EXT", default_value = "png",
           requires = "decoding", value_parser = extension)]
     pub(crate) format: String,
+    #[command(flatten)]
+    pub(crate) keep: Keep,
     #[command(flatten)]
     pub(crate) encoder: EncoderArgs,
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use image_gip::Region;
 
+use super::keep::Keep;
 use super::values::{ThreadCount, number, region, size};
 
 /// Decodes a .gip file to a picture.
@@ -11,8 +12,12 @@ use super::values::{ThreadCount, number, region, size};
 /// The extension of OUTPUT sets the format: png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm,
 /// ppm, pnm or pam. On standard output it is PNG. Gray becomes RGB if the format has no gray, and
 /// 16 bits become 8 if it has no more. Alpha is never dropped: a picture with alpha cannot be
-/// written in a format without it. ICC profile and Exif are written to formats that support them
-/// (PNG, JPEG, WebP; in TIFF only the profile). An orientation in the file's Exif is applied.
+/// written in a format without it.
+///
+/// The picture is written upright: an orientation in the file's Exif is applied, and reset in Exif and XMP. Sizes
+/// and regions are those of the upright picture. ICC profile and Exif are written to PNG, JPEG and WebP, to TIFF
+/// the profile, to other formats nothing; XMP and texts are not written. A warning tells what was there and is
+/// not written. More is in docs/metadata.md.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -32,17 +37,19 @@ pub(crate) struct Decode {
     #[arg(long, value_name = "F", conflicts_with = "size",
           value_parser = |text: &str| number(text, 0.001, 1000.0))]
     pub(crate) scale: Option<f64>,
-    /// Render the whole picture at W by H pixels.
+    /// Render the whole picture at W by H pixels, which it has when it is upright.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<(u32, u32)>,
     /// Render only a region: the W by H pixels whose first one is (X, Y). Coordinates are pixels of
-    /// the output, after --scale or --size.
+    /// the upright output, after --scale or --size.
     #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
     pub(crate) region: Option<Region>,
     /// If the file is truncated or damaged, write the picture of the Gaussians that can be decoded,
     /// and print a warning, instead of failing.
     #[arg(long)]
     pub(crate) allow_partial: bool,
+    #[command(flatten)]
+    pub(crate) keep: Keep,
     #[command(flatten)]
     pub(crate) threads: ThreadCount,
 }

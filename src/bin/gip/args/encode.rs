@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use image_gip::{Encoder, Precision, Target, Tune};
 
+use super::keep::Keep;
 use super::values::{ThreadCount, number};
 
 /// Encodes a picture as a .gip file.
@@ -12,14 +13,17 @@ use super::values::{ThreadCount, number};
 /// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS, ICO, farbfeld, OpenEXR, Radiance
 /// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
 /// Alpha is dropped if every pixel is opaque. Samples that are floats (OpenEXR, HDR) are taken as
-/// linear light, clipped, and stored as 16-bit sRGB. An Exif orientation is applied to the pixels,
-/// and the tag in the stored Exif is reset. ICC profile, Exif and XMP are stored.
+/// linear light, clipped, and stored as 16-bit sRGB.
+///
+/// The picture is stored upright: an Exif orientation is applied to the pixels, and reset in Exif and XMP. ICC
+/// profile, Exif and XMP are stored; of the tags of a TIFF those of description, artist, copyright, camera, dates
+/// and resolution, as Exif. Texts of PNG and IPTC are not read. More is in docs/metadata.md.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
     after_help = "\
 At most one of --gaussians, --bpp, --bytes, --psnr, --quality and --lambda may be given. If the target cannot
-be met, the file comes as close as possible, and the report gives the reason."
+be met, the file comes as close as possible, and the report gives the reason. A size counts the metadata."
 )]
 pub(crate) struct Encode {
     /// The picture, or `-` for standard input.
@@ -31,6 +35,8 @@ pub(crate) struct Encode {
     /// Write OUTPUT even if its name does not end in .gip.
     #[arg(long)]
     pub(crate) force: bool,
+    #[command(flatten)]
+    pub(crate) keep: Keep,
     #[command(flatten)]
     pub(crate) threads: ThreadCount,
     /// Print the report as one JSON object. It goes to standard error if OUTPUT is `-`.

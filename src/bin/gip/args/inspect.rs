@@ -10,6 +10,8 @@ pub(crate) struct Info {
     /// Print one JSON object: the size of the file, all fields of the header, number and bytes of
     /// the chunks of each type, bits per Gaussian by attribute, and sizes of the metadata.
     ///
+    /// `width` and `height` are those of the picture as stored; `upright_width` and `upright_height` those after it
+    /// is turned by `orientation`, 1 to 8 as in Exif.
     /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the
     /// quantizer of each component of the packed coding; with the entropy coding it is empty.
     /// `lattice_steps` has the quantization steps of the entropy coding; with the packed coding it
@@ -20,7 +22,8 @@ pub(crate) struct Info {
 
 /// Measures how much two pictures differ.
 ///
-/// Each may be a .gip file or any picture that `gip encode` reads. They must have the same size. An
+/// Each may be a .gip file or any picture that `gip encode` reads. They are compared upright, and must have the same
+/// size. An
 /// alpha channel that is opaque everywhere is ignored. Both are converted to a colour model with the
 /// channels of both, and to the greater depth: gray becomes RGB, missing alpha becomes opaque, 8
 /// bits become 16. PSNR and the largest error are over all samples of all channels. MS-SSIM is the

@@ -5,6 +5,7 @@ mod command;
 mod decode;
 mod encode;
 mod inspect;
+mod keep;
 mod values;
 
 pub(crate) use batch::Batch;

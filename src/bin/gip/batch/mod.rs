@@ -1,5 +1,6 @@
 //! `gip batch`.
 
+mod age;
 mod budget;
 mod inputs;
 mod left_out;

@@ -9,12 +9,13 @@ use std::process::ExitCode;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Error, Result, bail};
 use image_gip::EncodeError;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
+use super::age;
 use super::budget::Budget;
 use super::inputs::{self, Item, Rest};
 use super::manifest::{Manifest, Record};
@@ -48,7 +49,8 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
         None => PIXELS_PER_JOB * jobs as u64,
     };
     let (budget, stop) = (Budget::new(pixels), Stop::on_signals()?);
-    let batch = Batch { task, items, rest, jobs, budget, stop };
+    let preserve_times = args.keep.preserve_times;
+    let batch = Batch { task, items, rest, preserve_times, jobs, budget, stop };
 
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     for folder in &folders {
@@ -76,6 +78,8 @@ struct Batch {
     task: Task,
     items: Vec<Item>,
     rest: Rest,
+    /// Whether results get the times of their sources.
+    preserve_times: bool,
     jobs: usize,
     budget: Budget,
     stop: Stop,
@@ -108,7 +112,7 @@ impl Batch {
         workers::for_each(self.jobs, self.items.len(), &self.stop, |index| {
             let item = &self.items[index];
             let inspect = || self.task.inspect(&item.output, &self.budget);
-            if is_newer(&item.output, &item.source)
+            if age::is_new(&item.output, &item.source, self.preserve_times)
                 && let Ok(facts) = catch_panic(item, inspect)
             {
                 let _ = found[index].set(facts);
@@ -168,8 +172,9 @@ impl Batch {
 
     /// Makes the result of one file.
     fn result(&self, item: &Item) -> Result<Facts> {
-        let stamp = || stamp(&item.source).with_context(|| item.source.display().to_string());
+        let stamp = || age::stamp(&item.source).with_context(|| item.source.display().to_string());
         let before = stamp()?;
+        let times = self.preserve_times.then(|| files::times(&item.source)).transpose()?;
         let (bytes, facts) = self.task.perform(item, &self.budget, &self.stop)?;
         // The result will be newer, and would never be made again.
         if stamp()? != before {
@@ -178,7 +183,7 @@ impl Batch {
         if let Some(folder) = item.output.parent() {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
-        Output::new(&item.output)?.write(&bytes)?;
+        Output::new(&item.output)?.write(&bytes, times)?;
         Ok(facts)
     }
 
@@ -230,20 +235,6 @@ fn catch_panic<T>(item: &Item, work: impl FnOnce() -> Result<T>) -> Result<T> {
     })
 }
 
-/// Size and time of a file, which tell whether it changed.
-fn stamp(path: &Path) -> io::Result<(u64, Option<SystemTime>)> {
-    let metadata = fs::metadata(path)?;
-    Ok((metadata.len(), metadata.modified().ok()))
-}
-
-fn is_newer(output: &Path, source: &Path) -> bool {
-    let modified = |path| fs::metadata(path).and_then(|metadata| metadata.modified());
-    match (modified(output), modified(source)) {
-        (Ok(output), Ok(source)) => output > source,
-        _ => false,
-    }
-}
-
 /// Whether an error is that of a full disk, or of a full quota.
 fn is_disk_full(error: &Error) -> bool {
     error
@@ -281,9 +272,10 @@ mod tests {
     #[cfg(unix)]
     fn a_source_that_changes_while_it_is_read_has_no_result() {
         let room = tempfile::tempdir().expect("a place for temporary files");
-        let task = Task::Decode { extension: "png".into(), bounds: None };
+        let task = Task::Decode { extension: "png".into(), bounds: None, policy: None };
         let (budget, stop) = (Budget::new(1), Stop::default());
-        let batch = Batch { task, items: Vec::new(), rest: Rest::default(), jobs: 1, budget, stop };
+        let (items, rest, preserve_times) = (Vec::new(), Rest::default(), false);
+        let batch = Batch { task, items, rest, preserve_times, jobs: 1, budget, stop };
         let item = |name: &str| Item {
             source: room.path().join(name),
             output: room.path().join("out").join(name).with_extension("png"),

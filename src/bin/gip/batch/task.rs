@@ -8,8 +8,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image::ImageFormat;
-use image::metadata::Orientation;
-use image_gip::{Decoder, EncodeError, Encoder, Header, RenderOptions, StreamDecoder, Threads};
+use image_gip::{
+    Decoder, EncodeError, Encoder, Header, MetadataPolicy, Orientation, RenderOptions,
+    StreamDecoder, Threads,
+};
 use serde::Serialize;
 
 use super::budget::Budget;
@@ -26,11 +28,16 @@ use crate::source;
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
 pub(crate) enum Task {
-    Encode(Box<Encoder>),
-    /// `bounds` are the sides that a thumbnail fits into; `None` for the whole picture.
+    Encode {
+        encoder: Box<Encoder>,
+        policy: MetadataPolicy,
+    },
+    /// `bounds` are the sides that a thumbnail fits into; `None` for the whole picture. The policy is that
+    /// of [`decode::finish`].
     Decode {
         extension: String,
         bounds: Option<(u32, u32)>,
+        policy: Option<MetadataPolicy>,
     },
 }
 
@@ -50,16 +57,21 @@ pub(crate) struct Facts {
 
 impl Task {
     pub(crate) fn new(args: &args::Batch) -> Self {
+        let policy = args.keep.policy();
         if args.decode || args.thumbnail.is_some() {
-            return Self::Decode { extension: args.format.clone(), bounds: args.thumbnail };
+            let (extension, bounds) = (args.format.clone(), args.thumbnail);
+            let policy =
+                if bounds.is_some() { policy } else { policy.or(Some(MetadataPolicy::All)) };
+            return Self::Decode { extension, bounds, policy };
         }
-        Self::Encode(Box::new(args.encoder.encoder().with_threads(Threads::One)))
+        let encoder = Box::new(args.encoder.encoder().with_threads(Threads::One));
+        Self::Encode { encoder, policy: policy.unwrap_or_default() }
     }
 
     /// The extension of the results.
     pub(crate) fn extension(&self) -> &str {
         match self {
-            Self::Encode(_) => "gip",
+            Self::Encode { .. } => "gip",
             Self::Decode { extension, .. } => extension,
         }
     }
@@ -67,7 +79,7 @@ impl Task {
     /// How a file of a folder is taken, by its name.
     pub(crate) fn kind(&self, path: &Path) -> Kind {
         let is_taken = match self {
-            Self::Encode(_) => {
+            Self::Encode { .. } => {
                 ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled())
             }
             Self::Decode { .. } => {
@@ -76,7 +88,7 @@ impl Task {
         };
         match self {
             _ if is_taken => Kind::Taken,
-            Self::Encode(_) if left_out::is_unread_picture(path) => Kind::Unread,
+            Self::Encode { .. } if left_out::is_unread_picture(path) => Kind::Unread,
             _ => Kind::Other,
         }
     }
@@ -92,15 +104,15 @@ impl Task {
         stop: &Stop,
     ) -> Result<(Vec<u8>, Facts)> {
         match self {
-            Self::Encode(encoder) => encode(encoder, item, budget, stop),
-            Self::Decode { bounds, .. } => decode(*bounds, item, budget, stop),
+            Self::Encode { encoder, policy } => encode(encoder, *policy, item, budget, stop),
+            Self::Decode { bounds, policy, .. } => decode(*bounds, *policy, item, budget, stop),
         }
     }
 
     /// Checks that an earlier result is whole, and returns what it tells about itself.
     pub(crate) fn inspect(&self, output: &Path, budget: &Budget) -> Result<Facts> {
         let (width, height, gaussians) = match self {
-            Self::Encode(_) => {
+            Self::Encode { .. } => {
                 let mut stream = StreamDecoder::new();
                 stream.feed(&fs::read(output)?)?;
                 stream.finish()?;
@@ -126,6 +138,7 @@ impl Task {
 
 fn encode(
     encoder: &Encoder,
+    policy: MetadataPolicy,
     item: &Item,
     budget: &Budget,
     stop: &Stop,
@@ -135,6 +148,7 @@ fn encode(
     check(stop)?;
     let start = Instant::now();
     let mut picture = source::read(&item.source)?;
+    picture.retain_metadata(policy);
     let encoded = encode::encode(encoder.clone(), &mut picture, &mut |_| match check(stop) {
         Ok(()) => ControlFlow::Continue(()),
         Err(_) => ControlFlow::Break(()),
@@ -156,6 +170,7 @@ fn encode(
 
 fn decode(
     bounds: Option<(u32, u32)>,
+    policy: Option<MetadataPolicy>,
     item: &Item,
     budget: &Budget,
     stop: &Stop,
@@ -166,8 +181,7 @@ fn decode(
     let mut decoder = Decoder::new(file).with_context(context)?;
     let metadata = decoder.metadata().clone();
     let mut options = RenderOptions::new().with_threads(Threads::One);
-    let size =
-        bounds.map(|bounds| fitted(decoder.header(), decode::orientation(&metadata), bounds));
+    let size = bounds.map(|bounds| fitted(decoder.header(), metadata.orientation(), bounds));
     if let Some((width, height)) = size {
         options = options.with_size(width, height);
     }
@@ -184,7 +198,8 @@ fn decode(
         Some(_) => decoder.stream().gaussians().len() as u32,
     };
     let image = image.with_context(context)?;
-    let picture = decode::upright(StillImage { image, metadata, warnings: Vec::new() });
+    let mut picture = StillImage { image, metadata, warnings: Vec::new() };
+    decode::finish(&mut picture, codec, policy);
     let bytes = codec.encode(&picture).with_context(context)?;
     let facts = Facts {
         width: Some(picture.image.width()),
@@ -211,11 +226,7 @@ fn thumbnail(
 
 /// The size, before it is turned upright, of a thumbnail that fits into these sides.
 fn fitted(header: &Header, orientation: Orientation, bounds: (u32, u32)) -> (u32, u32) {
-    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
-    let (across, down) = match orientation {
-        Rotate90 | Rotate90FlipH | Rotate270 | Rotate270FlipH => (bounds.1, bounds.0),
-        _ => bounds,
-    };
+    let (across, down) = orientation.turned_size(bounds.0, bounds.1);
     let (width, height) = (f64::from(header.width), f64::from(header.height));
     let scale = (f64::from(across) / width).min(f64::from(down) / height).min(1.0);
     let side = |side: f64| (side * scale).round().max(1.0) as u32;

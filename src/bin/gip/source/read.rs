@@ -6,9 +6,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
-use image_gip::Metadata;
 
-use super::frames;
+use super::{frames, metadata};
 use crate::files;
 use crate::picture::StillImage;
 
@@ -35,19 +34,17 @@ pub(crate) fn dimensions(path: &Path) -> Result<(u32, u32)> {
 
 fn decode(path: &Path, file: &[u8]) -> Result<StillImage> {
     let reader = reader(path, Cursor::new(file))?;
-    let warnings = reader.format().and_then(|format| frames::warning(format, file));
+    let format = reader.format();
+    let warnings = format.and_then(|format| frames::warning(format, file));
     let mut limits = limits();
     let mut decoder = reader.into_decoder()?;
     limits.reserve(decoder.total_bytes())?;
     decoder.set_limits(limits)?;
 
     let orientation = decoder.orientation()?;
-    let mut metadata = Metadata::default();
-    metadata.icc_profile = decoder.icc_profile()?;
-    metadata.exif = decoder.exif_metadata()?.and_then(tiff_stream);
-    metadata.xmp = decoder.xmp_metadata()?;
+    let (metadata, loss) = metadata::read(&mut decoder, format, file)?;
     let image = stored_samples(DynamicImage::from_decoder(decoder)?);
-    let warnings = warnings.into_iter().collect();
+    let warnings = warnings.into_iter().chain(loss.map(|loss| loss.to_string())).collect();
     let mut picture = StillImage { image, metadata, warnings };
     picture.make_upright(orientation);
     picture.drop_foreign_profile();
@@ -71,15 +68,6 @@ fn limits() -> image::Limits {
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_MEMORY);
     limits
-}
-
-/// The TIFF stream of Exif metadata: some programs write the prefix of JPEG's Exif marker before
-/// it. `None` for anything else.
-fn tiff_stream(mut exif: Vec<u8>) -> Option<Vec<u8>> {
-    if exif.starts_with(b"Exif\0\0") {
-        exif.drain(..6);
-    }
-    (exif.starts_with(b"II") || exif.starts_with(b"MM")).then_some(exif)
 }
 
 /// The picture with samples that a .gip file can hold: floats are taken as linear light, encoded as

@@ -1,4 +1,4 @@
-//! Changes to a packet of XMP that leave all else as it is.
+//! The orientation in XMP.
 
 use super::packet::{TIFF, parse};
 
