@@ -10,5 +10,6 @@ fuzz_target!(|bytes: &[u8]| {
     let fed = decoder.feed(bytes);
     assert_eq!(fed.is_ok() && decoder.is_complete(), decoder.finish().is_ok());
     image_gip_fuzz::check(&decoder);
+    let _orientation = decoder.orientation();
     image_gip_fuzz::decode_region(bytes);
 });

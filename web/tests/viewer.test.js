@@ -261,6 +261,8 @@ onPage('damaged and other files give a message', { path: '/' }, async (page) => 
   await drop(page, { name: 'header.gip', bytes: await vectorBytes('xcrc-header.gip') });
   await says(/header\.gip.*GHDR/);
   assert.ok(await page.locator('#welcome').isVisible());
+  await drop(page, { name: 'tall.gip', bytes: makePicture({ width: 2, height: 65_537, layers: [3] }) });
+  await says(/tall\.gip: limit exceeded: height: 65537 required, 65536 allowed\.$/);
   const half = sample.subarray(0, 13_000);
   await drop(page, { name: 'half.gip', bytes: half });
   await says(/half\.gip.*What is shown came before that: [\d,]+ of 6,296/);
