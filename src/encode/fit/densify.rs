@@ -18,6 +18,14 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
 /// pruned: a 16th of the quantization step of 8 bits.
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
+/// Gaussians that are placed in a tile at the same time see the same residuals. If too many of them overlap,
+/// their steps together go too far: the distortion of the tile rises, and it gets most of the next Gaussians,
+/// too. So they may overlap up to this many times as much as all would if they were spread evenly,
+const MOST_OVERLAP: f64 = 4.0;
+/// and there are at most so many: about one for ten pixels, or several times as many as the tiles get on
+/// average, where that is more.
+const MOST_AT_ONCE: f64 = 12.0;
+const MOST_OF_AVERAGE: f64 = 4.0;
 /// Work for the distortions of a tile.
 const WORK: f64 = 2000.0;
 /// Tiles that get new Gaussians from one poll of the observer to the next, and new Gaussians.
@@ -228,8 +236,10 @@ fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
 ///
 /// Where a tile has r times the mean distortion, and r is more than 1, each new Gaussian has 1/r of
 /// the area that it would have on average. Its variance is smaller by the square root of r: they
-/// overlap, but they converge. A variance smaller by r itself is too small to grow in a short run
-/// (0.5 dB less at effort 2).
+/// overlap, but they converge, up to [`MOST_OVERLAP`]. A variance smaller by r itself is too small to grow
+/// in a short run (0.5 dB less at effort 2).
+///
+/// Of a tile with more than its due, only a part counts, so there may be fewer than `count`.
 fn spread(
     count: usize,
     width: usize,
@@ -241,12 +251,16 @@ fn spread(
 ) -> Result<Vec<NewPosition>, EncodeError> {
     let total: f64 = sums.iter().copied().map(f64::from).sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
+    let average = count as f64 / sums.len() as f64;
+    let most = step * MOST_AT_ONCE.max(MOST_OF_AVERAGE * average);
+    // The part of a tile's distortion that counts.
+    let counted = |tile: usize| (most / f64::from(sums[tile])).min(1.0);
     // The tiles that contain a step, with the sum of all tiles before, and the first step in them.
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     let mut sum = 0.0;
     along_z([0, 0], [columns, rows], &mut |column, row| {
         let tile = row * columns + column;
-        let end = sum + f64::from(sums[tile]);
+        let end = sum + f64::from(sums[tile]).min(most);
         let next = ((sum / step - phase).ceil() + phase) * step;
         if end > next {
             found.push((tile, sum, next));
@@ -254,16 +268,17 @@ fn spread(
         sum = end;
     });
     let positions = observer.map(WORK, found.into_iter(), |(tile, mut sum, mut next)| {
-        let variance_share = (mean / f64::from(sums[tile])).sqrt().min(1.0) as f32;
+        let ratio = (mean / f64::from(sums[tile])).min(1.0);
+        let variance_share = ratio.sqrt().min(MOST_OVERLAP * ratio) as f32;
         let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;
         let mut positions = Vec::new();
-        let errors = errors(tile);
+        let (errors, counted) = (errors(tile), counted(tile));
         for (y, line) in errors.distortions.iter().enumerate() {
-            let end = sum + sum_of(line);
+            let end = sum + counted * sum_of(line);
             // Few lines contain a step.
             if end > next {
                 for (x, &value) in line.iter().enumerate() {
-                    sum += f64::from(value);
+                    sum += counted * f64::from(value);
                     // Pixels that are exact or outside the picture have no distortion.
                     if sum > next && value > 0.0 {
                         let pixel = (first + y * width + x) as u32;
@@ -410,6 +425,24 @@ mod tests {
                 _ => assert!(share > 0.0 && share <= 1.0, "{position:?}"),
             }
         }
+    }
+
+    #[test]
+    fn a_tile_gets_few_at_once() {
+        // One of 400 tiles has nearly all of the distortion.
+        let tiles = |tile| tile_of(0, |_| if tile == 21 { 1e6 } else { 1.0 });
+        let in_tile = |count: usize| {
+            let pixels = pixels(&spread(count, 20 * TILE_WIDTH, [20, 20], 0.5, tiles));
+            let inside = |pixel: &&u32| {
+                let (x, y) =
+                    (**pixel as usize % (20 * TILE_WIDTH), **pixel as usize / (20 * TILE_WIDTH));
+                [x / TILE_WIDTH, y / TILE_HEIGHT] == [1, 1]
+            };
+            pixels.iter().filter(inside).count()
+        };
+        assert_eq!(in_tile(5), 5);
+        assert_eq!(in_tile(400), MOST_AT_ONCE as usize);
+        assert_eq!(in_tile(4000), 10 * MOST_OF_AVERAGE as usize);
     }
 
     #[test]
