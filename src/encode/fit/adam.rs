@@ -18,6 +18,11 @@ pub(super) struct State {
 impl State {
     pub(super) const NEW: Self =
         Self { mean: [0.0; MAX_COMPONENTS], square: [0.0; MAX_COMPONENTS], age: 0 };
+
+    /// Makes the next steps a quarter as large. The squares forget it.
+    pub(super) fn slow_down(&mut self) {
+        self.square = self.square.map(|square| 16.0 * square);
+    }
 }
 
 /// One step for one Gaussian.

@@ -22,6 +22,7 @@ const FIRST_PACE: f32 = 0.4;
 /// The change of the pace, and its range.
 const FASTER: f32 = 1.2;
 const SLOWER: f32 = 0.8;
+const MUCH_SLOWER: f32 = 0.25;
 const LEAST_PACE: f32 = 0.02;
 const MOST_PACE: f32 = 3.0;
 
@@ -39,6 +40,11 @@ pub(super) struct State {
 impl State {
     pub(super) const NEW: Self =
         Self { mean: [0.0; MAX_COMPONENTS], pace: FIRST_PACE, weight: 0.0 };
+
+    /// Makes the next steps smaller after a setback, without waiting for the gradient to turn round.
+    pub(super) fn slow_down(&mut self) {
+        self.pace *= MUCH_SLOWER;
+    }
 }
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by

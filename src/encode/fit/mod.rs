@@ -3,6 +3,7 @@
 mod adam;
 mod bins;
 pub(crate) mod budget;
+mod checkpoint;
 mod densify;
 mod distortion_map;
 mod gauss_newton;
@@ -22,6 +23,7 @@ use glam::Vec2;
 
 use bins::reset;
 use budget::Budget;
+use checkpoint::Checkpoint;
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use parameters::Parameters;
@@ -75,7 +77,7 @@ pub(crate) struct Fit<'a> {
     /// Those of quantization-aware training, once it has started.
     quantizers: Option<LsqQuantizers>,
     /// The state of least error since Gaussians were last added or removed.
-    best: Option<Snapshot>,
+    best: Option<Checkpoint>,
     pass: Pass,
     /// Passes for which the present bins remain valid.
     binned_for: u32,
@@ -87,14 +89,6 @@ pub(crate) struct Fit<'a> {
     error: RenderingError,
     work: Work,
     rng: fastrand::Rng,
-}
-
-/// A state of training that can be written to a file.
-#[derive(Clone, Debug)]
-struct Snapshot {
-    error: RenderingError,
-    rows: Vec<Row>,
-    quantizers: Option<LsqQuantizers>,
 }
 
 impl<'a> Fit<'a> {
@@ -154,7 +148,7 @@ impl<'a> Fit<'a> {
             let done = iteration + 1;
             let growths_left = plan.growths_left(done);
             let grows = growths_left.is_some();
-            self.iterate(factor, total, plan.is_settled(iteration), grows, observer)?;
+            self.iterate(factor, total, grows, observer)?;
             if done % densification.prune_interval == 0 {
                 self.prune(observer)?;
             }
@@ -198,7 +192,7 @@ impl<'a> Fit<'a> {
         for iteration in 0..iterations {
             observer.advance(workload.iteration(1.0))?;
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
-            self.iterate(factor, total, true, false, observer)?;
+            self.iterate(factor, total, false, observer)?;
         }
         self.settle(observer)
     }
@@ -206,8 +200,8 @@ impl<'a> Fit<'a> {
     /// The best Gaussians so far as codes of the packed coding: those of the trained quantizers, or
     /// floats.
     pub(crate) fn fitted(&self) -> PackedCodes {
-        let empty = Snapshot { error: self.error, rows: Vec::new(), quantizers: None };
-        let Snapshot { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
+        let empty = Checkpoint::new();
+        let Checkpoint { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
         match quantizers {
             Some(quantizers) => PackedCodes {
                 quantizers: quantizers.stored(),
@@ -290,21 +284,22 @@ impl<'a> Fit<'a> {
     }
 
     /// One iteration: a pass, and a step of the optimizer, where `factor` scales all learning
-    /// rates. `iterations` is how many are planned in total, for the progress report. If `settled`,
-    /// the state before the step may become the best so far; `grows` tells that Gaussians are added
-    /// after it.
+    /// rates. `iterations` is how many are planned in total, for the progress report; `grows` tells that
+    /// Gaussians are added after it.
     fn iterate(
         &mut self,
         factor: f32,
         iterations: u32,
-        settled: bool,
         grows: bool,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         self.forward(grows, observer)?;
-        if settled {
-            self.keep_if_best();
+        let samples = self.raster.pixels() * self.raster.channels;
+        if self.best.as_ref().is_some_and(|best| best.is_lost(self.error, samples)) {
+            self.return_to_best();
+            self.forward(grows, observer)?;
         }
+        self.keep_if_best();
         observer.report(self.work.iterations, iterations, self.len(), self.psnr())?;
         self.work.iterations += 1;
         self.step(factor, grows, observer)?;
@@ -536,20 +531,24 @@ impl<'a> Fit<'a> {
 
     /// Keeps a copy of the values of the last pass if their error is the least so far.
     fn keep_if_best(&mut self) {
-        let is_better = |best: &Snapshot| self.error.distortion < best.error.distortion;
-        if self.best.as_ref().is_none_or(is_better) {
-            let best = self.best.get_or_insert_with(|| Snapshot {
-                error: self.error,
-                rows: Vec::new(),
-                quantizers: None,
-            });
-            best.error = self.error;
-            // `clone_from` would allocate more memory than needed.
-            best.rows.clear();
-            best.rows.reserve_exact(self.parameters.len());
-            best.rows.extend_from_slice(&self.parameters.values);
-            best.quantizers.clone_from(&self.quantizers);
+        let best = self.best.get_or_insert_with(Checkpoint::new);
+        if self.error.distortion < best.error.distortion {
+            let (tiles, rows) = (self.pass.tile_distortions(), &self.parameters.values);
+            best.set(self.error, tiles, rows, self.quantizers.as_ref());
         }
+    }
+
+    /// Takes the values of the best state again after a setback, and smaller steps from there where the
+    /// distortion rose.
+    fn return_to_best(&mut self) {
+        let Some(best) = &mut self.best else { return };
+        let blamed = best.blamed(self.pass.tile_distortions());
+        self.parameters.values.copy_from_slice(&best.rows);
+        self.quantizers.clone_from(&best.quantizers);
+        let pass = &self.pass;
+        self.parameters.slow_down(|row| blamed[pass.tile_near([row[0], row[1]])]);
+        self.binned_for = 0;
+        self.has_splats = false;
     }
 
     /// PSNR of the last pass, in dB.

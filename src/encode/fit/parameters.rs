@@ -54,6 +54,11 @@ impl Parameters {
         self.values = values;
     }
 
+    /// Lets the Gaussians for whose row `is_slow` is true take smaller steps.
+    pub(crate) fn slow_down(&mut self, is_slow: impl Fn(&Row) -> bool) {
+        self.states.slow_down(|index| is_slow(&self.values[index]));
+    }
+
     /// Removes the Gaussians for whose index `keep` is false.
     pub(crate) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         retain(&mut self.values, &keep);

@@ -56,6 +56,8 @@ pub(crate) struct Pass {
     slots: Vec<Slot>,
     /// The distortion of every tile, if the last pass measured it.
     distortions: Vec<f32>,
+    /// What the last pass minimizes, by tile, row by row.
+    tile_distortions: Vec<f32>,
     /// The error of every row of tiles.
     row_errors: Vec<RenderingError>,
 }
@@ -70,6 +72,7 @@ impl Pass {
             bins: RowBins::new(region),
             slots: Vec::new(),
             distortions: Vec::new(),
+            tile_distortions: vec![0.0; rows * raster.width.div_ceil(TILE_WIDTH)],
             row_errors: vec![RenderingError::default(); rows],
         }
     }
@@ -161,6 +164,19 @@ impl Pass {
         &self.distortions
     }
 
+    /// What the last pass minimizes, the distortion of every tile, row by row.
+    pub(crate) fn tile_distortions(&self) -> &[f32] {
+        &self.tile_distortions
+    }
+
+    /// The index of the tile at a position in pixels, or of the nearest one inside the picture.
+    pub(crate) fn tile_near(&self, [x, y]: [f32; 2]) -> usize {
+        // Casts saturate.
+        let (column, row) = (x as usize / TILE_WIDTH, y as usize / TILE_HEIGHT);
+        let (columns, rows) = (self.bins.columns(), self.bins.rows());
+        row.min(rows - 1) * columns + column.min(columns - 1)
+    }
+
     /// Whether a splat touches the picture, by the present bins.
     pub(crate) fn touches(&self, splat: usize) -> bool {
         !self.bins.spans_of(splat).is_empty()
@@ -170,7 +186,7 @@ impl Pass {
     pub(crate) fn memory(&self) -> usize {
         self.bins.memory()
             + self.slots.capacity() * size_of::<Slot>()
-            + self.distortions.capacity() * size_of::<f32>()
+            + (self.distortions.capacity() + self.tile_distortions.len()) * size_of::<f32>()
     }
 
     fn run_of<const CHANNELS: usize>(
@@ -189,34 +205,37 @@ impl Pass {
         self.distortions.resize(if measure.is_some() { tiles } else { 0 }, 0.0);
         let mut slots = &mut self.slots[..];
         let mut distortions = &mut self.distortions[..];
-        let rows = bins.tile_rows().iter().zip(&mut self.row_errors).enumerate();
-        let rows = rows.map(|(row, (tiles, error))| {
+        let by_tile = self.tile_distortions.chunks_exact_mut(bins.columns());
+        let rows = bins.tile_rows().iter().zip(&mut self.row_errors).zip(by_tile).enumerate();
+        let rows = rows.map(|(row, ((tiles, error), by_tile))| {
             let slots = slots
                 .split_off_mut(..bins.spans(row).len() * per_span)
                 .expect("there are slots for all rows");
             let of_row = if measure.is_some() { bins.columns() } else { 0 };
             let distortions =
                 distortions.split_off_mut(..of_row).expect("there is one for each tile");
-            (row, tiles, slots, distortions, error)
+            (row, tiles, slots, distortions, by_tile, error)
         });
         let level = self.level;
         type Scratch = (Vec<Splat>, Vec<TileState>);
         let work = work / bins.rows() as f64;
         observer.map_with(work, rows, |(of_row, states): &mut Scratch, item| {
-            let (row, tiles, slots, distortions, error) = item;
+            let (row, tiles, slots, distortions, by_tile, error) = item;
             of_row.clear();
             of_row.extend(bins.spans(row).iter().map(|span| splats[span.splat as usize]));
             let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
             slots.fill(Slot::default());
             *error = RenderingError::default();
-            for column in 0..bins.columns() {
+            for (column, by_tile) in by_tile.iter_mut().enumerate() {
                 let indices = tiles.spans(column);
                 let tile = TrainingTile::new(raster, [column, row], base, of_row, indices);
                 if states.len() < indices.len() {
                     states.resize(indices.len(), TileState::ZERO);
                 }
                 let states = &mut states[..indices.len()];
-                *error = *error + tile.run(level, kernel, states, slots, &mut planes);
+                let of_tile = tile.run(level, kernel, states, slots, &mut planes);
+                *by_tile = of_tile.distortion as f32;
+                *error = *error + of_tile;
                 if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
                     let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
                     let plane = distortion_map::of_tile(raster, corner, &planes, measure);

@@ -36,12 +36,6 @@ impl TrainingSchedule {
         }
     }
 
-    /// Whether an iteration's Gaussians may become those of the file, because none will be added or
-    /// culled any more.
-    pub(crate) fn is_settled(&self, iteration: u32) -> bool {
-        iteration >= self.cull_end
-    }
-
     /// If Gaussians are added after `done` iterations: the number of growth steps that follow.
     pub(crate) fn growths_left(&self, done: u32) -> Option<u32> {
         let due = done.is_multiple_of(self.growth_interval) && done <= self.growth_end;
@@ -97,8 +91,6 @@ mod tests {
                 let last_cull = culls.last().map_or(0, |&(done, _)| done);
                 assert!(last_cull <= schedule.quantized_from, "{training:?}");
                 assert!(schedule.quantized_from < iterations, "{training:?}");
-                let settled = (0..iterations).find(|&iteration| schedule.is_settled(iteration));
-                assert_eq!(settled, Some(last_cull), "{training:?}");
             }
         }
     }

@@ -39,6 +39,16 @@ impl States {
         }
     }
 
+    /// Makes the steps smaller of Gaussians for whose index `is_slow` is true.
+    pub(super) fn slow_down(&mut self, is_slow: impl Fn(usize) -> bool) {
+        match self {
+            Self::Adam(_, states) => slow_down(states, is_slow, adam::State::slow_down),
+            Self::GaussNewton(_, states) => {
+                slow_down(states, is_slow, gauss_newton::State::slow_down);
+            }
+        }
+    }
+
     /// Removes the states for whose index `keep` is false.
     pub(super) fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         match self {
@@ -67,6 +77,11 @@ impl States {
 fn extend<T: Copy>(states: &mut Vec<T>, count: usize, new: T) {
     states.reserve_exact(count.saturating_sub(states.len()));
     states.resize(count, new);
+}
+
+fn slow_down<T>(states: &mut [T], is_slow: impl Fn(usize) -> bool, slow_down: impl Fn(&mut T)) {
+    let slow = states.iter_mut().enumerate().filter(|(index, _)| is_slow(*index));
+    slow.for_each(|(_, state)| slow_down(state));
 }
 
 /// The items at these indices in this order.
