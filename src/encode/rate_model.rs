@@ -8,7 +8,7 @@
 //! the squares that it adds to the picture.
 
 use super::options::Tune;
-use crate::coding::entropy::{Lattice, MAX_CLASS, to_axes};
+use crate::coding::entropy::{Lattice, MAX_CLASS, MOST_CODE, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
@@ -59,6 +59,17 @@ pub(crate) fn color_step(step: f64) -> f64 {
 /// distortion.
 pub(crate) fn step_for(distortion: f64, count: usize) -> f64 {
     0.5 * (SQUARED_STEP * distortion / count.max(1) as f64).log2()
+}
+
+/// The base-2 logarithm of the least step of colour with which all of these Gaussians have codes.
+pub(crate) fn least_step(gaussians: &[Gaussian], model: ColorModel) -> f64 {
+    let strength = |gaussian: &Gaussian| {
+        let [l11, _, l22] = gaussian.cholesky;
+        let axes = to_axes(gaussian.color, model);
+        axes.iter().fold(0.0, |most: f32, axis| most.max(axis.abs())) * (l11 * l22).sqrt()
+    };
+    let strongest = gaussians.iter().map(strength).fold(0.0, f32::max);
+    f64::from(strongest / MOST_CODE).log2()
 }
 
 /// The base-2 logarithm of the step of colour for a Lagrange multiplier in squared error per bit,

@@ -18,6 +18,9 @@ use crate::simd::Backend;
 const GEOMETRY: usize = 4;
 /// Largest precision class.
 pub(crate) const MAX_CLASS: u32 = 7;
+/// The largest code that the encoder rounds to.
+#[cfg(feature = "encode")]
+pub(crate) const MOST_CODE: f32 = 30_000.0;
 /// Most fraction bits of a position: the least position interval is 2^-6 pixels.
 const MAX_FRACTION_BITS: i32 = 6;
 /// Valid steps.
@@ -252,7 +255,7 @@ impl Lattice {
         model: ColorModel,
     ) -> Code {
         let scale = class_scale(class);
-        let nearest = |value: f32, step: f32| (value / step).round().clamp(-30_000.0, 30_000.0);
+        let nearest = |value: f32, step: f32| (value / step).round().clamp(-MOST_CODE, MOST_CODE);
         let [l11, l21, l22] = gaussian.cholesky;
         let size = nearest(0.5 * (l11 * l22).ln(), self.size.step * scale) as i32;
         let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio.step * scale) as i32;

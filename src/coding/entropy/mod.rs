@@ -22,7 +22,7 @@ pub(crate) use cells::CenterGrid;
 pub(crate) use lattice::Lattice;
 pub use lattice::LatticeSteps;
 #[cfg(feature = "encode")]
-pub(crate) use lattice::{Code, LatticeCodes, MAX_CLASS, to_axes};
+pub(crate) use lattice::{Code, LatticeCodes, MAX_CLASS, MOST_CODE, to_axes};
 #[cfg(feature = "encode")]
 pub(crate) use layer::EncodedLayer;
 pub(crate) use layer::{LAYER_PREFIX, LayerCoder};

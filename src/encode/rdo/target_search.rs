@@ -95,11 +95,13 @@ impl<'a> TargetSearch<'a> {
             Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             _ => rate_model::step_for(distortion, gaussians.len()),
         };
+        let least = rate_model::least_step(gaussians, self.layout.header().color);
+        let step = step.max(least);
         observer.expect(self.work.whole());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             return Ok(self.descended(gaussians, step, self.work.passes, observer)?.coded);
         };
-        let finest = step + FINEST;
+        let finest = (step + FINEST).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
