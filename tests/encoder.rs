@@ -42,6 +42,26 @@ fn textured(width: u32, height: u32) -> Vec<u8> {
     scene.iter().zip(noise).map(|(sample, noise)| sample.saturating_add(noise / 8)).collect()
 }
 
+/// A dark picture with faint texture and bright lamps, or a red one with a spot of fine texture: a few
+/// places have nearly all of the error.
+fn spotted(width: u32, height: u32, is_dark: bool) -> Vec<u8> {
+    let lamps = [(30.0, 25.0, 3.0), (150.0, 40.0, 5.0), (80.0, 90.0, 4.0), (120.0, 100.0, 6.0)];
+    let pixel = |x: f32, y: f32| {
+        if is_dark {
+            let is_lit =
+                |&(left, top, radius): &(f32, f32, f32)| (x - left).hypot(y - top) < radius;
+            let faint = 6.0 + 4.0 * (x / 9.0).sin() * (y / 7.0).sin();
+            if lamps.iter().any(is_lit) { [255.0, 220.0, 150.0] } else { [faint; 3] }
+        } else if (x - 90.0).hypot(y - 60.0) < 16.0 {
+            [127.0 + 127.0 * (1.3 * x).sin() * (1.1 * y).sin(); 3]
+        } else {
+            [250.0, 10.0 + 5.0 * (x / 20.0).sin(), 0.0]
+        }
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x as f32, y as f32)));
+    pixels.flat_map(|(x, y)| pixel(x, y)).map(|value| value.round() as u8).collect()
+}
+
 /// Pseudo-random samples.
 fn noise(count: usize) -> Vec<u8> {
     let mut state = 1_u32;
@@ -578,7 +598,7 @@ fn what_a_target_does_not_reach_is_told() {
     // iterations, and it is not nearly as good.
     let large = encoded(&noise, Target::BitsPerPixel(1000.0));
     let report = &large.report;
-    let as_large = Shortfall::SizeBelow { bytes: large.bytes.len(), gaussians: report.gaussians };
+    let as_large = Shortfall::SizeUnused { bytes: large.bytes.len(), gaussians: report.gaussians };
     assert_eq!(report.shortfall, Some(as_large));
     assert_eq!(report.iterations, 60);
     // Where Gaussians bring nothing, a large file is not written.
@@ -603,6 +623,26 @@ fn what_a_target_does_not_reach_is_told() {
     ] {
         let text = shortfall.expect("just seen").to_string();
         assert!(text.contains(&said), "{text}");
+    }
+}
+
+#[test]
+fn more_bits_and_more_effort_give_no_worse_picture() {
+    let (width, height) = (384, 256);
+    for is_dark in [true, false] {
+        let samples = spotted(width, height, is_dark);
+        let source = Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("sizes agree");
+        for tune in [Tune::Visual, Tune::Psnr] {
+            let psnr = |effort, rate| {
+                let encoder = quick(Target::BitsPerPixel(rate)).with_effort(effort).with_tune(tune);
+                encoder.encode(&source).expect("it encodes").report.psnr
+            };
+            let psnrs = [psnr(1, 0.3), psnr(1, 0.6), psnr(2, 0.6)];
+            // Above this, nothing but the rounding to samples is left of the error.
+            let is_no_worse = |pair: &[f64]| pair[1].min(58.9) >= pair[0].min(58.9) - 0.1;
+            assert!(psnrs.windows(2).all(is_no_worse), "dark: {is_dark}, {tune:?}: {psnrs:?}");
+            assert!(psnrs[0] > 40.0, "dark: {is_dark}, {tune:?}: {psnrs:?}");
+        }
     }
 }
 

@@ -45,17 +45,20 @@ pub(crate) struct Outcome {
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
     verify::check_limits(job)?;
     let outcome = encode_for_target(job, Work::default(), observer)?;
-    let pixels = job.pixels();
-    let is_large = outcome.gaussians as usize > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
-    if job.target.bytes(pixels).is_none() || !is_large {
+    let (pixels, gaussians) = (job.pixels(), outcome.gaussians as usize);
+    let is_large = gaussians > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
+    // An effort that finds no use for the bytes may have begun with too many Gaussians.
+    let is_unused = matches!(outcome.shortfall, Some(Shortfall::SizeUnused { .. }));
+    let Some(most_bytes) = job.target.bytes(pixels).filter(|_| is_large || is_unused) else {
         return Ok(outcome);
-    }
-    let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).max(1);
+    };
+    let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
     let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
     let modest = encode_for_target(&modest_job, outcome.work, observer)?;
     let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
     let gain = outcome.distortion.psnr - modest.distortion.psnr;
-    if gain >= LEAST_GAIN * doublings {
+    let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
+    if gain >= least || modest.file.len() as u64 > most_bytes {
         return Ok(Outcome { work: modest.work, ..outcome });
     }
     let (bytes, gaussians) = (modest.file.len(), modest.gaussians);
@@ -107,7 +110,9 @@ fn encode_for_target(
     // The estimate of an exact copy would have rounding errors.
     let is_exact = distortion.psnr == f64::INFINITY;
     let quality = if is_exact { 100.0 } else { quality::quality(dissimilarity).max(0.0) };
-    let reached = Reached { bytes: file.len(), psnr: distortion.psnr, quality, gaussians };
+    let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
+    let reached =
+        Reached { bytes: file.len(), psnr: distortion.psnr, exact_psnr, quality, gaussians };
     let shortfall = Shortfall::of(target, job.pixels(), reached);
     Ok(Outcome { file, work, gaussians, distortion, quality, shortfall })
 }

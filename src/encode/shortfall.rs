@@ -49,7 +49,18 @@ pub enum Shortfall {
         /// Gaussians in the file.
         gaussians: u32,
     },
+    /// The file is smaller than its target, and the picture could be better, but this effort finds no use
+    /// for more bytes.
+    SizeUnused {
+        /// Bytes of the file.
+        bytes: usize,
+        /// Gaussians in the file.
+        gaussians: u32,
+    },
 }
+
+/// Bytes that one more Gaussian may need.
+const BYTES_OF_GAUSSIAN: f64 = 24.0;
 
 /// What a file has reached.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +68,8 @@ pub(crate) struct Reached {
     pub(crate) bytes: usize,
     /// In dB.
     pub(crate) psnr: f64,
+    /// The PSNR in dB of a picture of which nothing but the rounding to samples is left.
+    pub(crate) exact_psnr: f64,
     /// From 0 to 100.
     pub(crate) quality: f64,
     pub(crate) gaussians: u32,
@@ -65,7 +78,7 @@ pub(crate) struct Reached {
 impl Shortfall {
     /// That of a file; `None` if it meets its target.
     pub(crate) fn of(target: Target, pixels: usize, reached: Reached) -> Option<Self> {
-        let Reached { bytes, psnr, quality, gaussians } = reached;
+        let Reached { bytes, psnr, exact_psnr, quality, gaussians } = reached;
         if let Target::Psnr(target) = target {
             return if psnr < target {
                 Some(Self::PsnrBelow { psnr })
@@ -82,8 +95,17 @@ impl Shortfall {
                 is_above.then_some(Self::QualityAbove { quality, gaussians })
             };
         }
-        let least = target.bytes(pixels)? as f64 * SIZE_TOLERANCE;
-        ((bytes as f64) < least).then_some(Self::SizeBelow { bytes, gaussians })
+        let most = target.bytes(pixels)? as f64;
+        let missing = most - bytes as f64;
+        if missing <= (1.0 - SIZE_TOLERANCE) * most {
+            return None;
+        }
+        let is_needless = psnr >= exact_psnr || missing < BYTES_OF_GAUSSIAN;
+        Some(if is_needless {
+            Self::SizeBelow { bytes, gaussians }
+        } else {
+            Self::SizeUnused { bytes, gaussians }
+        })
     }
 }
 
@@ -109,6 +131,10 @@ impl fmt::Display for Shortfall {
             Self::SizeBelow { bytes, gaussians } => write!(
                 f,
                 "{gaussians} Gaussians, {bytes} bytes, are what the picture needs or the size holds"
+            ),
+            Self::SizeUnused { bytes, gaussians } => write!(
+                f,
+                "{gaussians} Gaussians, {bytes} bytes, are all that this effort finds use for"
             ),
         }
     }
