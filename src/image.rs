@@ -65,7 +65,8 @@ pub fn register() -> bool {
 }
 
 /// Decodes `.gip` for `image`: an [`ImageDecoder`] and [`ImageDecoderRect`] over any reader. The
-/// samples have the file's own colour model and depth.
+/// samples have the file's own colour model and depth, and the picture is as stored:
+/// [`ImageDecoder::orientation`] tells how to turn it for display.
 ///
 /// A file that ends too early is an error. For the picture of the Gaussians that have arrived, use
 /// [`Decoder`].
@@ -292,6 +293,10 @@ mod encoder {
 
     /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and
     /// RGB pictures with or without alpha.
+    ///
+    /// The metadata are those of [`Encoder::with_metadata`], with the profile and the Exif that are set here
+    /// in the place of its own. Only they can have XMP, of which `image` has no method. Nothing is filtered
+    /// or reset.
     ///
     /// ```no_run
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -150,7 +150,11 @@ impl Encoder {
         self
     }
 
-    /// The ICC profile, Exif, XMP and texts to store with the picture. Default: none.
+    /// The ICC profile, Exif, XMP and texts to store with the picture, as they are. Default: none.
+    /// `Metadata::retain` (feature `metadata`) drops what is private before.
+    ///
+    /// An orientation in Exif says how the samples are to be turned for display. Of samples that have been
+    /// turned, `Metadata::reset_orientation` says so.
     pub fn with_metadata(mut self, metadata: Metadata) -> Self {
         self.metadata = metadata;
         self

@@ -168,6 +168,17 @@ fn what_is_turned_is_reset_in_exif_and_xmp() {
     assert_eq!(room.json(&["info", "a.gip", "--json"])["width"], 30);
     assert_eq!(xmp_of("a.gip"), (xmp(6), 1));
 
+    // Some programs write the prefix of JPEG's Exif into other formats.
+    let mut webp = Vec::new();
+    let mut encoder = image::codecs::webp::WebPEncoder::new_lossless(&mut webp);
+    let prefixed = [b"Exif\0\0", &exif(6, true)[..]].concat();
+    encoder.set_exif_metadata(prefixed).expect("WebP has Exif");
+    picture.write_with_encoder(encoder).expect("in memory");
+    room.write("prefix.webp", webp);
+    encode("prefix.webp");
+    let info = room.json(&["info", "a.gip", "--json"]);
+    assert_eq!((&info["width"], &info["orientation"]), (&20.into(), &1.into()));
+
     // A .gip that is stored turned is a source as any other.
     room.write("turned.gip", gip(Some(exif(6, false)), Some(xmp(6))));
     encode("turned.gip");

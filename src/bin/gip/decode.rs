@@ -3,7 +3,6 @@
 use std::io::Read;
 
 use anyhow::{Context, Result, anyhow};
-use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer, Pixel};
 use image_gip::{
     ColorModel, DecodeError, Decoder, Header, Metadata, MetadataPolicy, Picture, RenderOptions,
@@ -63,8 +62,7 @@ fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<Stil
 /// metadata as was asked for and the format takes. Without a policy, which is for thumbnails, it has what is safe,
 /// and nobody misses what the format does not take.
 pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
-    let orientation = picture.metadata.orientation().to_exif();
-    picture.make_upright(Orientation::from_exif(orientation).expect("both have those of Exif"));
+    picture.make_upright(picture.metadata.orientation());
     picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));
     picture.drop_foreign_profile();
     let dropped = codec.drop_unwritable(&mut picture.metadata);

@@ -1,8 +1,7 @@
 //! Pictures in memory, and converting their colour model and depth.
 
 use image::DynamicImage;
-use image::metadata::Orientation;
-use image_gip::{ColorModel, Metadata, MetadataPolicy, SampleDepth};
+use image_gip::{ColorModel, Metadata, MetadataPolicy, Orientation, SampleDepth};
 
 /// An upright picture, its metadata, and what was lost on the way to it.
 #[derive(Debug)]
@@ -26,7 +25,8 @@ impl StillImage {
     /// again. Metadata of a picture that is upright stays as it is.
     pub(crate) fn make_upright(&mut self, orientation: Orientation) {
         if orientation != Orientation::NoTransforms {
-            self.image.apply_orientation(orientation);
+            let turn = image::metadata::Orientation::from_exif(orientation.to_exif());
+            self.image.apply_orientation(turn.expect("both have the eight of Exif"));
             self.metadata.reset_orientation();
         }
     }

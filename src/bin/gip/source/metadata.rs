@@ -1,11 +1,11 @@
-//! The metadata of a picture.
+//! The metadata of a picture, and how it is to be turned.
 
 use std::io::Cursor;
 
 use exif::experimental::Writer;
 use exif::{In, Reader, Tag};
 use image::{ImageDecoder, ImageFormat, ImageResult};
-use image_gip::{Metadata, MetadataLoss};
+use image_gip::{Metadata, MetadataLoss, Orientation};
 
 use super::extended_xmp;
 
@@ -29,6 +29,19 @@ const TAGS_OF_TIFF: [Tag; 17] = [
     Tag::SubSecTimeOriginal,
     Tag::SubSecTimeDigitized,
 ];
+
+/// How a picture is to be turned, which a TIFF says by a tag and all others by their Exif.
+pub(super) fn orientation(
+    decoder: &mut impl ImageDecoder,
+    format: Option<ImageFormat>,
+    metadata: &Metadata,
+) -> ImageResult<Orientation> {
+    if format != Some(ImageFormat::Tiff) {
+        // The decoders of `image` know nothing of the prefix that was removed.
+        return Ok(metadata.orientation());
+    }
+    Ok(Orientation::from_exif(decoder.orientation()?.to_exif()).unwrap_or_default())
+}
 
 /// Reads the metadata of a file before its pixels.
 pub(super) fn read(

@@ -41,8 +41,8 @@ fn decode(path: &Path, file: &[u8]) -> Result<StillImage> {
     limits.reserve(decoder.total_bytes())?;
     decoder.set_limits(limits)?;
 
-    let orientation = decoder.orientation()?;
     let (metadata, loss) = metadata::read(&mut decoder, format, file)?;
+    let orientation = metadata::orientation(&mut decoder, format, &metadata)?;
     let image = stored_samples(DynamicImage::from_decoder(decoder)?);
     let warnings = warnings.into_iter().chain(loss.map(|loss| loss.to_string())).collect();
     let mut picture = StillImage { image, metadata, warnings };
