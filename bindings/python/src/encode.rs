@@ -29,7 +29,7 @@ const NEWS: f64 = 0.002;
 /// lock is released meanwhile, and Ctrl-C ends it.
 ///
 /// At most one target may be given; without any of them it is quality=75. A file that cannot meet its
-/// target comes as close as it can; where that means less PSNR or quality than asked for, there is a
+/// target comes as close as it can; where that means less PSNR or quality than that, there is a
 /// ShortfallWarning.
 ///
 /// Args:
@@ -118,10 +118,8 @@ pub(crate) fn encode<'py>(
     let encoded = py
         .detach(|| run(&encoder, &source, threads, progress.as_ref()))?
         .map_err(|error| encode_error(py, &error))?;
-    let asked = !matches!(target, Target::Auto);
-    if asked
-        && let Some(shortfall @ (Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })) =
-            encoded.report.shortfall
+    if let Some(shortfall @ (Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })) =
+        encoded.report.shortfall
     {
         warn(py, "ShortfallWarning", &shortfall.to_string())?;
     }

@@ -180,6 +180,14 @@ def test_a_target_out_of_reach(photo: Picture) -> None:
     assert image_gip.decode(file).shape == (16, 16, 3)
 
 
+def test_the_default_quality_out_of_reach() -> None:
+    noise = np.random.default_rng(1).integers(0, 256, (64, 64, 3), np.uint8)
+    with pytest.warns(image_gip.ShortfallWarning, match="quality .* is what this effort and"):
+        file = image_gip.encode(noise, effort=1, precision="packed")
+    with pytest.warns(image_gip.ShortfallWarning):
+        assert image_gip.encode(noise, effort=1, precision="packed", quality=75) == file
+
+
 def test_the_number_of_threads_does_not_show(photo: Picture) -> None:
     files = {image_gip.encode(photo, effort=2, threads=threads) for threads in (1, 2, 3)}
     assert len(files) == 1

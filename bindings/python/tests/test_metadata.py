@@ -100,6 +100,15 @@ def test_pillow_keeps_what_avif_does(options: dict[str, Any], inherited: dict[st
         assert found.getxmp() == expected.getxmp()
 
 
+def test_texts_in_pillow() -> None:
+    file = saved(Image.fromarray(draw(20, 10, 3)), texts=TEXTS)
+    with Image.open(file) as opened:
+        assert opened.info["texts"] == tuple(TEXTS.items())
+        assert image_gip.info(saved(opened).getvalue()).texts == ()
+        again = saved(opened, texts=opened.info["texts"])
+    assert image_gip.info(again.getvalue()).texts == tuple(TEXTS.items())
+
+
 def test_there_and_back_in_pillow() -> None:
     file = saved(Image.fromarray(draw(20, 10, 3)), exif=exif(), xmp=XMP, icc_profile=OTHER)
     with Image.open(file) as opened:

@@ -61,7 +61,7 @@ def test_premultiplied_alpha_becomes_straight(mode: str, straight: str) -> None:
 def test_a_transparent_colour_becomes_alpha(mode: str, expected: str) -> None:
     image = Image.fromarray(draw(40, 30, 3)).convert(mode)
     image.info["transparency"] = image.getpixel((5, 5))
-    assert stored(image).mode == expected
+    assert stored(image, gaussians=50).mode == expected
 
 
 def test_a_transparent_colour_of_16_bits() -> None:

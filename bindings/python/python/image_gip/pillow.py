@@ -64,6 +64,8 @@ class GipImageFile(ImageFile.ImageFile):
             self.info["exif"] = b"Exif\0\0" + header.exif
         if header.xmp is not None:
             self.info["xmp"] = header.xmp
+        if header.texts:
+            self.info["texts"] = header.texts
         self._set_size(header.size, is_draft=False)
 
     def _set_size(self, size: tuple[int, int], *, is_draft: bool) -> None:
