@@ -3,13 +3,17 @@
 mod batch;
 mod batch_inputs;
 mod batch_recovery;
+mod colors;
 mod commands;
 #[path = "../common/mod.rs"]
 mod common;
+mod damage;
 mod frames;
 mod jpeg;
+mod limits;
 mod metadata;
 mod orientation;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod room;
+mod tiff;

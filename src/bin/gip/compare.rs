@@ -10,13 +10,14 @@ use crate::args;
 use crate::encode::json_psnr;
 use crate::files;
 use crate::picture::{SampleSlice, StillImage, widest};
-use crate::source;
+use crate::source::Reading;
 
 pub(crate) fn run(args: &args::Compare) -> Result<()> {
     if files::is_standard_stream(&args.a) && files::is_standard_stream(&args.b) {
         bail!("only one of the two pictures can come from standard input");
     }
-    let (mut a, mut b) = (source::read(&args.a)?, source::read(&args.b)?);
+    let reading = Reading { limits: args.limits.limits(), allow_partial: false };
+    let (mut a, mut b) = (reading.read(&args.a)?, reading.read(&args.b)?);
     files::warn(&args.a, &a.warnings);
     files::warn(&args.b, &b.warnings);
     let size = |picture: &StillImage| (picture.image.width(), picture.image.height());

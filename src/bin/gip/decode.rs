@@ -2,11 +2,11 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
 use image::{DynamicImage, ImageBuffer, Pixel};
 use image_gip::{
-    ColorModel, DecodeError, Decoder, Header, Metadata, MetadataPolicy, Picture, RenderOptions,
-    RequestError, SampleDepth, StreamDecoder,
+    ColorModel, DecodeError, Decoder, Header, Limits, Metadata, MetadataPolicy, Picture,
+    RenderOptions, RequestError, SampleDepth, StreamDecoder,
 };
 
 use crate::args;
@@ -20,7 +20,14 @@ pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let file = files::read(&args.input)?;
     let mut picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
-        Err(_) if args.allow_partial => decode_partial(args, codec, &file),
+        Err(error) if args.allow_partial => {
+            let wanted = |header: &Header, metadata: &Metadata| {
+                Wanted::new(render_options(args, header, metadata)?, codec, header)
+            };
+            let partial = partial(&file, args.limits.limits(), wanted);
+            // Where the file is valid, the error is in the request.
+            partial.with_context(|| files::input_name(&args.input))?.ok_or(error)
+        }
         decoded => decoded,
     })?;
     finish(&mut picture, codec, Some(args.keep.policy().unwrap_or_default()));
@@ -31,7 +38,8 @@ pub(crate) fn run(args: &args::Decode) -> Result<()> {
 /// Decodes a valid file. Layers that are not visible in the region are skipped.
 fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> {
     let context = || files::input_name(&args.input);
-    let mut decoder = Decoder::new(file).with_context(context)?;
+    let limits = args.limits.limits();
+    let mut decoder = Decoder::new_with_limits(file, limits).with_context(context)?;
     let metadata = decoder.metadata().clone();
     let options = render_options(args, decoder.header(), &metadata).with_context(context)?;
     let wanted = Wanted::new(options, codec, decoder.header())?;
@@ -39,23 +47,20 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     Ok(StillImage { image, metadata, warnings: Vec::new() })
 }
 
-/// Decodes as many Gaussians of an invalid file as possible.
-fn decode_partial(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> {
-    let mut stream = StreamDecoder::new();
-    let Err(error) = stream.feed(file).and_then(|_| stream.finish()) else {
-        // The file is valid, so the error is in the request.
-        return decode(args, codec, file);
-    };
-    let Some(picture) = stream.picture() else {
-        return Err(error).context(files::input_name(&args.input));
-    };
+/// Decodes as many Gaussians of an invalid file as possible; `None` if the file is valid.
+pub(crate) fn partial(
+    file: &[u8],
+    limits: Limits,
+    wanted: impl FnOnce(&Header, &Metadata) -> Result<Wanted>,
+) -> Result<Option<StillImage>> {
+    let mut stream = StreamDecoder::new().with_limits(limits);
+    let Err(error) = stream.feed(file).and_then(|_| stream.finish()) else { return Ok(None) };
+    let Some(picture) = stream.picture() else { bail!(error) };
     let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
     let warnings = vec![format!("{error}; showing {shown} of {all} Gaussians")];
     let metadata = stream.metadata().clone();
-    let options = render_options(args, picture.header(), &metadata)?;
-    let wanted = Wanted::new(options, codec, picture.header())?;
-    let image = wanted.render(&picture)?;
-    Ok(StillImage { image, metadata, warnings })
+    let image = wanted(picture.header(), &metadata)?.render(&picture)?;
+    Ok(Some(StillImage { image, metadata, warnings }))
 }
 
 /// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, and with such
@@ -87,6 +92,12 @@ impl Wanted {
         let options = options.with_color(color);
         let (width, height) = options.output_size(header);
         Ok(Self { options, width, height, color, depth })
+    }
+
+    /// As [`Wanted::new`], with the colour model and depth of the file.
+    pub(crate) fn as_stored(options: RenderOptions, header: &Header) -> Self {
+        let (width, height) = options.output_size(header);
+        Self { options, width, height, color: header.color, depth: header.depth }
     }
 
     /// The pixels of the rendering.

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::args;
 use crate::files::{self, Output};
 use crate::picture::{SampleSlice, StillImage};
-use crate::source;
+use crate::source::Reading;
 
 /// What stands for an infinite PSNR in JSON, which has no infinity.
 const INFINITE_PSNR: f64 = 999.0;
@@ -24,11 +24,14 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
         check_name(&output)?;
     }
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
-    let mut picture = source::read(&args.input)?;
+    let limits = args.limits.limits();
+    let reading = Reading { limits: limits.clone(), allow_partial: args.allow_partial };
+    let mut picture = reading.read(&args.input)?;
     picture.retain_metadata(args.keep.policy().unwrap_or_default());
     files::warn(&args.input, &picture.warnings);
     let pool = args.threads.pool()?;
-    let encoded = pool.install(|| encode_with_bar(args.encoder.encoder(), &mut picture))?;
+    let encoder = args.encoder.encoder().with_limits(limits);
+    let encoded = pool.install(|| encode_with_bar(encoder, &mut picture))?;
     output.write(&encoded.bytes, times)?;
 
     let report = JsonReport::new(&picture, &encoded);

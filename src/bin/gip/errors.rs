@@ -3,6 +3,8 @@
 use image_gip::EncodeError;
 use thiserror::Error;
 
+use crate::limits;
+
 /// The user asked for something that makes no sense.
 #[derive(Debug, Error)]
 #[error("{0}")]
@@ -26,6 +28,10 @@ pub(crate) fn one_line(error: &anyhow::Error) -> String {
             }
             line.push_str(&cause);
         }
+    }
+    if let Some(advice) = limits::advice(error) {
+        line.push_str("; ");
+        line.push_str(&advice);
     }
     line
 }

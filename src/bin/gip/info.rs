@@ -15,7 +15,7 @@ use crate::files;
 pub(crate) fn run(args: &args::Info) -> Result<()> {
     let context = || files::input_name(&args.file);
     let bytes = files::read(&args.file)?;
-    let mut stream = StreamDecoder::new().with_statistics();
+    let mut stream = StreamDecoder::new().with_limits(args.limits.limits()).with_statistics();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
     let info = FileInfo::new(header, &stream, bytes.len());

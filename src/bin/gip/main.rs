@@ -11,6 +11,7 @@ mod encode;
 mod errors;
 mod files;
 mod info;
+mod limits;
 mod picture;
 mod source;
 
@@ -21,8 +22,6 @@ use clap::Parser;
 use args::{Args, Command};
 
 fn main() -> ExitCode {
-    // With this, `image` reads .gip too.
-    image_gip::register();
     let args = Args::parse();
     let success = |()| ExitCode::SUCCESS;
     let outcome = match args.command {

@@ -41,7 +41,12 @@ impl StillImage {
     /// of a CMYK picture that was converted to RGB.
     pub(crate) fn drop_foreign_profile(&mut self) {
         let expected: &[u8] = if self.color().channels() < 3 { b"GRAY" } else { b"RGB " };
-        self.metadata.icc_profile.take_if(|profile| profile.get(16..20) != Some(expected));
+        let is_foreign = |profile: &mut Vec<u8>| profile.get(16..20) != Some(expected);
+        if let Some(profile) = self.metadata.icc_profile.take_if(is_foreign) {
+            let space = String::from_utf8_lossy(profile.get(16..20).unwrap_or_default());
+            let space = space.trim().escape_debug().to_string();
+            self.warnings.push(format!("its ICC profile is one of {space} and cannot be kept"));
+        }
     }
 
     /// The colour model.

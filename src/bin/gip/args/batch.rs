@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::encode::EncoderArgs;
 use super::keep::Keep;
+use super::limits::LimitArgs;
 use super::values::{bounds, extension, number};
 
 /// Encodes or decodes many files and whole folders, one picture per core.
@@ -92,6 +93,12 @@ pub(crate) struct Batch {
     /// If a file is skipped that has no line, it gets one with what its result tells.
     #[arg(long, value_name = "FILE")]
     pub(crate) manifest: Option<PathBuf>,
+    /// Take what can be read of a file that is truncated or damaged, with a warning, instead of failing
+    /// with it.
+    #[arg(long)]
+    pub(crate) allow_partial: bool,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
     /// Decode .gip files; of a folder, only these are taken.
     #[arg(long, help_heading = "Decoding", group = "decoding",
           conflicts_with_all = EncoderArgs::IDS)]

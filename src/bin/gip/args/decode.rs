@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use image_gip::Region;
 
 use super::keep::Keep;
+use super::limits::LimitArgs;
 use super::values::{ThreadCount, number, region, size};
 
 /// Decodes a .gip file to a picture.
@@ -50,6 +51,8 @@ pub(crate) struct Decode {
     pub(crate) allow_partial: bool,
     #[command(flatten)]
     pub(crate) keep: Keep,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
     #[command(flatten)]
     pub(crate) threads: ThreadCount,
 }

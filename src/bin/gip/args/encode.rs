@@ -6,14 +6,21 @@ use clap::ValueEnum;
 use image_gip::{Encoder, Precision, Target, Tune};
 
 use super::keep::Keep;
+use super::limits::LimitArgs;
 use super::values::{ThreadCount, number};
 
 /// Encodes a picture as a .gip file.
 ///
 /// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS, ICO, farbfeld, OpenEXR, Radiance
 /// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
-/// Alpha is dropped if every pixel is opaque. Samples that are floats (OpenEXR, HDR) are taken as
-/// linear light, clipped, and stored as 16-bit sRGB.
+/// Alpha is dropped if every pixel is opaque. Of several pictures, the first is taken. Samples that are
+/// floats are clipped and stored with 16 bits: in OpenEXR and HDR they are linear light, and become
+/// sRGB; in TIFF they are from 0 to 1, like integers from 0 to their largest. CMYK, YCbCr and CIELAB
+/// become RGB.
+///
+/// Colours: an ICC profile is kept, if it is one of gray or RGB. What a PNG says by cICP, or by gAMA and
+/// cHRM, becomes a profile, or sRGB if it is only a gamma. What cannot be kept, such as PQ and HLG,
+/// is told.
 ///
 /// The picture is stored upright: an Exif orientation is applied to the pixels, and reset in Exif and XMP. ICC
 /// profile, Exif and XMP are stored; of the tags of a TIFF those of description, artist, copyright, camera, dates
@@ -35,6 +42,15 @@ pub(crate) struct Encode {
     /// Write OUTPUT even if its name does not end in .gip.
     #[arg(long)]
     pub(crate) force: bool,
+    /// If INPUT is truncated or damaged, encode what can be read of it, and print a warning, instead of
+    /// failing.
+    ///
+    /// PNG, JPEG, TIFF, GIF, .gip and formats without compression are shown as far as they go. Damage
+    /// in the middle of a JPEG is noticed where it changes how many data the picture takes.
+    #[arg(long)]
+    pub(crate) allow_partial: bool,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
     #[command(flatten)]
     pub(crate) keep: Keep,
     #[command(flatten)]

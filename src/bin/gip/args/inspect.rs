@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::limits::LimitArgs;
+
 /// Shows what a .gip file contains.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Info {
@@ -18,6 +20,8 @@ pub(crate) struct Info {
     /// is null.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
 }
 
 /// Measures how much two pictures differ.
@@ -39,4 +43,6 @@ pub(crate) struct Compare {
     /// pictures, which is infinite, is given as 999.
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) limits: LimitArgs,
 }

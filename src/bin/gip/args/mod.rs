@@ -6,6 +6,7 @@ mod decode;
 mod encode;
 mod inspect;
 mod keep;
+mod limits;
 mod values;
 
 pub(crate) use batch::Batch;

@@ -246,6 +246,8 @@ fn is_disk_full(error: &Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::source::Reading;
+    use image_gip::Limits;
 
     #[test]
     fn a_panic_is_an_error_with_the_name_of_the_file() {
@@ -272,7 +274,9 @@ mod tests {
     #[cfg(unix)]
     fn a_source_that_changes_while_it_is_read_has_no_result() {
         let room = tempfile::tempdir().expect("a place for temporary files");
-        let task = Task::Decode { extension: "png".into(), bounds: None, policy: None };
+        let reading = Reading { limits: Limits::default(), allow_partial: false };
+        let extension = "png".into();
+        let task = Task::Decode { extension, reading, bounds: None, policy: None };
         let (budget, stop) = (Budget::new(1), Stop::default());
         let (items, rest, preserve_times) = (Vec::new(), Rest::default(), false);
         let batch = Batch { task, items, rest, preserve_times, jobs: 1, budget, stop };

@@ -22,20 +22,23 @@ use crate::args;
 use crate::codec::Codec;
 use crate::decode::{self, Wanted};
 use crate::encode;
+use crate::errors::one_line;
 use crate::picture::StillImage;
-use crate::source;
+use crate::source::Reading;
 
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
 pub(crate) enum Task {
     Encode {
         encoder: Box<Encoder>,
+        reading: Reading,
         policy: MetadataPolicy,
     },
     /// `bounds` are the sides that a thumbnail fits into; `None` for the whole picture. The policy is that
     /// of [`decode::finish`].
     Decode {
         extension: String,
+        reading: Reading,
         bounds: Option<(u32, u32)>,
         policy: Option<MetadataPolicy>,
     },
@@ -58,14 +61,16 @@ pub(crate) struct Facts {
 impl Task {
     pub(crate) fn new(args: &args::Batch) -> Self {
         let policy = args.keep.policy();
+        let limits = args.limits.limits();
+        let reading = Reading { limits: limits.clone(), allow_partial: args.allow_partial };
         if args.decode || args.thumbnail.is_some() {
             let (extension, bounds) = (args.format.clone(), args.thumbnail);
             let policy =
                 if bounds.is_some() { policy } else { policy.or(Some(MetadataPolicy::All)) };
-            return Self::Decode { extension, bounds, policy };
+            return Self::Decode { extension, reading, bounds, policy };
         }
-        let encoder = Box::new(args.encoder.encoder().with_threads(Threads::One));
-        Self::Encode { encoder, policy: policy.unwrap_or_default() }
+        let encoder = args.encoder.encoder().with_limits(limits).with_threads(Threads::One);
+        Self::Encode { encoder: Box::new(encoder), reading, policy: policy.unwrap_or_default() }
     }
 
     /// The extension of the results.
@@ -104,25 +109,29 @@ impl Task {
         stop: &Stop,
     ) -> Result<(Vec<u8>, Facts)> {
         match self {
-            Self::Encode { encoder, policy } => encode(encoder, *policy, item, budget, stop),
-            Self::Decode { bounds, policy, .. } => decode(*bounds, *policy, item, budget, stop),
+            Self::Encode { encoder, reading, policy } => {
+                encode(encoder, reading, *policy, item, budget, stop)
+            }
+            Self::Decode { reading, bounds, policy, .. } => {
+                decode(reading, *bounds, *policy, item, budget, stop)
+            }
         }
     }
 
     /// Checks that an earlier result is whole, and returns what it tells about itself.
     pub(crate) fn inspect(&self, output: &Path, budget: &Budget) -> Result<Facts> {
         let (width, height, gaussians) = match self {
-            Self::Encode { .. } => {
-                let mut stream = StreamDecoder::new();
+            Self::Encode { reading, .. } => {
+                let mut stream = StreamDecoder::new().with_limits(reading.limits.clone());
                 stream.feed(&fs::read(output)?)?;
                 stream.finish()?;
                 let header = stream.header().context("no header")?;
                 (header.width, header.height, Some(header.gaussians))
             }
-            Self::Decode { .. } => {
-                let (width, height) = source::dimensions(output)?;
+            Self::Decode { reading, .. } => {
+                let (width, height) = reading.dimensions(output)?;
                 let _permit = budget.wait_for(pixels(width, height));
-                source::read(output)?;
+                reading.read(output)?;
                 (width, height, None)
             }
         };
@@ -138,16 +147,17 @@ impl Task {
 
 fn encode(
     encoder: &Encoder,
+    reading: &Reading,
     policy: MetadataPolicy,
     item: &Item,
     budget: &Budget,
     stop: &Stop,
 ) -> Result<(Vec<u8>, Facts)> {
-    let (width, height) = source::dimensions(&item.source)?;
+    let (width, height) = reading.dimensions(&item.source)?;
     let _permit = budget.wait_for(pixels(width, height));
     check(stop)?;
     let start = Instant::now();
-    let mut picture = source::read(&item.source)?;
+    let mut picture = reading.read(&item.source)?;
     picture.retain_metadata(policy);
     let encoded = encode::encode(encoder.clone(), &mut picture, &mut |_| match check(stop) {
         Ok(()) => ControlFlow::Continue(()),
@@ -169,6 +179,7 @@ fn encode(
 }
 
 fn decode(
+    reading: &Reading,
     bounds: Option<(u32, u32)>,
     policy: Option<MetadataPolicy>,
     item: &Item,
@@ -178,7 +189,8 @@ fn decode(
     let context = || item.source.display().to_string();
     let codec = Codec::of(&item.output)?;
     let file = BufReader::new(File::open(&item.source).with_context(context)?);
-    let mut decoder = Decoder::new(file).with_context(context)?;
+    let mut decoder =
+        Decoder::new_with_limits(file, reading.limits.clone()).with_context(context)?;
     let metadata = decoder.metadata().clone();
     let mut options = RenderOptions::new().with_threads(Threads::One);
     let size = bounds.map(|bounds| fitted(decoder.header(), metadata.orientation(), bounds));
@@ -193,12 +205,24 @@ fn decode(
         None => wanted.decode(&mut decoder),
         Some(size) => thumbnail(&wanted, &mut decoder, size),
     };
+    let mut warnings = Vec::new();
+    let image = match image {
+        Err(error) if reading.allow_partial => {
+            // An error in a layer that was not decoded yet comes now, and then the layers before it.
+            let _ = decoder.picture();
+            let picture = decoder.picture().with_context(context)?;
+            let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
+            warnings.push(format!("{}; showing {shown} of {all} Gaussians", one_line(&error)));
+            wanted.render(&picture)
+        }
+        image => image,
+    };
     let gaussians = match size {
-        None => decoder.header().gaussians,
-        Some(_) => decoder.stream().gaussians().len() as u32,
+        None if warnings.is_empty() => decoder.header().gaussians,
+        _ => decoder.stream().gaussians().len() as u32,
     };
     let image = image.with_context(context)?;
-    let mut picture = StillImage { image, metadata, warnings: Vec::new() };
+    let mut picture = StillImage { image, metadata, warnings };
     decode::finish(&mut picture, codec, policy);
     let bytes = codec.encode(&picture).with_context(context)?;
     let facts = Facts {

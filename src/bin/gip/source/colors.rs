@@ -1,0 +1,196 @@
+//! What files say about their colours beside an ICC profile.
+
+use std::io::Cursor;
+
+use image::DynamicImage;
+use moxcms::{
+    Chromaticity, CicpProfile, ColorPrimaries, ColorProfile, DataColorSpace, LocalizableString,
+    MatrixCoefficients, ProfileText, ToneReprCurve, XyY,
+};
+use png::{CodingIndependentCodePoints, Info, SourceChromaticities};
+
+use super::light;
+use super::stored::Stored;
+
+/// The gamma that stands for sRGB, and how far others that do may be from it.
+const SRGB_GAMMA: f64 = 0.454_55;
+const SAME_GAMMA: f64 = 0.01;
+/// How far chromaticities of sRGB may be from the standard's.
+const SAME_CHROMATICITY: f64 = 0.002;
+/// x and y of sRGB's white, red, green and blue.
+const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
+
+/// Applies the chunks of a PNG, of which the first of cICP, iCCP, sRGB, and gAMA with cHRM counts (PNG,
+/// third edition, 4.3). A gamma alone is turned to that of sRGB, and what has other colours gets a
+/// profile.
+pub(super) fn of_png(file: &[u8], stored: &mut Stored) {
+    let Ok(reader) = png::Decoder::new(Cursor::new(file)).read_info() else { return };
+    let info = reader.info();
+    let is_gray =
+        matches!(stored.image, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_))
+            || matches!(stored.image, DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_));
+    if let Some(points) = info.coding_independent_code_points
+        && !is_unspecified(points)
+    {
+        match profile_of_code_points(points, is_gray) {
+            Some(profile) => {
+                stored.metadata.icc_profile = profile.and_then(|profile| profile.encode().ok());
+                return;
+            }
+            None => stored.warnings.push(lost(points, has_other(info))),
+        }
+    }
+    if info.icc_profile.is_none() && info.srgb.is_none() {
+        of_gamma_and_chromaticities(info, is_gray, stored);
+    }
+}
+
+fn is_unspecified(points: CodingIndependentCodePoints) -> bool {
+    points.color_primaries == 2 || points.transfer_function == 2
+}
+
+/// The profile for code points; `Some(None)` for sRGB, and `None` if no profile can express them.
+fn profile_of_code_points(
+    points: CodingIndependentCodePoints,
+    is_gray: bool,
+) -> Option<Option<ColorProfile>> {
+    let (primaries, transfer) = (points.color_primaries, points.transfer_function);
+    // Others than these are of high dynamic range, or historical.
+    let is_known = matches!(transfer, 1 | 4..=8 | 13..=15);
+    if !is_known || points.matrix_coefficients != 0 || !points.is_video_full_range_image {
+        return None;
+    }
+    if transfer == 13 && (primaries == 1 || is_gray) {
+        return Some(None);
+    }
+    let mut profile = ColorProfile::new_from_cicp(CicpProfile {
+        color_primaries: primaries.try_into().ok()?,
+        transfer_characteristics: transfer.try_into().ok()?,
+        matrix_coefficients: MatrixCoefficients::Identity,
+        full_range: true,
+    });
+    let curve = profile.red_trc.clone()?;
+    if is_gray {
+        profile = ColorProfile::new_gray_with_gamma(1.0);
+        profile.pcs = DataColorSpace::Xyz;
+        profile.gray_trc = Some(curve);
+    }
+    Some(Some(named(profile, format!("CICP {primaries}/{transfer}/0/1"))))
+}
+
+/// Whether a PNG has a description of its colours beside cICP.
+fn has_other(info: &Info<'_>) -> bool {
+    info.icc_profile.is_some()
+        || info.srgb.is_some()
+        || info.gama_chunk.is_some()
+        || info.chrm_chunk.is_some()
+}
+
+fn lost(points: CodingIndependentCodePoints, has_other: bool) -> String {
+    let CodingIndependentCodePoints {
+        color_primaries,
+        transfer_function,
+        matrix_coefficients,
+        is_video_full_range_image,
+    } = points;
+    let name = match transfer_function {
+        16 => "PQ, ",
+        18 => "HLG, ",
+        _ => "",
+    };
+    let range = u8::from(is_video_full_range_image);
+    let kept = match has_other {
+        true => "what else it says about its colours counts",
+        false => "its samples are taken as sRGB",
+    };
+    format!(
+        "its colour space ({name}cICP {color_primaries}/{transfer_function}/{matrix_coefficients}/\
+         {range}) cannot be kept; {kept}"
+    )
+}
+
+fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stored) {
+    let gamma = info.gama_chunk.map(|gamma| f64::from(gamma.into_value()));
+    let gamma = gamma.filter(|gamma| *gamma > 0.0);
+    let is_srgb_gamma = gamma.is_none_or(|gamma| (gamma / SRGB_GAMMA - 1.0).abs() < SAME_GAMMA);
+    let chromaticities = info.chrm_chunk.filter(|_| !is_gray).map(points);
+    let others = chromaticities.filter(|points| {
+        let pairs = points.iter().zip(SRGB);
+        pairs.into_iter().any(|(&(x, y), (u, v))| {
+            (x - u).abs() > SAME_CHROMATICITY || (y - v).abs() > SAME_CHROMATICITY
+        })
+    });
+    match (others, gamma) {
+        (None, Some(gamma)) if !is_srgb_gamma => {
+            light::from_power(&mut stored.image, 1.0 / gamma);
+        }
+        (None, _) => {}
+        (Some([white, red, green, blue]), gamma) => {
+            let curve = match gamma {
+                Some(gamma) => ToneReprCurve::Parametric(vec![(1.0 / gamma) as f32]),
+                None => srgb_curve(),
+            };
+            let point = |(x, y): (f64, f64)| Chromaticity::new(x as f32, y as f32);
+            let primaries =
+                ColorPrimaries { red: point(red), green: point(green), blue: point(blue) };
+            let white = XyY { x: white.0, y: white.1, yb: 1.0 };
+            let mut profile = ColorProfile::new_srgb();
+            profile.update_rgb_colorimetry(white, primaries);
+            profile.red_trc = Some(curve.clone());
+            profile.green_trc = Some(curve.clone());
+            profile.blue_trc = Some(curve);
+            let profile = named(profile, "PNG gAMA cHRM".into());
+            let matrix = profile.colorant_matrix();
+            // Chromaticities on a line make no colour space.
+            if matrix.v.iter().flatten().all(|value| value.is_finite() && value.abs() < 4.0)
+                && let Ok(profile) = profile.encode()
+            {
+                stored.metadata.icc_profile = Some(profile);
+            } else {
+                stored.warnings.push("its chromaticities (cHRM) are invalid".into());
+            }
+        }
+    }
+}
+
+fn points(chromaticities: SourceChromaticities) -> [(f64, f64); 4] {
+    let SourceChromaticities { white, red, green, blue } = chromaticities;
+    let point = |(x, y): (png::ScaledFloat, png::ScaledFloat)| {
+        (f64::from(x.into_value()), f64::from(y.into_value()))
+    };
+    [white, red, green, blue].map(point)
+}
+
+fn srgb_curve() -> ToneReprCurve {
+    ColorProfile::new_srgb().red_trc.unwrap_or(ToneReprCurve::Parametric(vec![2.2]))
+}
+
+/// The profile with a name, and with the white that its colours are adapted to.
+fn named(mut profile: ColorProfile, name: String) -> ColorProfile {
+    profile.cicp = None;
+    profile.media_white_point = Some(profile.white_point);
+    let name = LocalizableString::new("en".into(), "US".into(), name);
+    profile.description = Some(ProfileText::Localizable(vec![name]));
+    profile
+}
+
+/// What of an OpenEXR file's colours is lost.
+pub(super) fn lost_of_exr(file: &[u8]) -> Option<String> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false).ok()?;
+    let found = meta.headers.first()?.shared_attributes.chromaticities?;
+    let exr::meta::attribute::Chromaticities { red, green, blue, white } = found;
+    let points = [white, red, green, blue].map(|point| (f64::from(point.0), f64::from(point.1)));
+    let is_srgb = points.iter().zip(SRGB).all(|(&(x, y), (u, v))| {
+        (x - u).abs() <= SAME_CHROMATICITY && (y - v).abs() <= SAME_CHROMATICITY
+    });
+    (!is_srgb)
+        .then(|| "its primaries (chromaticities) cannot be kept, and are taken as sRGB's".into())
+}
+
+/// What of a Radiance file's colours is lost.
+pub(super) fn lost_of_hdr(file: &[u8]) -> Option<String> {
+    let decoder = image::codecs::hdr::HdrDecoder::new(Cursor::new(file)).ok()?;
+    let attributes = decoder.metadata().custom_attributes;
+    let (_, primaries) = attributes.iter().find(|(name, _)| name == "PRIMARIES")?;
+    Some(format!("its primaries ({}) cannot be kept, and are taken as sRGB's", primaries.trim()))
+}

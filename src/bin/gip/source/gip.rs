@@ -1,0 +1,31 @@
+//! Reading .gip files as sources.
+
+use anyhow::Result;
+use image_gip::{Decoder, Header, Limits, Metadata, RenderOptions};
+
+use super::stored::Stored;
+use crate::decode::{Wanted, partial};
+use crate::picture::StillImage;
+
+pub(super) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<Stored> {
+    let picture = match whole(file, limits) {
+        Err(error) if allow_partial => {
+            let wanted = |header: &Header, _: &Metadata| Ok(wanted(header));
+            partial(file, limits.clone(), wanted)?.ok_or(error)?
+        }
+        picture => picture?,
+    };
+    let StillImage { image, metadata, warnings } = picture;
+    Ok(Stored { image, orientation: metadata.orientation(), metadata, warnings })
+}
+
+fn whole(file: &[u8], limits: &Limits) -> Result<StillImage> {
+    let mut decoder = Decoder::new_with_limits(file, limits.clone())?;
+    let metadata = decoder.metadata().clone();
+    let image = wanted(decoder.header()).decode(&mut decoder)?;
+    Ok(StillImage { image, metadata, warnings: Vec::new() })
+}
+
+fn wanted(header: &Header) -> Wanted {
+    Wanted::as_stored(RenderOptions::new(), header)
+}

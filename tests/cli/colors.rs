@@ -1,0 +1,138 @@
+//! What sources say about their colours: it is kept as an ICC profile or turned to sRGB, or its loss is
+//! told.
+
+use std::io::Cursor;
+
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use moxcms::ColorProfile;
+
+use super::pictures;
+use super::room::{Room, text};
+
+const GAMMA: &[u8] = b"gAMA";
+const CHROMATICITIES: &[u8] = b"cHRM";
+const CODE_POINTS: &[u8] = b"cICP";
+const SRGB_GAMMA: u32 = 45_455;
+const SRGB: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+const ADOBE: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000];
+
+/// A PNG of one colour with more chunks.
+fn png(picture: &DynamicImage, chunks: &[(&[u8], Vec<u8>)]) -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    picture.write_to(&mut file, ImageFormat::Png).expect("in memory");
+    let file = file.into_inner();
+    let mut all = file[..33].to_vec();
+    for (name, contents) in chunks {
+        all.extend((contents.len() as u32).to_be_bytes());
+        let contents = [*name, contents].concat();
+        all.extend(&contents);
+        all.extend(crc32fast::hash(&contents).to_be_bytes());
+    }
+    [&all, &file[33..]].concat()
+}
+
+fn gamma(value: u32) -> (&'static [u8], Vec<u8>) {
+    (GAMMA, value.to_be_bytes().to_vec())
+}
+
+fn chromaticities(values: [u32; 8]) -> (&'static [u8], Vec<u8>) {
+    (CHROMATICITIES, values.iter().flat_map(|value| value.to_be_bytes()).collect())
+}
+
+fn code_points(primaries: u8, transfer: u8) -> (&'static [u8], Vec<u8>) {
+    (CODE_POINTS, vec![primaries, transfer, 0, 1])
+}
+
+/// What becomes of a source: the profile of the decoded picture, and what is printed.
+fn carried(room: &Room, name: &str, file: &[u8]) -> (Option<ColorProfile>, String) {
+    room.write(name, file);
+    let args = ["encode", name, "a.gip", "--effort", "1", "--gaussians", "1"];
+    let output = room.run(&args);
+    assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+    room.ok(&["decode", "a.gip", "a.png"]);
+    let reader = ImageReader::open(room.path("a.png")).expect("it was written");
+    let profile = reader.into_decoder().expect("a PNG").icc_profile().expect("a PNG");
+    let profile = profile.map(|profile| ColorProfile::new_from_slice(&profile).expect("valid"));
+    (profile, text(&output.stderr))
+}
+
+#[test]
+fn chunks_of_png_become_a_profile() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    // x and y of the red of each profile's primaries, adapted to D50.
+    let (p3, wide, adobe) = ((0.5151, 0.2412), (0.6735, 0.2790), (0.6097, 0.3111));
+    for (chunks, red) in [
+        (&[code_points(12, 13)][..], Some(p3)),
+        (&[code_points(9, 1)], Some(wide)),
+        (&[code_points(9, 14), gamma(100_000), chromaticities(SRGB)], Some(wide)),
+        (&[gamma(SRGB_GAMMA), chromaticities(ADOBE)], Some(adobe)),
+        (&[chromaticities(ADOBE)], Some(adobe)),
+        // sRGB in other words.
+        (&[code_points(1, 13)], None),
+        (&[gamma(SRGB_GAMMA), chromaticities(SRGB)], None),
+        (&[gamma(SRGB_GAMMA)], None),
+        (&[(b"sRGB", vec![0]), gamma(100_000), chromaticities(ADOBE)], None),
+        // Not specified.
+        (&[code_points(2, 2)], None),
+    ] {
+        let (profile, printed) = carried(&room, "a.png", &png(&picture, chunks));
+        assert_eq!(printed, "", "{chunks:?}");
+        let found = profile.map(|profile| (profile.red_colorant.x, profile.red_colorant.y));
+        match (found, red) {
+            (Some((x, y)), Some((u, v))) => {
+                assert!((x - u).abs() < 0.001 && (y - v).abs() < 0.001, "{chunks:?}: {x} {y}");
+            }
+            (found, red) => assert_eq!(found, red, "{chunks:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_gamma_alone_is_turned_to_that_of_srgb() {
+    let room = Room::new();
+    let linear =
+        image::RgbaImage::from_raw(3, 1, vec![0, 55, 255, 255, 55, 55, 55, 9, 1, 255, 128, 0]);
+    let linear = DynamicImage::from(linear.expect("a row"));
+    let expected =
+        image::RgbaImage::from_raw(3, 1, vec![0, 128, 255, 255, 128, 128, 128, 9, 13, 255, 188, 0]);
+    let expected = DynamicImage::from(expected.expect("a row"));
+    room.write("linear.png", png(&linear, &[gamma(100_000)]));
+    room.save_picture("srgb.png", &expected);
+    assert_eq!(room.ok(&["compare", "linear.png", "srgb.png"]), "identical\n");
+    // With 16 bits, and gray, too.
+    for (picture, full) in
+        [(linear.to_rgba16().into(), 65_535.0), (linear.to_luma8().into(), 255.0)]
+    {
+        room.write("linear.png", png(&picture, &[gamma(100_000)]));
+        let plain = room.json(&["compare", "linear.png", "srgb.png", "--json"]);
+        let error = plain["max_abs_error"].as_f64().expect("a number");
+        assert!(full == 255.0 || error < full / 250.0, "{plain}");
+    }
+}
+
+#[test]
+fn colours_that_cannot_be_kept_are_told() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    for (transfer, name) in [(16, "PQ"), (18, "HLG")] {
+        let (profile, printed) =
+            carried(&room, "a.png", &png(&picture, &[code_points(9, transfer)]));
+        assert!(profile.is_none());
+        let expected = format!(
+            "warning: a.png: its colour space ({name}, cICP 9/{transfer}/0/1) cannot be kept; its \
+             samples are taken as sRGB\n"
+        );
+        assert_eq!(printed, expected);
+    }
+
+    let mut radiance = Cursor::new(Vec::new());
+    let floats = DynamicImage::from(picture.to_rgb32f());
+    floats.write_to(&mut radiance, ImageFormat::Hdr).expect("in memory");
+    let radiance = radiance.into_inner();
+    assert_eq!(carried(&room, "a.hdr", &radiance).1, "");
+    let line = radiance.iter().position(|&byte| byte == b'\n').expect("a header") + 1;
+    let primaries = b"PRIMARIES= .7 .3 .2 .7 .1 .05 .33 .33\n";
+    let other = [&radiance[..line], primaries, &radiance[line..]].concat();
+    assert!(carried(&room, "a.hdr", &other).1.contains("its primaries (.7 .3"));
+}

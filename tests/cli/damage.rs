@@ -1,0 +1,198 @@
+//! Damaged sources: what truncation and damage in the middle give, for each format, and what
+//! `--allow-partial` makes of them.
+
+use std::io::Cursor;
+
+use image::codecs::jpeg::JpegEncoder;
+use image::{DynamicImage, ImageFormat, RgbImage};
+use serde_json::Value;
+
+use super::common::layered;
+use super::room::{Room, by_input, text};
+use super::tiff;
+
+const SIZE: (u32, u32) = (40, 32);
+const QUICK: [&str; 4] = ["--effort", "1", "--gaussians", "1"];
+
+/// Noise, so that files have something everywhere.
+fn noise() -> RgbImage {
+    let mut state = 7_u32;
+    RgbImage::from_fn(SIZE.0, SIZE.1, |_, _| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let [_, r, g, b] = state.to_be_bytes();
+        image::Rgb([r, g | 1, b])
+    })
+}
+
+fn written(format: ImageFormat) -> Vec<u8> {
+    let noise = DynamicImage::from(noise());
+    let picture = match format {
+        ImageFormat::Farbfeld => noise.to_rgba16().into(),
+        ImageFormat::Gif | ImageFormat::Ico => noise.to_rgba8().into(),
+        ImageFormat::OpenExr | ImageFormat::Hdr => noise.to_rgb32f().into(),
+        _ => noise,
+    };
+    let mut file = Cursor::new(Vec::new());
+    picture.write_to(&mut file, format).expect("the format takes it");
+    file.into_inner()
+}
+
+/// DXT1: 8 bytes for 4 x 4 pixels.
+fn dds() -> Vec<u8> {
+    let mut header = vec![0_u32; 32];
+    header[0] = u32::from_le_bytes(*b"DDS ");
+    header[1..5].copy_from_slice(&[124, 0x1007, SIZE.1, SIZE.0]);
+    header[19..22].copy_from_slice(&[32, 4, u32::from_le_bytes(*b"DXT1")]);
+    header[27] = 0x1000;
+    let blocks = noise().into_raw().into_iter().take((SIZE.0 * SIZE.1 / 2) as usize);
+    header.into_iter().flat_map(u32::to_le_bytes).chain(blocks).collect()
+}
+
+fn jpeg(quality: u8) -> Vec<u8> {
+    let mut file = Vec::new();
+    JpegEncoder::new_with_quality(&mut file, quality).encode_image(&noise()).expect("in memory");
+    file
+}
+
+fn cut(file: &[u8]) -> Vec<u8> {
+    file[..file.len() * 6 / 10].to_vec()
+}
+
+fn overwritten(file: &[u8]) -> Vec<u8> {
+    let mut file = file.to_vec();
+    let middle = file.len() / 2;
+    for (byte, at) in file[middle..middle + 24].iter_mut().zip(11_u8..) {
+        *byte = at.wrapping_mul(37) % 251;
+    }
+    file
+}
+
+/// What is made of a damaged file.
+#[derive(Debug, PartialEq, Eq)]
+enum Outcome {
+    /// It is refused, and so is it with `--allow-partial`.
+    Nothing,
+    /// It is refused, and taken with a warning with `--allow-partial`.
+    Partial,
+    /// It is taken: the format has nothing that tells.
+    Unnoticed,
+}
+
+fn outcome(room: &Room, name: &str, file: &[u8]) -> Outcome {
+    use Outcome::{Nothing, Partial, Unnoticed};
+    room.write(name, file);
+    let args = [&["encode", name, "a.gip"], &QUICK[..]].concat();
+    let strict = room.run(&args);
+    let partial = room.run(&[&args[..], &["--allow-partial"]].concat());
+    let (error, warning) = (text(&strict.stderr), text(&partial.stderr));
+    assert_eq!(error.lines().count().max(warning.lines().count()).max(1), 1, "{error}{warning}");
+    match (strict.status.success(), partial.status.success()) {
+        (true, true) => {
+            assert_eq!((&*error, &*warning), ("", ""), "{name}");
+            Unnoticed
+        }
+        (false, true) => {
+            assert!(error.starts_with(&format!("error: {name}: ")), "{error}");
+            assert!(warning.starts_with(&format!("warning: {name}: ")), "{warning}");
+            Partial
+        }
+        (false, false) => {
+            assert!(error.starts_with(&format!("error: {name}: ")), "{error}");
+            Nothing
+        }
+        (true, false) => panic!("{name}: {warning}"),
+    }
+}
+
+#[test]
+fn each_format_tells_damage_as_well_as_it_can() {
+    use Outcome::{Nothing, Partial, Unnoticed};
+    let room = Room::new();
+    let gip = {
+        let source = image_gip::Source::new_u8(
+            SIZE.0,
+            SIZE.1,
+            image_gip::ColorModel::Rgb,
+            &noise().into_raw(),
+        )
+        .map(|source| {
+            let encoder = image_gip::Encoder::new().with_effort(1);
+            encoder.with_target(image_gip::Target::Gaussians(200)).encode(&source)
+        });
+        source.expect("the sizes agree").expect("no target").bytes
+    };
+    // A file, what becomes of it when it is cut, and when its middle is overwritten.
+    let table = [
+        ("a.png", written(ImageFormat::Png), Partial, Partial),
+        ("a.jpg", jpeg(90), Partial, Partial),
+        ("a.gif", written(ImageFormat::Gif), Partial, Partial),
+        ("a.webp", written(ImageFormat::WebP), Partial, Nothing),
+        ("a.qoi", written(ImageFormat::Qoi), Partial, Partial),
+        ("a.ico", written(ImageFormat::Ico), Partial, Partial),
+        ("a.exr", written(ImageFormat::OpenExr), Partial, Unnoticed),
+        ("a.gip", gip, Partial, Partial),
+        // Without compression, any samples are valid.
+        ("a.tif", written(ImageFormat::Tiff), Nothing, Unnoticed),
+        ("b.tif", tiff::rgb(SIZE, &noise().into_raw()), Partial, Unnoticed),
+        ("a.bmp", written(ImageFormat::Bmp), Partial, Unnoticed),
+        ("a.tga", written(ImageFormat::Tga), Partial, Unnoticed),
+        ("a.pnm", written(ImageFormat::Pnm), Partial, Unnoticed),
+        ("a.ff", written(ImageFormat::Farbfeld), Partial, Unnoticed),
+        ("a.hdr", written(ImageFormat::Hdr), Partial, Partial),
+        ("a.dds", dds(), Partial, Unnoticed),
+    ];
+    let mut others = Vec::new();
+    for (name, file, when_cut, when_overwritten) in table {
+        assert_eq!(outcome(&room, name, &file), Unnoticed, "{name} is whole");
+        let found = (outcome(&room, name, &cut(&file)), outcome(&room, name, &overwritten(&file)));
+        if found != (when_cut, when_overwritten) {
+            others.push((name, found));
+        }
+    }
+    assert!(others.is_empty(), "{others:?}");
+}
+
+#[test]
+fn jpegs_that_are_only_unusual_are_whole() {
+    let room = Room::new();
+    let file = jpeg(50);
+    let end = file.len() - 2;
+    let after_start = |bytes: &[u8]| [&file[..2], bytes, &file[2..]].concat();
+    for (name, unusual) in [
+        ("without its last marker", file[..end].to_vec()),
+        ("bytes after the end", [&file[..], b"anything, \xFF\xD8\xFF\xE0 too"].concat()),
+        ("a second picture", [&file[..], &file[..]].concat()),
+        ("padding", [&file[..end], &[0xFF, 0, 0xFF, 0], &file[end..]].concat()),
+        ("fill bytes before a marker", after_start(&[0xFF, 0xFF, 0xFF])),
+        ("a comment", after_start(b"\xFF\xFE\0\x06text")),
+    ] {
+        assert_eq!(outcome(&room, "a.jpg", &unusual), Outcome::Unnoticed, "{name}");
+    }
+    // A marker that is put where a file was cut makes it no picture.
+    let closed = [&cut(&file)[..], &[0xFF, 0xD9]].concat();
+    assert_eq!(outcome(&room, "a.jpg", &closed), Outcome::Partial);
+}
+
+#[test]
+fn a_batch_records_what_was_damaged() {
+    let room = Room::new();
+    room.write("in/whole.jpg", jpeg(80));
+    room.write("in/cut.jpg", cut(&jpeg(80)));
+    let args = ["in", "--out", "out", "--manifest", "m.jsonl"];
+    let (_, errors) = room.batch(3, &[&args[..], &QUICK].concat());
+    assert_eq!(errors, "error: in/cut.jpg: the file is damaged: the data end too early\n");
+    assert!(room.files("out").keys().eq(&["whole.gip"]));
+
+    room.batch(0, &[&args[..], &QUICK, &["--allow-partial"]].concat());
+    let manifest = by_input(&room.read("m.jsonl"));
+    let warnings = |name: &str| manifest[name]["warnings"].as_array().map(Vec::len);
+    assert_eq!((warnings("in/whole.jpg"), warnings("in/cut.jpg")), (Some(0), Some(1)));
+
+    // The way back, too.
+    room.write("gips/hurt.gip", layered::damaged(&[20]));
+    let back = ["gips", "--decode", "--out", "back", "--manifest", "-"];
+    room.batch(3, &back);
+    let (line, _) = room.batch(0, &[&back[..], &["--allow-partial"]].concat());
+    let line: Value = serde_json::from_str(line.trim()).expect("JSON");
+    assert_eq!(line["warnings"].as_array().map(Vec::len), Some(1), "{line}");
+}

@@ -1,0 +1,187 @@
+//! TIFF as other programs write it: palettes, floats, other colour models, alpha that was multiplied.
+
+use image::{DynamicImage, GenericImageView, ImageReader, Rgba};
+
+use super::room::{Room, text};
+
+/// The tags that say how many bits a sample has, what samples mean, and how many a pixel has.
+const BITS: u16 = 258;
+const PHOTOMETRIC: u16 = 262;
+const SAMPLES: u16 = 277;
+const COLOR_MAP: u16 = 320;
+const EXTRA_SAMPLES: u16 = 338;
+const FORMAT: u16 = 339;
+const SUBSAMPLING: u16 = 530;
+
+/// A file with these tags in ascending order and with these samples, which come last.
+fn file((width, height): (u32, u32), tags: &[(u16, &[u32])], samples: &[u8]) -> Vec<u8> {
+    let (width, height) = ([width], [height]);
+    let mut tags = tags.to_vec();
+    tags.extend([(256, &width[..]), (257, &height), (273, &[0]), (278, &height), (279, &[0])]);
+    tags.sort_by_key(|(tag, _)| *tag);
+    // All numbers are SHORT. Those that do not fit in an entry come after the directory.
+    let bytes =
+        |list: &[u32]| list.iter().flat_map(|v| (*v as u16).to_le_bytes()).collect::<Vec<_>>();
+    let lists = tags.iter().map(|(_, list)| bytes(list)).filter(|list| list.len() > 4);
+    let lists: Vec<u8> = lists.flatten().collect();
+    let behind = 8 + 2 + 12 * tags.len() + 4;
+    let (mut file, mut at) = ([&b"II*\0"[..], &8_u32.to_le_bytes()].concat(), behind);
+    file.extend((tags.len() as u16).to_le_bytes());
+    for (tag, list) in tags {
+        let mut value = match tag {
+            273 => bytes(&[(behind + lists.len()) as u32]),
+            279 => bytes(&[samples.len() as u32]),
+            _ => bytes(list),
+        };
+        if value.len() > 4 {
+            let length = value.len();
+            value = (at as u32).to_le_bytes().to_vec();
+            at += length;
+        }
+        value.resize(4, 0);
+        file.extend(tag.to_le_bytes());
+        file.extend(3_u16.to_le_bytes());
+        file.extend((list.len() as u32).to_le_bytes());
+        file.extend(value);
+    }
+    file.extend([0; 4]);
+    [file, lists, samples.to_vec()].concat()
+}
+
+/// RGB with 8 bits, with the directory before the samples.
+pub(crate) fn rgb(size: (u32, u32), samples: &[u8]) -> Vec<u8> {
+    file(size, &[(BITS, &[8, 8, 8]), (PHOTOMETRIC, &[2]), (SAMPLES, &[3])], samples)
+}
+
+/// The picture that the tool reads: a lossless way out of it is to compare with a PNG.
+#[track_caller]
+fn assert_read(room: &Room, tiff: &[u8], expected: &DynamicImage, most: u64) {
+    room.write("a.tif", tiff);
+    room.save_picture("b.png", expected);
+    let comparison = room.json(&["compare", "a.tif", "b.png", "--json"]);
+    assert!(
+        comparison["max_abs_error"].as_u64().is_some_and(|error| error <= most),
+        "{comparison}"
+    );
+}
+
+fn gray(samples: &[u8]) -> DynamicImage {
+    let image = image::GrayImage::from_raw(samples.len() as u32, 1, samples.to_vec());
+    image.expect("a row").into()
+}
+
+fn colors(pixels: &[[u8; 3]]) -> DynamicImage {
+    let image = image::RgbImage::from_raw(pixels.len() as u32, 1, pixels.concat());
+    image.expect("a row").into()
+}
+
+#[test]
+fn gray_of_few_bits_or_inverted() {
+    let room = Room::new();
+    for (bits, photometric, samples, expected) in [
+        (1, 1, &[0b0110_0000][..], &[0, 255, 255, 0][..]),
+        (1, 0, &[0b0110_0000], &[255, 0, 0, 255]),
+        (2, 1, &[0b0001_1011], &[0, 85, 170, 255]),
+        (4, 1, &[0x0F, 0x3C], &[0, 255, 51, 204]),
+        (8, 0, &[0, 1, 254, 255], &[255, 254, 1, 0]),
+    ] {
+        let tags: [(u16, &[u32]); 2] = [(BITS, &[bits]), (PHOTOMETRIC, &[photometric])];
+        assert_read(&room, &file((4, 1), &tags, samples), &gray(expected), 0);
+    }
+}
+
+#[test]
+fn palettes() {
+    let room = Room::new();
+    let [red, half, dark] = [[255, 0, 0], [128, 128, 128], [1, 2, 3]];
+    let pixels = colors(&[dark, red, half, red]);
+    for (bits, samples) in [(2, &[0b10_00_01_00][..]), (4, &[0x20, 0x10]), (8, &[2, 0, 1, 0])] {
+        // All red values come first. Some programs repeat the 8 bits, and some do not shift them.
+        for factor in [257, 1] {
+            let mut map = vec![0_u32; 3 << bits];
+            for (index, color) in [red, half, dark].into_iter().enumerate() {
+                for (channel, value) in color.into_iter().enumerate() {
+                    map[(channel << bits) + index] = u32::from(value) * factor;
+                }
+            }
+            let tags: [(u16, &[u32]); 3] =
+                [(BITS, &[bits]), (PHOTOMETRIC, &[3]), (COLOR_MAP, &map)];
+            assert_read(&room, &file((4, 1), &tags, samples), &pixels, 0);
+        }
+    }
+}
+
+#[test]
+fn floats_from_0_to_1_are_samples_like_integers() {
+    let room = Room::new();
+    let samples = [0.0_f32, 0.2, 1.0, 1.5].map(f32::to_le_bytes).concat();
+    let tags: [(u16, &[u32]); 3] = [(BITS, &[32]), (PHOTOMETRIC, &[1]), (FORMAT, &[3])];
+    assert_read(&room, &file((4, 1), &tags, &samples), &gray(&[0, 51, 255, 255]), 0);
+}
+
+#[test]
+fn other_colour_models() {
+    let room = Room::new();
+    // White, black, a gray, and a red: by the formulas of CIE 1976 and ITU-R BT.601.
+    let pixels = colors(&[[255, 255, 255], [0, 0, 0], [119, 119, 119], [255, 0, 0]]);
+    let lab = [[255, 0, 0], [0, 0, 0], [127, 0, 0], [138, 81, 70]].concat();
+    let icc_lab = [[255, 128, 128], [0, 128, 128], [127, 128, 128], [138, 209, 198]].concat();
+    let ycbcr = [[255, 128, 128], [0, 128, 128], [119, 128, 128], [76, 85, 255]].concat();
+    let cmyk = [[0, 0, 0, 0], [0, 0, 0, 255], [0, 0, 0, 136], [0, 255, 255, 0]].concat();
+    for (photometric, count, samples, most) in
+        [(8, 3, lab, 5), (9, 3, icc_lab, 5), (6, 3, ycbcr, 2), (5, 4, cmyk, 0)]
+    {
+        let bits = vec![8; count as usize];
+        let tags: [(u16, &[u32]); 4] = [
+            (BITS, &bits),
+            (PHOTOMETRIC, &[photometric]),
+            (SAMPLES, &[count]),
+            (SUBSAMPLING, &[1, 1]),
+        ];
+        assert_read(&room, &file((4, 1), &tags, &samples), &pixels, most);
+    }
+    // What is not read is told.
+    let tags: [(u16, &[u32]); 3] = [(BITS, &[8, 8, 8]), (PHOTOMETRIC, &[6]), (SAMPLES, &[3])];
+    room.write("a.tif", file((4, 2), &tags, &[0; 12]));
+    let error = room.fails(&["encode", "a.tif", "a.gip"]);
+    assert!(error.contains("chroma"), "{error}");
+}
+
+#[test]
+fn alpha_and_other_channels() {
+    let room = Room::new();
+    let pixels = [[200, 100, 50, 255], [100, 50, 25, 128], [0, 0, 0, 0]];
+    let image = |pixels: [[u8; 4]; 3]| -> DynamicImage {
+        let image = image::RgbaImage::from_raw(3, 1, pixels.concat());
+        image.expect("a row").into()
+    };
+    let tags = |extra: &'static [u32]| -> [(u16, &[u32]); 4] {
+        [(BITS, &[8, 8, 8, 8]), (PHOTOMETRIC, &[2]), (SAMPLES, &[4]), (EXTRA_SAMPLES, extra)]
+    };
+    let with = |extra| file((3, 1), &tags(extra), &pixels.concat());
+    assert_read(&room, &with(&[2]), &image(pixels), 0);
+    let divided = [[200, 100, 50, 255], [199, 100, 50, 128], [0, 0, 0, 0]];
+    assert_read(&room, &with(&[1]), &image(divided), 0);
+    // A channel without a meaning is left out.
+    assert_read(&room, &with(&[0]), &image(pixels.map(|[r, g, b, _]| [r, g, b, 255])), 0);
+    // Gray with alpha.
+    let tags: [(u16, &[u32]); 4] =
+        [(BITS, &[8, 8]), (PHOTOMETRIC, &[1]), (SAMPLES, &[2]), (EXTRA_SAMPLES, &[2])];
+    let gray_alpha = image::GrayAlphaImage::from_raw(2, 1, vec![9, 255, 200, 7]);
+    let gray_alpha = DynamicImage::from(gray_alpha.expect("a row"));
+    assert_read(&room, &file((2, 1), &tags, &[9, 255, 200, 7]), &gray_alpha, 0);
+}
+
+#[test]
+fn what_of_its_colours_is_lost_is_told() {
+    let room = Room::new();
+    let tags: [(u16, &[u32]); 3] = [(BITS, &[8, 8, 8]), (PHOTOMETRIC, &[8]), (SAMPLES, &[3])];
+    room.write("a.tif", file((2, 1), &tags, &[255, 0, 0, 9, 0, 0]));
+    let output = room.run(&["encode", "a.tif", "a.gip", "--effort", "1"]);
+    assert!(text(&output.stderr).starts_with("warning: a.tif: its CIELAB colours"), "{output:?}");
+    room.ok(&["decode", "a.gip", "a.png"]);
+    let reader = ImageReader::open(room.path("a.png")).expect("it was written");
+    let picture = reader.decode().expect("a picture");
+    let Rgba([r, g, b, _]) = picture.get_pixel(0, 0);
+    assert!([r, g, b].iter().all(|sample| *sample > 240), "white");
+}
