@@ -146,6 +146,15 @@ fn exif_that_is_damaged_is_dropped_but_for_its_orientation() {
 }
 
 #[test]
+fn an_orientation_that_is_said_twice_remains_the_first() {
+    let exif = write(&[short(Tag::Orientation, 6), short(Tag::Orientation, 3)], None, false);
+    let mut metadata = of_exif(exif);
+    assert_eq!(metadata.orientation(), Orientation::Rotate90);
+    assert!(metadata.retain(MetadataPolicy::Safe).is_empty());
+    assert_eq!(metadata, of_exif(write(&safe()[..1], None, false)));
+}
+
+#[test]
 fn hostile_exif_ends_in_time_and_tells_no_secret() {
     let exif = |metadata: &Metadata| metadata.exif.clone().unwrap_or_default();
     let check = |bytes: Vec<u8>| {

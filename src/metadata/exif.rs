@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use exif::experimental::Writer;
-use exif::{Context, Error, Field, In, Reader, Tag, Value};
+use exif::{Context, Exif, Field, In, Reader, Tag, Value};
 
 use crate::orientation::Orientation;
 
@@ -16,10 +16,8 @@ enum Kind {
     Numbers(usize),
 }
 
-/// Exif 3.0, section 4.6; `Gamma` and the offsets of dates have no name in the crate or are of later
-/// versions.
+/// The tags that are safe, besides the orientation (Exif 3.0, section 4.6).
 const SAFE: &[(Tag, Kind)] = &[
-    (Tag::Orientation, Kind::Numbers(1)),
     (Tag::XResolution, Kind::Numbers(1)),
     (Tag::YResolution, Kind::Numbers(1)),
     (Tag::ResolutionUnit, Kind::Numbers(1)),
@@ -59,37 +57,31 @@ impl Kind {
     }
 }
 
-/// The safe tags of Exif, written anew, so that nothing else is between them; `None` if there are none.
-pub(super) fn safe(exif: Vec<u8>) -> Result<Option<Vec<u8>>, Error> {
-    let exif = Reader::new().read_raw(exif)?;
-    // The crate reads a value when it is asked for. It is not asked for all of them: thousands may share
-    // the same bytes.
-    let fields = SAFE.iter().filter_map(|(tag, kind)| {
-        exif.get_field(*tag, In::PRIMARY).filter(|field| kind.includes(&field.value))
-    });
-    write(fields, exif.little_endian())
-}
-
-/// Exif with nothing but an orientation.
-pub(super) fn of_orientation(orientation: Orientation) -> Vec<u8> {
+/// Exif of this orientation with the safe tags of another, if that can be read. It is written anew, so that
+/// nothing else is between them; `None` if there is nothing to write.
+pub(super) fn safe(exif: Option<&Exif>, orientation: Orientation) -> Option<Vec<u8>> {
     let value = Value::Short(vec![orientation.to_exif().into()]);
-    let field = Field { tag: Tag::Orientation, ifd_num: In::PRIMARY, value };
-    write([&field].into_iter(), false).ok().flatten().unwrap_or_default()
-}
-
-fn write<'a>(
-    fields: impl Iterator<Item = &'a Field>,
-    little_endian: bool,
-) -> Result<Option<Vec<u8>>, Error> {
-    let (mut writer, mut is_empty) = (Writer::new(), true);
-    for field in fields {
-        writer.push_field(field);
-        is_empty = false;
+    let turn = Field { tag: Tag::Orientation, ifd_num: In::PRIMARY, value };
+    let mut writer = Writer::new();
+    if orientation != Orientation::default() {
+        writer.push_field(&turn);
     }
-    if is_empty {
-        return Ok(None);
+    if let Some(exif) = exif {
+        // The crate reads a value when it is asked for. It is not asked for all of them: thousands may
+        // share the same bytes.
+        let field = |tag| exif.get_field(tag, In::PRIMARY);
+        let fields = SAFE
+            .iter()
+            .filter_map(|(tag, kind)| field(*tag).filter(|field| kind.includes(&field.value)));
+        fields.for_each(|field| writer.push_field(field));
     }
     let mut out = Cursor::new(Vec::new());
-    writer.write(&mut out, little_endian)?;
-    Ok(Some(out.into_inner()))
+    // It fails if there is nothing to write.
+    writer.write(&mut out, exif.is_some_and(Exif::little_endian)).ok()?;
+    Some(out.into_inner())
+}
+
+/// Reads Exif, unless it is damaged.
+pub(super) fn read(exif: Vec<u8>) -> Option<Exif> {
+    Reader::new().read_raw(exif).ok()
 }

@@ -4,7 +4,6 @@ use core::fmt;
 
 use super::{exif, icc, xmp};
 use crate::container::Metadata;
-use crate::orientation::Orientation;
 
 /// Keywords of texts, as PNG registers them, whose texts an author wrote to be read by all.
 const SAFE_KEYWORDS: [&str; 6] =
@@ -66,11 +65,11 @@ impl Metadata {
             MetadataPolicy::Safe => {
                 let orientation = self.orientation();
                 if let Some(exif) = self.exif.take() {
-                    self.exif = exif::safe(exif).unwrap_or_else(|_| {
+                    let exif = exif::read(exif);
+                    if exif.is_none() {
                         losses.push(MetadataLoss::DamagedExif);
-                        (orientation != Orientation::default())
-                            .then(|| exif::of_orientation(orientation))
-                    });
+                    }
+                    self.exif = exif::safe(exif.as_ref(), orientation);
                 }
                 if let Some(xmp) = self.xmp.take() {
                     self.xmp = xmp::safe(&xmp).unwrap_or_else(|_| {

@@ -71,7 +71,7 @@ pub(in crate::metadata) fn safe(xmp: &[u8]) -> Result<Option<Vec<u8>>, Damaged> 
 /// is left out.
 fn value(document: &Document<'_>, uri: &str, name: &str) -> Option<String> {
     descriptions(document).find_map(|description| {
-        if let Some(text) = description.attribute((uri, name)) {
+        if let Some(text) = description.attribute((uri, name)).filter(|text| !text.is_empty()) {
             return Some(escaped(text));
         }
         let property = description.children().find(|child| child.has_tag_name((uri, name)))?;
