@@ -3,7 +3,7 @@
 
 use std::io::Cursor;
 
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageFormat, ImageReader};
 use moxcms::ColorProfile;
 
 use super::pictures;
@@ -108,6 +108,27 @@ fn a_gamma_alone_is_turned_to_that_of_srgb() {
         let plain = room.json(&["compare", "linear.png", "srgb.png", "--json"]);
         let error = plain["max_abs_error"].as_f64().expect("a number");
         assert!(full == 255.0 || error < full / 250.0, "{plain}");
+    }
+}
+
+#[test]
+fn cameras_name_adobe_rgb_in_exif() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    for (index, red) in [(b"R03\0", Some(0.6097)), (b"R98\0", None)] {
+        // Three directories of an entry each: to that of Exif, to that of interoperability, the index.
+        let mut exif = b"II*\0\x08\0\0\0".to_vec();
+        exif.extend(b"\x01\0\x69\x87\x04\0\x01\0\0\0\x1A\0\0\0\0\0\0\0");
+        exif.extend(b"\x01\0\x05\xA0\x04\0\x01\0\0\0\x2C\0\0\0\0\0\0\0");
+        exif.extend([&b"\x01\0\x01\0\x02\0\x04\0\0\0"[..], index, &[0; 4]].concat());
+        let mut file = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new(&mut file);
+        encoder.set_exif_metadata(exif).expect("JPEG has it");
+        picture.write_with_encoder(encoder).expect("in memory");
+        let (profile, printed) = carried(&room, "a.jpg", &file);
+        assert_eq!(printed, "");
+        let found = profile.map(|profile| profile.red_colorant.x);
+        assert_eq!(found.map(|x| (x * 1e3).round()), red.map(|x: f64| (x * 1e3).round()));
     }
 }
 

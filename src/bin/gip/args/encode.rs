@@ -19,7 +19,7 @@ use super::values::{ThreadCount, number};
 /// become RGB.
 ///
 /// Colours: an ICC profile is kept, if it is one of gray or RGB. What a PNG says by cICP, or by gAMA and
-/// cHRM, becomes a profile, or sRGB if it is only a gamma. What cannot be kept, such as PQ and HLG,
+/// cHRM, becomes a profile, or sRGB if it is only a gamma; so does the Adobe RGB of a camera's Exif. What cannot be kept, such as PQ and HLG,
 /// is told.
 ///
 /// The picture is stored upright: an Exif orientation is applied to the pixels, and reset in Exif and XMP. ICC

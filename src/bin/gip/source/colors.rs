@@ -3,6 +3,7 @@
 use std::io::Cursor;
 
 use image::DynamicImage;
+use image_gip::Metadata;
 use moxcms::{
     Chromaticity, CicpProfile, ColorPrimaries, ColorProfile, DataColorSpace, LocalizableString,
     MatrixCoefficients, ProfileText, ToneReprCurve, XyY,
@@ -172,6 +173,20 @@ fn named(mut profile: ColorProfile, name: String) -> ColorProfile {
     let name = LocalizableString::new("en".into(), "US".into(), name);
     profile.description = Some(ProfileText::Localizable(vec![name]));
     profile
+}
+
+/// Adds the profile of Adobe RGB, which cameras name by a code in Exif in its place (DCF, 2.0).
+pub(super) fn of_exif(metadata: &mut Metadata) {
+    let Some(bytes) = metadata.exif.as_ref().filter(|_| metadata.icc_profile.is_none()) else {
+        return;
+    };
+    let Ok(exif) = exif::Reader::new().read_raw(bytes.clone()) else { return };
+    let index = exif.get_field(exif::Tag::InteroperabilityIndex, exif::In::PRIMARY);
+    if let Some(exif::Value::Ascii(texts)) = index.map(|field| &field.value)
+        && texts.first().is_some_and(|text| text.starts_with(b"R03"))
+    {
+        metadata.icc_profile = ColorProfile::new_adobe_rgb().encode().ok();
+    }
 }
 
 /// What of an OpenEXR file's colours is lost.

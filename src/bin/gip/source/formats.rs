@@ -49,6 +49,7 @@ pub(super) fn read(
     };
     let mut stored = Stored { image: light::encoded(image), orientation, metadata, warnings };
     match format {
+        ImageFormat::Jpeg => colors::of_exif(&mut stored.metadata),
         ImageFormat::Png => colors::of_png(file, &mut stored),
         ImageFormat::OpenExr => stored.warnings.extend(colors::lost_of_exr(file)),
         ImageFormat::Hdr => stored.warnings.extend(colors::lost_of_hdr(file)),
