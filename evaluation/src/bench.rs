@@ -30,6 +30,9 @@ pub(crate) struct Folders {
     /// and 50,000 Gaussians.
     #[arg(long, value_name = "DIR")]
     large: Option<PathBuf>,
+    /// Folder with screenshots, as .png, for `monotony`.
+    #[arg(long, value_name = "DIR")]
+    screens: Option<PathBuf>,
 }
 
 /// The pictures and settings of a run, and where its measurements are kept.
@@ -41,6 +44,7 @@ pub(crate) struct Bench {
     photos: Vec<TestPicture>,
     /// For the paper's fits at 2K.
     pub(crate) large: Vec<TestPicture>,
+    pub(crate) screens: Vec<TestPicture>,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -71,6 +75,7 @@ impl Bench {
             pictures: load(&folders.kodak, QUICK_PICTURES)?,
             photos: others(&folders.photos, QUICK_PICTURES)?,
             large: others(&folders.large, QUICK_LARGE_PICTURES)?,
+            screens: others(&folders.screens, QUICK_LARGE_PICTURES)?,
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
@@ -87,7 +92,8 @@ impl Bench {
     /// Makes sure that the folder has no measurements of another picture with the same name.
     fn check_pictures(&self) -> Result<()> {
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        for picture in self.pictures.iter().chain(&self.photos).chain(&self.large) {
+        let photographs = self.pictures.iter().chain(&self.photos).chain(&self.large);
+        for picture in photographs.chain(&self.screens) {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -209,7 +215,7 @@ mod tests {
     use super::*;
 
     fn open(images: &Path, report: &Path) -> Result<Bench> {
-        let folders = Folders { kodak: images.into(), photos: None, large: None };
+        let folders = Folders { kodak: images.into(), photos: None, large: None, screens: None };
         Bench::new(&folders, report.into(), false, None, None)
     }
 

@@ -28,7 +28,8 @@ use clap::Parser;
 use bench::{Bench, Folders};
 use report::Section;
 use sections::{
-    ablation, content, decode, printed, quality, rate, representation, sheet, speed, stability,
+    ablation, content, decode, monotony, printed, quality, rate, representation, sheet, speed,
+    stability,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -94,6 +95,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Decode => decode::measure(bench),
         Section::Stability => stability::measure(bench),
         Section::Content => content::measure(bench),
+        Section::Monotony => monotony::measure(bench),
     }
 }
 

@@ -37,11 +37,13 @@ pub(crate) enum Section {
     Stability,
     /// Gaussians and bytes for simple and for difficult pictures
     Content,
+    /// Whether more bits and more effort give no worse picture
+    Monotony,
 }
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
@@ -52,6 +54,7 @@ impl Section {
         Self::Decode,
         Self::Stability,
         Self::Content,
+        Self::Monotony,
     ];
 
     fn title(self) -> &'static str {
@@ -66,6 +69,7 @@ impl Section {
             Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",
             Self::Content => "Only what a scene needs",
+            Self::Monotony => "More bits, more effort",
         }
     }
 }

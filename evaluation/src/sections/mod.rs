@@ -13,6 +13,7 @@ mod f64_renderer;
 mod float_file;
 mod growth;
 mod methods;
+pub(crate) mod monotony;
 pub(crate) mod printed;
 mod product_tests;
 pub(crate) mod quality;
