@@ -79,6 +79,7 @@ pub struct Encoder {
     limits: Limits,
     pub(crate) metadata: Metadata,
     training: Option<Training>,
+    keep_invisible: bool,
 }
 
 impl Default for Encoder {
@@ -101,6 +102,7 @@ impl Encoder {
             limits: Limits::default(),
             metadata: Metadata::default(),
             training: None,
+            keep_invisible: false,
         }
     }
 
@@ -167,6 +169,15 @@ impl Encoder {
         self
     }
 
+    /// Whether colours are kept where alpha is 0. Default `false`: what does not show gets the colours
+    /// around it, which takes fewer bytes and leaves no fringes when the picture is scaled; errors of a
+    /// colour count times alpha. With `true` all samples count as they are stored, as for masks that
+    /// are no opacity.
+    pub fn with_keep_invisible(mut self, keep_invisible: bool) -> Self {
+        self.keep_invisible = keep_invisible;
+        self
+    }
+
     /// Encodes `source`. A target that cannot be met is not an error: the file comes as close as
     /// it can, and [`Report::shortfall`] gives the reason.
     ///
@@ -193,8 +204,9 @@ impl Encoder {
         let start = Instant::now();
         let (training, passes) = self.check()?;
         let mut observer = Observer::new(progress, training.iterations);
+        let source = source.keeping_invisible(self.keep_invisible);
         let job = Job {
-            source,
+            source: &source,
             target: self.target,
             tune: self.tune,
             precision: self.precision,
@@ -277,13 +289,15 @@ pub struct Report {
     /// Number of Gaussians in the file.
     pub gaussians: u32,
     /// PSNR in dB of the decoded file against the source, over all samples at the source's depth;
-    /// infinite for an exact copy.
+    /// infinite for an exact copy. Colours count as they show, times their alpha, unless those under
+    /// alpha 0 are kept ([`Encoder::with_keep_invisible`]).
     pub psnr: f64,
     /// PSNR in dB of the decoded file against the source, where the decoded samples are floats,
     /// clamped but not rounded. This is the PSNR that papers report.
     pub psnr_float: f64,
     /// An estimate of the visual quality of the decoded file, from 0 to 100: the score that the metric
-    /// SSIMULACRA2 would give, within about 2.
+    /// SSIMULACRA2 would give, within about 2. Of a picture with alpha it is the lower one of those over
+    /// black and over white.
     pub quality: f64,
     /// Iterations of training.
     pub iterations: u32,

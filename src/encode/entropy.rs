@@ -9,7 +9,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::Target;
 use super::progress::Observer;
-use super::quality;
+use super::quality::judge;
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, SearchWork, TargetSearch, Window};
@@ -24,10 +24,13 @@ const MAX_ROUNDS: u32 = 8;
 
 /// How often the number of Gaussians of a finished fit may be corrected for a quality, and the
 /// factors that need no correction, because the steps of quantization make up for them.
-const MAX_CORRECTIONS: u32 = 3;
+const MAX_CORRECTIONS: u32 = 5;
 const CLOSE: Range<f64> = 0.75..1.2;
-/// The least factor for a correction.
-const LEAST_FACTOR: f64 = 0.25;
+/// The least and the largest factor for a correction.
+const FACTORS: (f64, f64) = (0.25, 4.0);
+/// The powers of the number of Gaussians that the error is taken to be inversely proportional to, once
+/// there are two of each: of noise it is a low one, of smooth pictures a high one.
+const POWERS: (f64, f64) = (0.4, 2.0);
 
 /// The bits of the Gaussians in a file of a size.
 pub(crate) fn bits_for_size(
@@ -54,8 +57,7 @@ pub(crate) fn finish(
         extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), job, observer)?;
     }
     if let Some(quality) = job.target.quality() {
-        let dissimilarity = rate_model::SHARE_OF_FIT * quality::dissimilarity_at(quality);
-        correct(&mut fit, dissimilarity, job, layout, observer)?;
+        correct(&mut fit, quality, job, layout, observer)?;
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -101,24 +103,33 @@ fn extend(
     Ok(())
 }
 
-/// Adds or removes Gaussians until a fit has about as many as the dissimilarity needs.
+/// Adds or removes Gaussians until a fit has about as many as the quality needs.
 fn correct(
     fit: &mut Fit<'_>,
-    dissimilarity: f64,
+    wanted_quality: f64,
     job: &Job<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(), EncodeError> {
+    let mut power = 1.0;
+    let mut last: Option<(f64, f64)> = None;
     for round in 0..MAX_CORRECTIONS {
         let before = fit.len();
         let gaussians = fit.gaussians();
         let limits = Limits::none();
         let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
-        // The dissimilarity is about inversely proportional to the number of Gaussians, but not where
-        // a few of them make the picture. There, too many are better than too few.
-        let factor = quality::dissimilarity(job.source, &picture, observer)? / dissimilarity;
+        // The error is about inversely proportional to the number of Gaussians, but not where a few of
+        // them make the picture. There, too many are better than too few.
+        let verdict = judge(job.source, &picture, observer)?;
+        let factor = verdict.excess(wanted_quality) / rate_model::SHARE_OF_FIT;
         let is_close = factor < CLOSE.end && (factor > CLOSE.start || round > 0);
-        let wanted = before.max(1) as f64 * factor.max(LEAST_FACTOR);
+        let count = before.max(1) as f64;
+        if let Some((last_count, last_factor)) = last {
+            let found = (last_factor / factor).ln() / (count / last_count).ln();
+            power = if found.is_finite() { found.clamp(POWERS.0, POWERS.1) } else { 1.0 };
+        }
+        last = Some((count, factor));
+        let wanted = count * factor.powf(1.0 / power).clamp(FACTORS.0, FACTORS.1);
         let wanted = (wanted.ceil() as usize).min(fit.most());
         if is_close || wanted == before {
             break;

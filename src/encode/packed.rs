@@ -8,12 +8,19 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{PSNR_TOLERANCE, Precision, SIZE_TOLERANCE, Target};
 use super::progress::Observer;
+use super::quality::judge;
 use super::source::Source;
 use super::verify::Verified;
 use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
 
 /// How often a finished fit may be extended to meet its target.
 const MAX_ROUNDS: u32 = 8;
+/// From which factor on the error that a quality allows Gaussians are added, and the most times as many
+/// that there are then.
+const CLOSE: f64 = 1.05;
+const MOST_FACTOR: f64 = 2.0;
+/// How often a finished fit may be extended for a quality.
+const MAX_EXTENSIONS: u32 = 4;
 /// How many single Gaussians are tried without.
 const MAX_TRIALS: usize = 64;
 
@@ -62,6 +69,9 @@ pub(crate) fn finish(
             break;
         }
     }
+    if let Some(quality) = target.quality() {
+        file = extended(&mut fit, file, quality, layout, source, observer)?;
+    }
     if let Target::Psnr(target) = target {
         file = trimmed(layout, layout.ordered(&fit.fitted()), file, source, target, observer)?;
     }
@@ -82,6 +92,39 @@ fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec
             (_, _) => packed(depths.color_bits),
         })
         .collect()
+}
+
+/// The best file of a fit that is extended until it has a quality. Codes of fixed depths are too coarse
+/// to ask for smooth gradients as well.
+fn extended(
+    fit: &mut Fit<'_>,
+    file: Vec<u8>,
+    wanted: f64,
+    layout: &FileLayout<'_>,
+    source: &Source<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Vec<u8>, EncodeError> {
+    let excess = |file: &[u8], observer: &mut Observer<'_>| {
+        let verified = Verified::new(file, source, observer)?;
+        let verdict = judge(source, &verified.picture(), observer)?;
+        Ok::<_, EncodeError>(verdict.excess_of_structure(wanted))
+    };
+    let mut best = (excess(&file, observer)?, file);
+    let mut factor = best.0;
+    for _ in 0..MAX_EXTENSIONS {
+        let count = fit.len().max(1) as f64 * factor.min(MOST_FACTOR);
+        let count = (count.ceil() as usize).min(fit.most());
+        if factor < CLOSE || count <= fit.len() {
+            break;
+        }
+        fit.resize(count, observer)?;
+        let file = layout.write_packed(&fit.fitted());
+        factor = excess(&file, observer)?;
+        if factor < best.0 {
+            best = (factor, file);
+        }
+    }
+    Ok(best.1)
 }
 
 /// How many Gaussians a finished fit still needs for its target.

@@ -87,7 +87,7 @@ fn encode_for_target(
     };
     observer.advance(preparation)?;
     observer.expect(work_from_training(job, expected));
-    let preparing = raster.memory() + raster.scratch_memory(source);
+    let preparing = raster.memory() + raster.scratch_memory;
     let peak_before = work.peak_memory.max(preparing);
     let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
@@ -104,12 +104,12 @@ fn encode_for_target(
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());
-    let (distortion, dissimilarity) = verified.judged(observer)?;
+    let (distortion, verdict) = verified.judged(observer)?;
     let judging = quality::memory(source);
     work.peak_memory = work.peak_memory.max(judging).max(peak_before);
     // The estimate of an exact copy would have rounding errors.
     let is_exact = distortion.psnr == f64::INFINITY;
-    let quality = if is_exact { 100.0 } else { quality::quality(dissimilarity).max(0.0) };
+    let quality = if is_exact { 100.0 } else { verdict.quality() };
     let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
     let reached =
         Reached { bytes: file.len(), psnr: distortion.psnr, exact_psnr, quality, gaussians };
@@ -147,12 +147,11 @@ fn budget(
             .map(Budget::Count);
     }
     if let Some(quality) = target.quality() {
-        let dissimilarity = quality::dissimilarity_at(quality);
         let means = match &raster.sensitivity {
             Some(sensitivity) => sensitivity.means,
             None => Sensitivity::new(job.source, observer)?.means,
         };
-        let count = quality::count_for(dissimilarity, raster.pixels(), means);
+        let count = quality::count_for(quality, raster.pixels(), means);
         return Ok(Budget::Count(count));
     }
     Ok(match target {

@@ -2,6 +2,7 @@
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
+use super::alpha_bleed::Bled;
 use super::error::EncodeError;
 use super::options::Tune;
 use super::progress::Observer;
@@ -45,9 +46,13 @@ pub(crate) struct Raster {
     /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) mean: [f32; 4],
     planes: Planes,
+    /// Size in bytes of what else [`Raster::new`] needed.
+    pub(crate) scratch_memory: usize,
 }
 
 impl Raster {
+    /// That of a source. Colours that do not show are others, unless they are to be kept.
+    ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
@@ -55,6 +60,10 @@ impl Raster {
         tune: Tune,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
+        let bled = Bled::new(source, observer)?;
+        let bled_memory = bled.as_ref().map_or(0, |bled| bled.memory(source));
+        let bled_source = bled.as_ref().map(|bled| bled.source(source));
+        let source = bled_source.as_ref().unwrap_or(source);
         let (width, height) = (source.width() as usize, source.height() as usize);
         let channels = source.color().channels();
         let size = [width, height, channels];
@@ -75,7 +84,9 @@ impl Raster {
             Tune::Visual => Some(Sensitivity::new(source, observer)?),
             Tune::Psnr => None,
         };
-        Ok(Self { width, height, channels, half_step, sensitivity, mean, planes })
+        let scratch = sensitivity.as_ref().map_or(0, |found| found.scratch_memory(source));
+        let scratch_memory = bled_memory + scratch;
+        Ok(Self { width, height, channels, half_step, sensitivity, mean, planes, scratch_memory })
     }
 
     /// All channels of a tile.
@@ -133,12 +144,6 @@ impl Raster {
 
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
-    }
-
-    /// Size in bytes of what else [`Raster::new`] needs.
-    pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
-        let sensitivity = self.sensitivity.as_ref();
-        sensitivity.map_or(0, |sensitivity| sensitivity.scratch_memory(source))
     }
 
     /// Size in bytes.

@@ -6,6 +6,8 @@
 //! So a coarse error, which shifts the means of small blocks of pixels, counts more than a fine one,
 //! and both count less in texture than on even ground.
 
+use core::ops::Range;
+
 use super::error::EncodeError;
 use super::progress::Observer;
 use super::source::Source;
@@ -61,6 +63,7 @@ impl Sensitivity {
         let model = source.color();
         let colors = model.channels() - usize::from(model.has_alpha());
         let shares = if colors == 1 { [1.0, 0.0, 0.0] } else { LUMA };
+        let backgrounds = source.backgrounds();
         let columns = (source.width() as usize).div_ceil(BLOCK);
         let rows = (source.height() as usize).div_ceil(BLOCK);
         let mut blocks = vec![[0.0; SCALES]; columns * rows];
@@ -72,8 +75,15 @@ impl Sensitivity {
             observer.map(work, bands, |(band, blocks)| {
                 let first = band * BAND;
                 let end = first + blocks.len() / columns;
-                let luma = LumaBand::new(source, &shares[..colors], scale, first, end);
-                luma.logarithms(first, blocks);
+                let rows = first..end;
+                for background in backgrounds {
+                    let over = source.is_premultiplied().then_some(*background);
+                    let luma = LumaBand::new(source, &shares[..colors], scale, rows.clone(), over);
+                    luma.add_logarithms(first, blocks);
+                }
+                for block in blocks {
+                    *block /= backgrounds.len() as f32;
+                }
             })?;
             let (values, mean) = normalized(&logarithms);
             observer.poll()?;
@@ -135,8 +145,14 @@ struct LumaBand {
 }
 
 impl LumaBand {
-    /// The luma on a scale around some rows of blocks.
-    fn new(source: &Source<'_>, shares: &[f32], scale: usize, first: usize, end: usize) -> Self {
+    /// The luma on a scale around some rows of blocks, of the colours as they are or over a background.
+    fn new(
+        source: &Source<'_>,
+        shares: &[f32],
+        scale: usize,
+        Range { start: first, end }: Range<usize>,
+        background: Option<f32>,
+    ) -> Self {
         let side = 1 << scale;
         let most = RADII[RADII.len() - 1] / side;
         let size = [source.width() as usize, source.height() as usize];
@@ -159,6 +175,11 @@ impl LumaBand {
                     *value = samples
                         .map(|(at, share)| share * f32::from(source.wide_sample(at)) / 65535.0)
                         .sum::<f32>();
+                    if let Some(background) = background {
+                        let alpha = source.wide_sample((row * size[0] + x + 1) * channels - 1);
+                        let alpha = f32::from(alpha) / 65535.0;
+                        *value = *value * alpha + background * (1.0 - alpha);
+                    }
                 }
                 for (mean, part) in means.iter_mut().zip(line.chunks(side)) {
                     *mean += part.iter().sum::<f32>() / (part.len() * count) as f32;
@@ -176,9 +197,9 @@ impl LumaBand {
         Self { scale, first, width, height: end - first, sums }
     }
 
-    /// The logarithms of the sensitivities of rows of blocks, of which the first has the index
+    /// Adds the logarithms of the sensitivities of rows of blocks, of which the first has the index
     /// `first` in the picture: means over the values of a block on this scale.
-    fn logarithms(&self, first: usize, blocks: &mut [f32]) {
+    fn add_logarithms(&self, first: usize, blocks: &mut [f32]) {
         let side = BLOCK >> self.scale;
         let columns = self.width.div_ceil(side);
         for (index, block) in blocks.iter_mut().enumerate() {
@@ -193,7 +214,7 @@ impl LumaBand {
                     count += 1.0;
                 }
             }
-            *block = (-MASKING / RADII.len() as f64 * sum / count) as f32;
+            *block += (-MASKING / RADII.len() as f64 * sum / count) as f32;
         }
     }
 

@@ -27,6 +27,11 @@ pub enum Shortfall {
         /// Estimated quality of the file.
         quality: f64,
     },
+    /// The visual quality is about the highest that is aimed at, but below its target.
+    QualityCapped {
+        /// Estimated quality of the file.
+        quality: f64,
+    },
     /// The visual quality is above its target even with these few Gaussians.
     QualityAbove {
         /// Estimated quality of the file.
@@ -87,9 +92,11 @@ impl Shortfall {
             };
         }
         if let Some(target) = target.quality() {
-            let target = target.min(MOST_QUALITY);
-            return if quality < target - QUALITY_TOLERANCE {
+            let aim = target.min(MOST_QUALITY);
+            return if quality < aim - QUALITY_TOLERANCE {
                 Some(Self::QualityBelow { quality })
+            } else if quality < target - QUALITY_TOLERANCE {
+                Some(Self::QualityCapped { quality })
             } else {
                 let is_above = quality > target + QUALITY_TOLERANCE;
                 is_above.then_some(Self::QualityAbove { quality, gaussians })
@@ -120,6 +127,9 @@ impl fmt::Display for Shortfall {
             }
             Self::QualityBelow { quality } => {
                 write!(f, "quality {quality:.1} is what this effort and precision reach")
+            }
+            Self::QualityCapped { quality } => {
+                write!(f, "quality {quality:.1}: more than {MOST_QUALITY} is not aimed at")
             }
             Self::QualityAbove { quality, gaussians } => {
                 write!(f, "with {gaussians} Gaussians the picture already has quality {quality:.1}")

@@ -11,6 +11,8 @@ pub struct Source<'a> {
     height: u32,
     color: ColorModel,
     samples: SourceSamples<'a>,
+    /// Whether colours count where alpha is 0.
+    keeps_invisible: bool,
 }
 
 /// Most pixels of a row that are read at a time.
@@ -36,7 +38,7 @@ impl<'a> Source<'a> {
         samples: &'a [u8],
     ) -> Result<Self, SourceError> {
         check(width, height, color, samples.len())?;
-        Ok(Self { width, height, color, samples: SourceSamples::Eight(samples) })
+        Ok(Self::of(width, height, color, SourceSamples::Eight(samples)))
     }
 
     /// A picture of 16-bit samples, 0 to 65535: width x height x channels of them, pixel after
@@ -51,7 +53,32 @@ impl<'a> Source<'a> {
         samples: &'a [u16],
     ) -> Result<Self, SourceError> {
         check(width, height, color, samples.len())?;
-        Ok(Self { width, height, color, samples: SourceSamples::Sixteen(samples) })
+        Ok(Self::of(width, height, color, SourceSamples::Sixteen(samples)))
+    }
+
+    fn of(width: u32, height: u32, color: ColorModel, samples: SourceSamples<'a>) -> Self {
+        Self { width, height, color, samples, keeps_invisible: false }
+    }
+
+    /// The same picture, where colours count under alpha 0 as well, or not.
+    pub(crate) fn keeping_invisible(self, keeps_invisible: bool) -> Self {
+        Self { keeps_invisible, ..self }
+    }
+
+    /// A picture of the same size, model and depth with other samples.
+    pub(crate) fn with_samples<'b>(&self, samples: SourceSamples<'b>) -> Source<'b> {
+        let Self { width, height, color, keeps_invisible, .. } = *self;
+        Source { width, height, color, samples, keeps_invisible }
+    }
+
+    /// Whether errors of a colour count as they show: times alpha.
+    pub(crate) fn is_premultiplied(&self) -> bool {
+        self.color.has_alpha() && !self.keeps_invisible
+    }
+
+    /// Backgrounds that the picture is judged over, where a full sample is 1.
+    pub(crate) fn backgrounds(&self) -> &'static [f32] {
+        if self.color.has_alpha() { &[0.0, 1.0] } else { &[0.0] }
     }
 
     /// Width in pixels.

@@ -9,7 +9,7 @@ use super::file::FileLayout;
 use super::job::Job;
 use super::options::Target;
 use super::progress::Observer;
-use super::quality::Judgement;
+use super::quality::{Judgement, Verdict};
 use super::source::{SPAN, Source};
 use super::strips;
 use crate::decode::StreamDecoder;
@@ -33,7 +33,8 @@ pub(crate) struct Verified<'a> {
 /// The distortion of the decoded picture.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilePsnr {
-    /// PSNR in dB of samples rounded to the source's depth.
+    /// PSNR in dB of samples rounded to the source's depth; colours count times alpha, unless those that
+    /// do not show are to be kept.
     pub(crate) psnr: f64,
     /// PSNR in dB of samples that are clamped, but not rounded.
     pub(crate) psnr_float: f64,
@@ -125,20 +126,20 @@ impl<'a> Verified<'a> {
         Ok(errors.psnr(self.source))
     }
 
-    /// The distortion of the decoded picture, and its dissimilarity to the source.
+    /// The distortion of the decoded picture, and how it differs from the source to the eye.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn judged(
         &self,
         observer: &mut Observer<'_>,
-    ) -> Result<(FilePsnr, f64), EncodeError> {
+    ) -> Result<(FilePsnr, Verdict), EncodeError> {
         let (mut errors, mut judgement) = (Errors::default(), Judgement::new(self.source));
         strips::render(&self.picture(), u32::MAX, observer, |region, planes| {
             errors.add(self.source, region, planes);
             judgement.see(region, planes);
         })?;
-        Ok((errors.psnr(self.source), judgement.dissimilarity()))
+        Ok((errors.psnr(self.source), judgement.verdict()))
     }
 }
 
@@ -170,21 +171,35 @@ impl Errors {
     fn of_row(source: &Source<'_>, region: Region, planes: &[f32], row: usize) -> Self {
         let (width, pixels) = (region.width as usize, region.pixels() as usize);
         let full_scale = f32::from(source.depth().max_sample());
+        let channels = source.color().channels();
         let mut samples = [[0.0; SPAN]; 4];
+        let (mut values, mut integers) = (samples, samples);
         let (mut rounded, mut exact) = ([0.0; LANES], [0.0; LANES]);
         for first in (0..width).step_by(SPAN) {
             let count = source.read(first, region.y as usize + row, &mut samples);
-            for (samples, plane) in samples.iter_mut().zip(planes.chunks_exact(pixels)) {
-                let mut values = [0.0; SPAN];
+            for (channel, plane) in planes.chunks_exact(pixels).enumerate() {
+                let (values, integers) = (&mut values[channel], &mut integers[channel]);
                 values[..count].copy_from_slice(&plane[row * width + first..][..count]);
-                samples[count..].fill(0.0);
+                for at in 0..SPAN {
+                    values[at] = values[at].clamp(0.0, 1.0) * full_scale;
+                    integers[at] = (values[at] + 0.5).floor();
+                }
+            }
+            if source.is_premultiplied() {
+                for planes in [&mut samples, &mut values, &mut integers] {
+                    premultiply(&mut planes[..channels], full_scale);
+                }
+            }
+            for channel in 0..channels {
+                for planes in [&mut samples, &mut values, &mut integers] {
+                    planes[channel][count..].fill(0.0);
+                }
                 for at in (0..count).step_by(LANES) {
                     for lane in 0..LANES {
-                        let sample = f64::from(samples[at + lane]);
-                        let value = values[at + lane].clamp(0.0, 1.0) * full_scale;
-                        let error = f64::from((value + 0.5).floor()) - sample;
+                        let sample = f64::from(samples[channel][at + lane]);
+                        let error = f64::from(integers[channel][at + lane]) - sample;
                         rounded[lane] += error * error;
-                        let error = f64::from(value) - sample;
+                        let error = f64::from(values[channel][at + lane]) - sample;
                         exact[lane] += error * error;
                     }
                 }
@@ -201,6 +216,17 @@ impl Errors {
         FilePsnr {
             psnr: 10.0 * (most / self.rounded).log10(),
             psnr_float: 10.0 * (most / self.exact).log10(),
+        }
+    }
+}
+
+/// Multiplies colours by their alpha, the last of the planes.
+#[inline(always)]
+fn premultiply(planes: &mut [[f32; SPAN]], full_scale: f32) {
+    let Some((alpha, colors)) = planes.split_last_mut() else { return };
+    for color in colors {
+        for at in 0..SPAN {
+            color[at] *= alpha[at] * (1.0 / full_scale);
         }
     }
 }

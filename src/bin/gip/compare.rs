@@ -32,13 +32,32 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
     let depth = if a.depth().bits() > b.depth().bits() { a.depth() } else { b.depth() };
     a.convert(color, depth);
     b.convert(color, depth);
-    let comparison = match (a.samples(), b.samples()) {
-        (SampleSlice::Eight(x), SampleSlice::Eight(y)) => Comparison::new(&a, depth, x, y),
-        (SampleSlice::Sixteen(x), SampleSlice::Sixteen(y)) => Comparison::new(&a, depth, x, y),
-        _ => bail!("the depths differ"),
-    };
+    let samples = |picture| shown(picture, args.keep_invisible);
+    let comparison = Comparison::new(&a, depth, &samples(&a), &samples(&b));
     let text = if args.json { serde_json::to_string(&comparison)? } else { comparison.to_string() };
     files::print(&text, None)
+}
+
+/// The samples of a picture, with colours times their alpha unless those under alpha 0 count, too.
+fn shown(picture: &StillImage, keep_invisible: bool) -> Vec<f64> {
+    let (mut samples, full): (Vec<f64>, _) = match picture.samples() {
+        SampleSlice::Eight(samples) => {
+            (samples.iter().map(|&s| s.into()).collect(), u8::MAX.into())
+        }
+        SampleSlice::Sixteen(samples) => {
+            (samples.iter().map(|&s| s.into()).collect(), f64::from(u16::MAX))
+        }
+    };
+    let color = picture.color();
+    if color.has_alpha() && !keep_invisible {
+        for pixel in samples.chunks_exact_mut(color.channels()) {
+            let (alpha, colors) = pixel.split_last_mut().expect("a pixel has samples");
+            for sample in colors {
+                *sample *= *alpha / full;
+            }
+        }
+    }
+    samples
 }
 
 /// What `--json` prints.
@@ -54,12 +73,7 @@ struct Comparison {
 }
 
 impl Comparison {
-    fn new<T: Copy + Into<f64>>(
-        picture: &StillImage,
-        depth: SampleDepth,
-        a: &[T],
-        b: &[T],
-    ) -> Self {
+    fn new(picture: &StillImage, depth: SampleDepth, a: &[f64], b: &[f64]) -> Self {
         let full_scale = f64::from((1_u32 << depth.bits()) - 1);
         let (width, height) = (picture.image.width(), picture.image.height());
         let channels = picture.color().channels();
@@ -70,7 +84,7 @@ impl Comparison {
             depth: depth.bits(),
             psnr: json_psnr(metrics::psnr(a, b, full_scale)),
             ms_ssim: metrics::ms_ssim(a, b, width as usize, channels, full_scale),
-            max_abs_error: metrics::max_abs_error(a, b) as u32,
+            max_abs_error: metrics::max_abs_error(a, b).ceil() as u32,
         }
     }
 }

@@ -21,17 +21,21 @@ const VECTORS: usize = 32;
 pub(super) struct Sums {
     /// Of structural dissimilarity, 1 - SSIM.
     pub(super) structure: f64,
-    /// Of its 4th powers.
+    /// Of detail that the rendering has and the source lacks.
+    pub(super) artifacts: f64,
+    /// Of detail that is lost in the rendering.
+    pub(super) lost: f64,
+    /// Of the 4th powers of each.
     pub(super) structure_4: f64,
-    /// Of the 4th powers of detail that the rendering has and the source lacks.
     pub(super) artifacts_4: f64,
-    /// Of the 4th powers of detail that is lost in the rendering.
     pub(super) lost_4: f64,
 }
 
 impl core::ops::AddAssign for Sums {
     fn add_assign(&mut self, other: Self) {
         self.structure += other.structure;
+        self.artifacts += other.artifacts;
+        self.lost += other.lost;
         self.structure_4 += other.structure_4;
         self.artifacts_4 += other.artifacts_4;
         self.lost_4 += other.lost_4;
@@ -71,7 +75,7 @@ fn part<S: Simd>(simd: S, around: &Around<'_>, vectors: Range<usize>, width: usi
         }
     }
     let [source, rendering] = around[RADIUS];
-    let mut sums = [f32x16::splat(simd, 0.0); 4];
+    let mut sums = [f32x16::splat(simd, 0.0); 6];
     for at in 0..vectors.len() {
         let [mean_a, mean_b, squares, product] = [
             mean_across(simd, &means[0], at),
@@ -96,18 +100,20 @@ fn part<S: Simd>(simd: S, around: &Around<'_>, vectors: Range<usize>, width: usi
                 found[which] *= inside;
             }
         }
-        sums[0] += found[0];
         for which in 0..3 {
+            sums[which] += found[which];
             let square = found[which] * found[which];
-            sums[which + 1] += square * square;
+            sums[which + 3] += square * square;
         }
     }
     let total = |sum: f32x16<S>| sum.as_array().iter().map(|&lane| f64::from(lane)).sum();
     Sums {
         structure: total(sums[0]),
-        structure_4: total(sums[1]),
-        artifacts_4: total(sums[2]),
-        lost_4: total(sums[3]),
+        artifacts: total(sums[1]),
+        lost: total(sums[2]),
+        structure_4: total(sums[3]),
+        artifacts_4: total(sums[4]),
+        lost_4: total(sums[5]),
     }
 }
 
@@ -182,6 +188,8 @@ mod tests {
                 let detail = (1.0 + (b(at) - mb).abs()) / (1.0 + (a(at) - ma).abs()) - 1.0;
                 sums += Sums {
                     structure,
+                    artifacts: detail.max(0.0),
+                    lost: (-detail).max(0.0),
                     structure_4: structure.powi(4),
                     artifacts_4: detail.max(0.0).powi(4),
                     lost_4: (-detail).max(0.0).powi(4),
@@ -227,6 +235,8 @@ mod tests {
                 let found = total(level, &different);
                 let pairs = [
                     (found.structure, expected.structure),
+                    (found.artifacts, expected.artifacts),
+                    (found.lost, expected.lost),
                     (found.structure_4, expected.structure_4),
                     (found.artifacts_4, expected.artifacts_4),
                     (found.lost_4, expected.lost_4),

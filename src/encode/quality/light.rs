@@ -5,14 +5,12 @@
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 use super::rows::Lanes;
-use crate::color::ColorModel;
+use crate::color::{ColorModel, SampleDepth};
 use crate::encode::source::{SPAN, Source};
 use crate::region::Region;
 
 /// Pixels of a row in a block.
 pub(super) const COLUMNS: usize = SPAN;
-/// What stands behind transparent pixels.
-const BACKGROUND: f32 = 0.5;
 /// The transfer function of sRGB above its linear part, as a polynomial from the constant term on:
 /// responses are within 4e-6.
 const TRANSFER: [f32; 8] = [
@@ -27,10 +25,23 @@ const TRANSFER: [f32; 8] = [
 ];
 /// The bias of the cube root that models the response of the eye's cones (JPEG XL, annex L.2).
 const BIAS: f32 = 0.003_793_073;
-/// The responses of luma, the mean of the long and medium cones, and of the short cones to linear
-/// light.
-const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
+/// Its cube root.
+const BIAS_ROOT: f32 = 0.155_954_2;
+/// The shares of linear light that the long, medium and short cones take in.
+const LONG: [f32; 3] = [0.3, 0.622, 0.078];
+const MEDIUM: [f32; 3] = [0.23, 0.692, 0.078];
 const SHORT: [f32; 3] = [0.243_423, 0.204_767, 0.551_81];
+
+/// A channel of what the eye takes in, XYB, scaled and shifted as SSIMULACRA2 does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Channel {
+    /// Red against green, X.
+    Opponent,
+    /// Y.
+    Luma,
+    /// Blue minus luma, B.
+    Blue,
+}
 
 /// A row of a block, where a full sample is 1.
 pub(super) type BlockRow = [Lanes; COLUMNS / 16];
@@ -44,9 +55,10 @@ pub(super) trait Samples: Sync {
     fn read(&self, x: usize, y: usize, channels: &mut [[f32; COLUMNS]; 4]);
 }
 
-/// A strip of a rendering.
+/// A strip of a rendering, which is seen as a decoder shows it: clamped and rounded.
 pub(super) struct Strip<'a> {
     pub(super) model: ColorModel,
+    pub(super) depth: SampleDepth,
     pub(super) region: Region,
     /// Plane after plane.
     pub(super) planes: &'a [f32],
@@ -62,8 +74,13 @@ impl Samples for Strip<'_> {
         let (width, pixels) = (self.region.width as usize, self.region.pixels() as usize);
         let count = COLUMNS.min(width - x);
         let at = (y - self.region.y as usize) * width + x;
+        let full_scale = f32::from(self.depth.max_sample());
+        let scale = 1.0 / full_scale;
         for (channel, plane) in channels.iter_mut().zip(self.planes.chunks_exact(pixels)) {
             channel[..count].copy_from_slice(&plane[at..][..count]);
+            for x in 0..COLUMNS {
+                channel[x] = (channel[x].clamp(0.0, 1.0) * full_scale + 0.5).floor() * scale;
+            }
         }
     }
 }
@@ -85,12 +102,13 @@ impl Samples for Source<'_> {
     }
 }
 
-/// The linear light of a row of a block from its samples, over the background.
+/// The linear light of a row of a block from its samples, over a background.
 #[inline(always)]
 pub(super) fn linear_row<S: Simd>(
     simd: S,
     model: ColorModel,
     channels: &[[f32; COLUMNS]; 4],
+    background: f32,
     light: [&mut BlockRow; 3],
 ) {
     let alpha = if model.has_alpha() { Some(model.channels() - 1) } else { None };
@@ -103,7 +121,7 @@ pub(super) fn linear_row<S: Simd>(
         }
         if let Some(alpha) = alpha {
             let opacity = values[alpha];
-            let background = opacity * -BACKGROUND + BACKGROUND;
+            let background = opacity * -background + background;
             for channel in 0..colors {
                 values[channel] = values[channel] * opacity + background;
             }
@@ -120,10 +138,9 @@ pub(super) fn linear_row<S: Simd>(
     }
 }
 
-/// The linear light of encoded samples, which are clamped.
+/// The linear light of encoded samples.
 #[inline(always)]
 fn linear<S: Simd>(simd: S, encoded: f32x16<S>) -> f32x16<S> {
-    let encoded = encoded.max(0.0).min(1.0);
     let mut light = f32x16::splat(simd, TRANSFER[TRANSFER.len() - 1]);
     for power in (0..TRANSFER.len() - 1).rev() {
         light = light * encoded + TRANSFER[power];
@@ -131,16 +148,18 @@ fn linear<S: Simd>(simd: S, encoded: f32x16<S>) -> f32x16<S> {
     encoded.simd_le(0.04045).select(encoded * (1.0 / 12.92), light)
 }
 
-/// The response of luma to linear light.
+/// The responses to linear light in the order of [`Channel`]; that of blue only if it is wanted.
 #[inline(always)]
-pub(super) fn luma<S: Simd>(simd: S, light: [f32x16<S>; 3]) -> f32x16<S> {
-    response(simd, LUMA, light)
-}
-
-/// Blue minus luma.
-#[inline(always)]
-pub(super) fn blue_minus_luma<S: Simd>(simd: S, light: [f32x16<S>; 3]) -> f32x16<S> {
-    response(simd, SHORT, light) - luma(simd, light)
+pub(super) fn responses<S: Simd>(
+    simd: S,
+    light: [f32x16<S>; 3],
+    with_blue: bool,
+) -> [f32x16<S>; 3] {
+    let (long, medium) = (response(simd, LONG, light), response(simd, MEDIUM, light));
+    let opponent = (long - medium) * 7.0 + 0.42;
+    let luma = (long + medium) * 0.5;
+    let blue = if with_blue { response(simd, SHORT, light) - luma + 0.55 } else { luma };
+    [opponent, luma + (0.01 - BIAS_ROOT), blue]
 }
 
 #[inline(always)]

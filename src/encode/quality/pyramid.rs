@@ -1,12 +1,11 @@
-//! A picture as the eye takes it in: luma and blue, on several scales.
+//! A picture as the eye takes it in: luma, red against green, and blue against luma, on several scales.
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::light::{BlockRow, COLUMNS, Samples, blue_minus_luma, linear_row, luma};
+use super::light::{BlockRow, COLUMNS, Channel, Samples, linear_row, responses};
+use super::norms::{LEAST_SIDE, Measured, SCALES};
 use super::rows::Group;
 
-/// Luma at all of the size, a half, a quarter and an eighth of it, and blue minus luma at a 16th.
-pub(super) const SCALES: usize = 5;
 /// Rows that make one row on the coarsest scale.
 pub(super) const ROWS: usize = 1 << (SCALES - 1);
 
@@ -17,55 +16,99 @@ struct Block {
     rows: usize,
 }
 
-/// Fills groups with rows of a picture on all scales, from the row `first` of `rows` rows on. It is
-/// picture number `which` of the groups.
+/// A picture over a background.
+pub(super) struct Shown<'a, P> {
+    pub(super) picture: &'a P,
+    pub(super) size: [usize; 2],
+    pub(super) background: f32,
+}
+
+/// The size of a picture with what is added to a small one: its mirror image.
+pub(super) fn padded(size: [usize; 2]) -> [usize; 2] {
+    size.map(|side| side.max(LEAST_SIDE))
+}
+
+/// Fills groups with rows of a picture, [`ROWS`] of them or as many as there are from the row `first`
+/// on: one group for all that is measured. It is picture number `which` of the groups.
 #[inline(always)]
-pub(super) fn fill<S: Simd>(
+pub(super) fn fill<S: Simd, P: Samples>(
     simd: S,
-    picture: &impl Samples,
-    [width, rows]: [usize; 2],
+    shown: &Shown<'_, P>,
     first: usize,
     which: usize,
-    groups: &mut [Group; SCALES],
+    measured: &[Measured],
+    groups: &mut [Group],
 ) {
+    let Shown { picture, size, background } = *shown;
+    let [width, height] = padded(size);
     let mut samples = [[0.0; COLUMNS]; 4];
     let mut block = Block { planes: [[[[0.0; 16]; COLUMNS / 16]; ROWS]; 3], columns: 0, rows: 0 };
     for x in (0..width).step_by(COLUMNS) {
-        (block.columns, block.rows) = (COLUMNS.min(width - x), rows);
-        for row in 0..rows {
-            picture.read(x, first + row, &mut samples);
+        (block.columns, block.rows) = (COLUMNS.min(width - x), ROWS.min(height - first));
+        for row in 0..block.rows {
+            picture.read(x, mirrored(first + row, size[1]), &mut samples);
+            for column in size[0]..width {
+                for channel in &mut samples {
+                    channel[column] = channel[mirrored(column, size[0])];
+                }
+            }
             let light = block.planes.each_mut().map(|plane| &mut plane[row]);
-            linear_row(simd, picture.model(), &samples, light);
+            linear_row(simd, picture.model(), &samples, background, light);
         }
-        for (scale, group) in groups.iter_mut().enumerate() {
+        let mut at = 0;
+        for scale in 0..SCALES {
             if scale > 0 {
                 block.halve(simd);
             }
-            for row in 0..block.rows {
-                let responses = block.responses(simd, row, scale + 1 == SCALES);
-                let part = group.part(which, row, x >> scale);
-                part[..block.columns].copy_from_slice(&responses.as_flattened()[..block.columns]);
-            }
+            let end = at + measured[at..].iter().take_while(|found| found.scale == scale).count();
+            block.take(simd, x >> scale, which, &measured[at..end], &mut groups[at..end]);
+            at = end;
         }
     }
 }
 
+/// An index inside of a length, mirrored at its ends.
+fn mirrored(at: usize, length: usize) -> usize {
+    let period = (2 * (length - 1)).max(1);
+    let at = at % period;
+    at.min(period - at).min(length - 1)
+}
+
 impl Block {
-    /// The responses of a row: of blue minus luma, or of luma.
+    /// Writes the responses that are measured on its scale to groups, from a column on.
     #[inline(always)]
-    fn responses<S: Simd>(&self, simd: S, row: usize, is_blue: bool) -> BlockRow {
-        let mut responses = [[0.0; 16]; COLUMNS / 16];
-        for at in 0..self.columns.div_ceil(16) {
-            let [red, green, blue] = &self.planes;
-            let light = [
-                f32x16::load_array_ref(simd, &red[row][at]),
-                f32x16::load_array_ref(simd, &green[row][at]),
-                f32x16::load_array_ref(simd, &blue[row][at]),
-            ];
-            let response = if is_blue { blue_minus_luma(simd, light) } else { luma(simd, light) };
-            response.store_array(&mut responses[at]);
+    fn take<S: Simd>(
+        &self,
+        simd: S,
+        x: usize,
+        which: usize,
+        measured: &[Measured],
+        groups: &mut [Group],
+    ) {
+        if measured.is_empty() {
+            return;
         }
-        responses
+        let with_blue = measured.iter().any(|found| found.channel == Channel::Blue);
+        let mut line = [[[0.0; 16]; COLUMNS / 16]; 3];
+        for row in 0..self.rows {
+            for at in 0..self.columns.div_ceil(16) {
+                let [red, green, blue] = &self.planes;
+                let light = [
+                    f32x16::load_array_ref(simd, &red[row][at]),
+                    f32x16::load_array_ref(simd, &green[row][at]),
+                    f32x16::load_array_ref(simd, &blue[row][at]),
+                ];
+                let [opponent, luma, blue] = responses(simd, light, with_blue);
+                opponent.store_array(&mut line[0][at]);
+                luma.store_array(&mut line[1][at]);
+                blue.store_array(&mut line[2][at]);
+            }
+            for (found, group) in measured.iter().zip(&mut *groups) {
+                let part = group.part(which, row, x);
+                let values = line[found.channel as usize].as_flattened();
+                part[..self.columns].copy_from_slice(&values[..self.columns]);
+            }
+        }
     }
 
     /// Makes it half as wide and high; the last row and column of an odd number count twice.
@@ -111,19 +154,31 @@ mod tests {
     use crate::encode::source::Source;
     use crate::testing::simd_levels;
 
-    /// Luma, or blue minus luma, of all pixels of a gray picture at a 2^scale-th of the size, where
-    /// `light` is linear.
-    fn plain(light: &[f64], [width, height]: [usize; 2], scale: usize) -> Vec<f64> {
+    /// X, Y and B of all pixels of a picture at a 2^scale-th of the size, where `light` is linear.
+    fn plain(light: &[[f64; 3]], [width, height]: [usize; 2], scale: usize) -> Vec<[f64; 3]> {
         if scale == 0 {
-            return light.iter().map(|light| (light + 0.003_793_073).cbrt()).collect();
+            let cones =
+                [[0.3, 0.622, 0.078], [0.23, 0.692, 0.078], [0.243_423, 0.204_767, 0.551_81]];
+            let responses = |light: &[f64; 3]| {
+                let [long, medium, short] = cones.map(|shares| {
+                    let taken: f64 =
+                        shares.iter().zip(light).map(|(share, light)| share * light).sum();
+                    (taken + 0.003_793_073).cbrt() - 0.003_793_073_f64.cbrt()
+                });
+                let luma = 0.5 * (long + medium);
+                [7.0 * (long - medium) + 0.42, luma + 0.01, short - luma + 0.55]
+            };
+            return light.iter().map(responses).collect();
         }
         let half = [width, height].map(|side| side.div_ceil(2));
         let means = (0..half[1]).flat_map(|y| (0..half[0]).map(move |x| [x, y]));
         let means = means.map(|[x, y]| {
-            let mut sum = 0.0;
+            let mut sum = [0.0; 3];
             for [dx, dy] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
                 let [x, y] = [(2 * x + dx).min(width - 1), (2 * y + dy).min(height - 1)];
-                sum += 0.25 * light[y * width + x];
+                for (sum, light) in sum.iter_mut().zip(light[y * width + x]) {
+                    *sum += 0.25 * light;
+                }
             }
             sum
         });
@@ -132,38 +187,47 @@ mod tests {
 
     #[test]
     fn scales_are_those_of_the_definition() {
-        for size in [[COLUMNS + 21, 13], [COLUMNS, ROWS], [1, 1], [9, 3]] {
+        for size in [[COLUMNS + 21, 13], [COLUMNS, ROWS], [1, 1], [9, 3], [2, 7]] {
             let mut rng = fastrand::Rng::with_seed(3);
-            let samples: Vec<u8> = (0..size[0] * size[1]).map(|_| rng.u8(..)).collect();
-            let source = Source::new_u8(size[0] as u32, size[1] as u32, ColorModel::Gray, &samples)
+            let samples: Vec<u8> = (0..size[0] * size[1] * 3).map(|_| rng.u8(..)).collect();
+            let source = Source::new_u8(size[0] as u32, size[1] as u32, ColorModel::Rgb, &samples)
                 .expect("the sizes agree");
-            let light: Vec<f64> = samples
-                .iter()
-                .map(|&sample| {
-                    let encoded = f64::from(sample) / 255.0;
-                    if encoded <= 0.04045 {
-                        encoded / 12.92
-                    } else {
-                        ((encoded + 0.055) / 1.055).powf(2.4)
-                    }
+            let linear = |sample: u8| {
+                let encoded = f64::from(sample) / 255.0;
+                if encoded <= 0.04045 {
+                    encoded / 12.92
+                } else {
+                    ((encoded + 0.055) / 1.055).powf(2.4)
+                }
+            };
+            let [width, height] = padded(size);
+            let mirrored = |at: usize, length: usize| {
+                let mut walk = (0..length).chain((1..length.max(2) - 1).rev()).cycle();
+                walk.nth(at).expect("it goes on")
+            };
+            let light: Vec<[f64; 3]> = (0..width * height)
+                .map(|at| {
+                    let [x, y] = [mirrored(at % width, size[0]), mirrored(at / width, size[1])];
+                    [0, 1, 2].map(|channel| linear(samples[(y * size[0] + x) * 3 + channel]))
                 })
                 .collect();
+            let measured = Measured::of_size([width, height]);
             for (name, level) in simd_levels() {
-                let scaled = |scale: usize| size.map(|side| side.div_ceil(1 << scale));
-                let mut rows: [Rows; SCALES] =
-                    core::array::from_fn(|scale| Rows::new(scaled(scale), ROWS >> scale));
-                let mut groups = rows.each_mut().map(Rows::blank);
-                dispatch!(level, simd => fill(simd, &source, size, 0, 1, &mut groups));
-                for (scale, group) in groups.iter_mut().enumerate() {
-                    let [width, height] = scaled(scale);
-                    let expected = plain(&light, size, scale);
-                    for y in 0..height {
-                        for (x, &found) in group.part(1, y, 0)[..width].iter().enumerate() {
-                            let luma = expected[y * width + x];
-                            // Gray has no blue that luma has not.
-                            let expected = if scale + 1 < SCALES { luma } else { 0.0 };
-                            let error = (f64::from(found) - expected).abs();
-                            assert!(error < 5e-6, "{name} {scale} {x} {y}: {found}, {expected}");
+                let scaled = |scale: usize| [width, height].map(|side| side.div_ceil(1 << scale));
+                let mut groups: Vec<Group> = measured
+                    .iter()
+                    .map(|found| Rows::new(scaled(found.scale), ROWS >> found.scale).blank())
+                    .collect();
+                let shown = Shown { picture: &source, size, background: 0.0 };
+                dispatch!(level, simd => fill(simd, &shown, 0, 1, &measured, &mut groups));
+                for (found, group) in measured.iter().zip(&mut groups) {
+                    let [columns, rows] = scaled(found.scale);
+                    let expected = plain(&light, [width, height], found.scale);
+                    for y in 0..rows.min(ROWS >> found.scale) {
+                        for (x, &value) in group.part(1, y, 0)[..columns].iter().enumerate() {
+                            let expected = expected[y * columns + x][found.channel as usize];
+                            let error = (f64::from(value) - expected).abs();
+                            assert!(error < 1e-4, "{name} {found:?} {x} {y}: {value}, {expected}");
                         }
                     }
                 }

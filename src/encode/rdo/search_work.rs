@@ -57,7 +57,7 @@ impl SearchWork {
         let measuring = match self.aim {
             None | Some(Aim::Size { .. }) => 0.0,
             Some(Aim::Psnr(_)) => self.workload.error(),
-            Some(Aim::Dissimilarity(_)) => self.workload.quality(),
+            Some(Aim::Quality(_)) => self.workload.quality(),
         };
         self.workload.coding() + measuring
     }

@@ -1,7 +1,6 @@
 //! The search for the quantization step with which a file meets its target.
 
 use crate::encode::options::Target;
-use crate::encode::quality::dissimilarity_at;
 
 /// The share of a target size that is aimed at.
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
@@ -17,16 +16,17 @@ const WRONG_SIDE_PENALTY: f64 = 1e3;
 
 /// The size, PSNR or visual quality that is aimed at, inside the tolerance of the target.
 ///
-/// The *deviation* of a file is the base-2 logarithm of its size, of its squared error, or of its
-/// dissimilarity to the eye, divided by the one that is aimed at. It is positive for files that are too large or too distorted.
+/// The *deviation* of a file is the base-2 logarithm of its size, of its squared error, or of
+/// its error to the eye, divided by the one that is aimed at. It is positive for files that are too large
+/// or too distorted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Aim {
     /// A size in bytes.
     Size { most: f64 },
     /// A PSNR of the decoded file in dB.
     Psnr(f64),
-    /// A dissimilarity to the eye.
-    Dissimilarity(f64),
+    /// A visual quality.
+    Quality(f64),
 }
 
 impl Aim {
@@ -36,7 +36,7 @@ impl Aim {
             return Some(Self::Psnr(psnr + AIMED_PSNR_EXCESS));
         }
         if let Some(quality) = target.quality() {
-            return Some(Self::Dissimilarity(dissimilarity_at(quality)));
+            return Some(Self::Quality(quality));
         }
         target.bytes(pixels).map(|bytes| Self::Size { most: AIMED_SHARE_OF_SIZE * bytes as f64 })
     }
@@ -47,7 +47,7 @@ impl Aim {
             Self::Size { .. } => TOLERANCE_OF_SIZE,
             Self::Psnr(_) => (-0.009, 0.006),
             // At a quality of 75, a third of a point; less at a higher one.
-            Self::Dissimilarity(_) => (-0.03, 0.03),
+            Self::Quality(_) => (-0.03, 0.03),
         };
         if deviation > above {
             return WRONG_SIDE_PENALTY + deviation;
@@ -59,7 +59,7 @@ impl Aim {
     pub(crate) fn middle(self) -> f64 {
         match self {
             Self::Size { .. } => 0.5 * (TOLERANCE_OF_SIZE.0 + TOLERANCE_OF_SIZE.1),
-            Self::Psnr(_) | Self::Dissimilarity(_) => 0.0,
+            Self::Psnr(_) | Self::Quality(_) => 0.0,
         }
     }
 
@@ -68,7 +68,7 @@ impl Aim {
         match self {
             // Files that are shortened a little are as good as others.
             Self::Size { .. } => deviation - deviation.clamp(WELL_SHORTENED.0, WELL_SHORTENED.1),
-            Self::Psnr(_) | Self::Dissimilarity(_) => deviation,
+            Self::Psnr(_) | Self::Quality(_) => deviation,
         }
     }
 
@@ -77,7 +77,7 @@ impl Aim {
         match self {
             // A pass removes Gaussians, but adds none.
             Self::Size { .. } => (-0.012..0.05).contains(&deviation),
-            Self::Psnr(_) | Self::Dissimilarity(_) => (-0.1..0.03).contains(&deviation),
+            Self::Psnr(_) | Self::Quality(_) => (-0.1..0.03).contains(&deviation),
         }
     }
 
@@ -85,7 +85,7 @@ impl Aim {
     pub(crate) fn by_step(self) -> f64 {
         match self {
             Self::Size { .. } => -0.38,
-            Self::Psnr(_) | Self::Dissimilarity(_) => 0.36,
+            Self::Psnr(_) | Self::Quality(_) => 0.36,
         }
     }
 
@@ -99,7 +99,7 @@ impl Aim {
     pub(crate) fn lambda_against(self, deviation: f64) -> f64 {
         let rises = match self {
             Self::Size { .. } => deviation > 0.0,
-            Self::Psnr(_) | Self::Dissimilarity(_) => deviation < 0.0,
+            Self::Psnr(_) | Self::Quality(_) => deviation < 0.0,
         };
         -deviation / self.by_lambda(rises)
     }

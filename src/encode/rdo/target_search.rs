@@ -8,7 +8,7 @@ use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
-use crate::encode::quality;
+use crate::encode::quality::judge;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
 use crate::encode::source::Source;
@@ -281,10 +281,10 @@ impl<'a> TargetSearch<'a> {
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
                 ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
-            Aim::Dissimilarity(dissimilarity) => {
+            Aim::Quality(quality) => {
                 let verified = Verified::new(&file, self.source, observer)?;
-                let reached = quality::dissimilarity(self.source, &verified.picture(), observer)?;
-                (reached / dissimilarity).log2().max(-LARGEST_DEVIATION)
+                let verdict = judge(self.source, &verified.picture(), observer)?;
+                verdict.excess(quality).log2().max(-LARGEST_DEVIATION)
             }
         };
         observer.advance(self.work.comparison())?;

@@ -55,6 +55,7 @@ def encode(
     precision: Precision = "entropy",
     threads: int = 1,
     seed: int = 0,
+    keep_invisible: bool = False,
     icc: _Buffer | None = None,
     exif: _Buffer | None = None,
     xmp: _Buffer | None = None,

@@ -85,12 +85,17 @@ pub(crate) struct EncoderArgs {
     /// Seed of the random numbers; the same picture, options and seed give the same file.
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
+    /// Keep colours where alpha is 0. By default what does not show takes the colours around it: the file
+    /// is smaller, and scaled pictures have no fringes.
+    #[arg(long)]
+    keep_invisible: bool,
 }
 
 impl EncoderArgs {
     /// The arguments above and the group of the targets, for what excludes them. The group that
     /// `clap` makes of a struct is empty if another struct is flattened into it.
-    pub(super) const IDS: [&str; 5] = ["TargetArgs", "tune", "effort", "precision", "seed"];
+    pub(super) const IDS: [&str; 6] =
+        ["TargetArgs", "tune", "effort", "precision", "seed", "keep_invisible"];
 
     pub(crate) fn encoder(&self) -> Encoder {
         Encoder::new()
@@ -99,6 +104,7 @@ impl EncoderArgs {
             .with_effort(self.effort)
             .with_precision(self.precision.into())
             .with_seed(self.seed)
+            .with_keep_invisible(self.keep_invisible)
     }
 }
 
@@ -122,7 +128,8 @@ struct TargetArgs {
     #[arg(long, help_heading = "Targets", value_name = "DB",
           value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
-    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2 [default: 75].
+    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2; no more than 97 is
+    /// aimed at [default: 75].
     #[arg(long, help_heading = "Targets", value_name = "Q",
           value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,

@@ -30,14 +30,18 @@ pub(crate) struct Info {
 /// size. An
 /// alpha channel that is opaque everywhere is ignored. Both are converted to a colour model with the
 /// channels of both, and to the greater depth: gray becomes RGB, missing alpha becomes opaque, 8
-/// bits become 16. PSNR and the largest error are over all samples of all channels. MS-SSIM is the
-/// mean over the channels, on up to five scales, as the size allows.
+/// bits become 16. Colours count as they show, times their alpha. PSNR and the largest error are over
+/// all samples of all channels. MS-SSIM is the mean over the channels, on up to five scales, as the
+/// size allows.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Compare {
     /// A picture, or `-` for standard input.
     pub(crate) a: PathBuf,
     /// Another one.
     pub(crate) b: PathBuf,
+    /// Count colours as they are stored, where alpha is 0, too.
+    #[arg(long)]
+    pub(crate) keep_invisible: bool,
     /// Print one JSON object: width, height, channels, depth (bits per sample), psnr (in dB),
     /// ms_ssim, max_abs_error (in quantization steps of that depth). The PSNR of identical
     /// pictures, which is infinite, is given as 999.

@@ -1,0 +1,100 @@
+//! The norms that SSIMULACRA2 adds up, and their weights.
+
+use super::difference::Sums;
+use super::light::Channel;
+
+/// Most scales of SSIMULACRA2.
+const MOST_SCALES: usize = 6;
+/// Scales with a norm of any weight: full size, a half, and so on.
+pub(super) const SCALES: usize = 5;
+/// The least side in pixels, up to which smaller pictures are padded, and of a scale that the next one
+/// is made from.
+pub(super) const LEAST_SIDE: usize = 8;
+/// Norms of a channel on a scale.
+const NORMS: usize = 6;
+/// The weights, first those of the first channel on all scales. A picture with fewer scales has the first
+/// ones, so that its channels have other weights than those of a large picture: so does the reference.
+/// Weights below 0.01 are left out.
+const WEIGHTS: [f64; 3 * MOST_SCALES * NORMS] = weights(&[
+    (9, 1.104_172_64),
+    (15, 1.842_245_55),
+    (16, 11.441_172_6),
+    (21, 1.878_759_5),
+    (22, 10.949_069_91),
+    (25, 0.967_793_71),
+    (28, 0.998_176_7),
+    (39, 7.466_890_33),
+    (41, 17.445_833_98),
+    (45, 6.683_678_15),
+    (47, 1.027_889_94),
+    (48, 225.205_153),
+    (51, 19.213_238_19),
+    (54, 176.393_175_98),
+    (57, 24.433_01),
+    (58, 0.285_208_03),
+    (63, 34.779_063_44),
+    (64, 44.835_625_33),
+    (93, 8.826_982_76),
+    (94, 23.192_433_44),
+    (96, 95.108_049_88),
+    (97, 0.986_397_8),
+    (98, 0.983_438_28),
+    (100, 171.266_725_59),
+    (101, 0.980_785_89),
+]);
+
+/// All weights, from those that are not 0 with their indices.
+const fn weights(given: &[(usize, f64)]) -> [f64; 3 * MOST_SCALES * NORMS] {
+    let mut weights = [0.0; 3 * MOST_SCALES * NORMS];
+    let mut at = 0;
+    while at < given.len() {
+        weights[given[at].0] = given[at].1;
+        at += 1;
+    }
+    weights
+}
+
+/// What of a picture has norms that count: a channel on a scale.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured {
+    pub(super) channel: Channel,
+    /// The size is a 2^scale-th.
+    pub(super) scale: usize,
+    /// Those of structure, artifacts and lost detail: three means, and three fourth roots of means of
+    /// fourth powers.
+    weights: [f64; NORMS],
+}
+
+impl Measured {
+    /// All that counts for a picture of a size, from the finest scale on.
+    pub(super) fn of_size(size: [usize; 2]) -> Vec<Self> {
+        let next = |size: &[usize; 2]| {
+            let has_next = size.iter().all(|&side| side >= LEAST_SIDE);
+            has_next.then(|| size.map(|side| side.div_ceil(2)))
+        };
+        let scales = core::iter::successors(Some(size), next).take(MOST_SCALES).count();
+        let channels = [Channel::Opponent, Channel::Luma, Channel::Blue];
+        let all = (0..scales.min(SCALES)).flat_map(|scale| {
+            channels.into_iter().enumerate().map(move |(index, channel)| {
+                let first = (index * scales + scale) * NORMS;
+                let weights = core::array::from_fn(|norm| WEIGHTS[first + norm]);
+                Self { channel, scale, weights }
+            })
+        });
+        all.filter(|measured| measured.weights != [0.0; NORMS]).collect()
+    }
+
+    /// The weighted norms, from sums over pixels.
+    pub(super) fn weighted(&self, sums: &Sums, pixels: f64) -> f64 {
+        let l4 = |sum: f64| (sum / pixels).sqrt().sqrt();
+        let norms = [
+            sums.structure / pixels,
+            sums.artifacts / pixels,
+            sums.lost / pixels,
+            l4(sums.structure_4),
+            l4(sums.artifacts_4),
+            l4(sums.lost_4),
+        ];
+        norms.iter().zip(self.weights).map(|(norm, weight)| norm * weight).sum()
+    }
+}

@@ -1,0 +1,165 @@
+//! The visual quality that files have is the one that they are said to have, and the one that was asked
+//! for, on pictures small, flat and dark as well.
+
+mod metric;
+
+use image_gip::{
+    ColorModel, Encoded, Encoder, Precision, RenderOptions, Shortfall, Source, StreamDecoder,
+    Target,
+};
+use metric::ssimulacra2;
+
+/// A picture of 8-bit RGB.
+struct Scene {
+    name: &'static str,
+    width: usize,
+    samples: Vec<u8>,
+}
+
+impl Scene {
+    /// From the colour at (x, y).
+    fn new(
+        name: &'static str,
+        [width, height]: [usize; 2],
+        pixel: impl Fn(usize, usize) -> [u8; 3],
+    ) -> Self {
+        let pixels = (0..width * height).flat_map(|at| pixel(at % width, at / width));
+        Self { name, width, samples: pixels.collect() }
+    }
+
+    fn encoded(&self, encoder: &Encoder) -> Encoded {
+        let height = self.samples.len() / (3 * self.width);
+        let source =
+            Source::new_u8(self.width as u32, height as u32, ColorModel::Rgb, &self.samples);
+        encoder.encode(&source.expect("the sizes agree")).expect("it encodes")
+    }
+}
+
+fn decoded(file: &[u8]) -> Vec<u8> {
+    let mut stream = StreamDecoder::new();
+    stream.feed(file).expect("the file is sound");
+    let picture = stream.picture().expect("the header was read");
+    let options = RenderOptions::new();
+    let mut out = vec![0; picture.output_len(&options).expect("small")];
+    picture.render_u8(&options, &mut out).expect("within limits");
+    out
+}
+
+/// A figure of a few colours in cells, which is symmetric.
+fn figure(x: usize, y: usize, side: usize, seed: usize) -> [u8; 3] {
+    const COLORS: [[u8; 3]; 5] =
+        [[24, 20, 37], [228, 59, 68], [254, 231, 97], [99, 199, 77], [192, 203, 220]];
+    let x = x.min(side - 1 - x);
+    let cell = (x * 7 + y * 13 + x * y * seed) % 11;
+    COLORS[if x + y < side / 4 { 0 } else { cell.min(4) }]
+}
+
+/// Light from a point, from `most` down to 0 and up to 1 at the sides.
+fn light(x: usize, y: usize, [width, height]: [usize; 2]) -> f32 {
+    let (u, v) = (x as f32 / width as f32 - 0.4, y as f32 / height as f32 - 0.3);
+    1.0 - u.hypot(v).min(1.0)
+}
+
+fn scenes() -> Vec<Scene> {
+    let shade = |x, y, size, most: f32| (light(x, y, size) * most + 0.5) as u8;
+    vec![
+        Scene::new("8x8", [8, 8], |x, y| figure(x, y, 8, 3)),
+        Scene::new("16x16", [16, 16], |x, y| figure(x, y, 16, 5)),
+        Scene::new("24x32", [24, 32], |x, y| figure(x / 2, y / 2, 12, 2)),
+        Scene::new("32x32", [32, 32], |x, y| figure(x, y, 32, 7)),
+        Scene::new("48x48", [48, 48], |x, y| figure(x / 4, y / 4, 12, 4)),
+        Scene::new("icon", [64, 64], |x, y| {
+            let distance = (x as f32 - 31.5).hypot(y as f32 - 31.5);
+            match distance as u32 {
+                0..9 => [255, 220, 40],
+                9..20 => [30, 110, 200],
+                20..28 => [240, 240, 240],
+                _ => [250, 250, 250],
+            }
+        }),
+        Scene::new("saturated", [64, 48], |x, y| {
+            [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 0, 255]][(x / 16 + y / 12) % 4]
+        }),
+        Scene::new("dither", [64, 64], |x, y| {
+            let threshold =
+                [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5][x % 4 + y % 4 * 4];
+            [if x / 4 > threshold { 255 } else { 0 }; 3]
+        }),
+        Scene::new("night", [160, 120], |x, y| {
+            let size = [160, 120];
+            [shade(x, y, size, 5.0), shade(x, y, size, 6.0), shade(x, y, size, 8.0)]
+        }),
+        Scene::new("gradient", [160, 120], |x, y| {
+            let size = [160, 120];
+            [shade(x, y, size, 250.0), shade(x, y, size, 180.0), 60 + shade(x, y, size, 90.0)]
+        }),
+        Scene::new("ramp", [256, 32], |x, _| [x as u8; 3]),
+    ]
+}
+
+#[test]
+fn the_quality_is_that_of_an_independent_metric() {
+    for (index, scene) in scenes().iter().enumerate() {
+        for precision in [Precision::Entropy, Precision::Packed] {
+            let effort = if precision == Precision::Packed { 2 } else { 1 + index as u8 % 4 };
+            let encoder = Encoder::new().with_effort(effort).with_precision(precision);
+            let encoded = scene.encoded(&encoder);
+            let found = ssimulacra2(&scene.samples, &decoded(&encoded.bytes), scene.width);
+            let (name, said) = (scene.name, encoded.report.quality);
+            let case =
+                format!("{name}, {precision:?}, effort {effort}: {found:.1}, said {said:.1}");
+            println!(
+                "{case}, {} Gaussians, {} bytes",
+                encoded.report.gaussians,
+                encoded.bytes.len()
+            );
+            assert!((found.max(0.0) - said).abs() < 2.0, "{case}");
+            // Six bits for a colour are too few for smooth gradients.
+            assert!(precision == Precision::Packed || found > 67.0, "{case}");
+        }
+    }
+}
+
+#[test]
+fn gradients_come_back_without_blotches() {
+    for scene in scenes().iter().filter(|scene| ["night", "gradient", "ramp"].contains(&scene.name))
+    {
+        for effort in 1..=3 {
+            let encoder = Encoder::new().with_effort(effort);
+            let found = decoded(&scene.encoded(&encoder).bytes);
+            let mut squares = (0.0, 0.0);
+            let height = found.len() / (3 * scene.width);
+            for (top, left) in (0..height)
+                .step_by(8)
+                .flat_map(|top| (0..scene.width).step_by(8).map(move |left| (top, left)))
+            {
+                for channel in 0..3 {
+                    let mut sum = 0.0;
+                    for at in (0..64).map(|at| (top + at / 8) * scene.width + left + at % 8) {
+                        let at = 3 * at + channel;
+                        sum += f32::from(found[at]) - f32::from(scene.samples[at]);
+                    }
+                    squares.0 += (sum / 64.0).powi(2);
+                    squares.1 += 1.0;
+                }
+            }
+            let deviation = (squares.0 / squares.1).sqrt();
+            println!("{}, effort {effort}: {deviation}", scene.name);
+            assert!(deviation < 0.6, "{}, effort {effort}: {deviation}", scene.name);
+        }
+    }
+}
+
+#[test]
+fn a_quality_that_is_not_aimed_at_is_reported() {
+    let scene = Scene::new("16x16", [16, 16], |x, y| {
+        [(8 * x + 3 * y) as u8, (100 + 5 * y) as u8, (x * y / 2) as u8]
+    });
+    let report = scene.encoded(&Encoder::new().with_target(Target::Quality(100.0))).report;
+    let shortfall = report.shortfall.expect("97 is the most");
+    assert!(
+        matches!(shortfall, Shortfall::QualityCapped { quality } | Shortfall::QualityBelow { quality }
+            if quality == report.quality),
+        "{shortfall:?}"
+    );
+}
