@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn samples_are_turned_as_exif_says() {
         for (orientation, rows) in Orientation::ALL.into_iter().zip(TURNED) {
-            let name = format!("{orientation:?}");
+            let name = alloc::format!("{orientation:?}");
             assert_eq!(turned(orientation), rows.replace(' ', "").as_bytes(), "{name}");
             let columns = orientation.turned_size(2, 3).0 as usize;
             assert_eq!(rows.find(' '), Some(columns), "{name}");
