@@ -41,7 +41,7 @@ def test_modes_of_other_colours(mode: str) -> None:
         image: Any = ImageCms.profileToProfile(photo, srgb, lab, outputMode="LAB")
     else:
         image = photo.convert(mode)
-    file = saved(image, quality=95)
+    file = saved(image, bpp=16)
     assert image_gip.info(file.getvalue()).icc is None
     with Image.open(file) as opened:
         assert opened.mode == "RGB"

@@ -32,6 +32,17 @@ def truncated_images() -> Iterator[None]:
     ImageFile.LOAD_TRUNCATED_IMAGES = False
 
 
+@pytest.mark.parametrize("keep", [False, True])
+def test_colours_that_do_not_show(keep: bool) -> None:
+    samples = draw(40, 30, 4)
+    samples[:, :20, 3] = 0
+    samples[:, 20:, 3] = 255
+    file = saved(Image.fromarray(samples), psnr=36, keep_invisible=keep).getvalue()
+    assert file == image_gip.encode(samples, psnr=36, effort=1, keep_invisible=keep)
+    found = image_gip.decode(file)[:, :12, :3].astype(int)
+    assert (np.abs(found - samples[:, :12, :3]).mean() < 8) == keep
+
+
 @pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA"])
 def test_round_trips(mode: str) -> None:
     samples = draw(60, 45, len(mode))
