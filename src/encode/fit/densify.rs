@@ -21,7 +21,7 @@ pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
 /// Gaussians that are placed in a tile at the same time see the same residuals. If too many of them overlap,
 /// their steps together go too far: the distortion of the tile rises, and it gets most of the next Gaussians,
 /// too. So they may overlap up to this many times as much as all would if they were spread evenly,
-const MOST_OVERLAP: f64 = 4.0;
+const MOST_OVERLAP: f64 = 3.0;
 /// and there are at most so many: about one for ten pixels, or several times as many as the tiles get on
 /// average, where that is more.
 const MOST_AT_ONCE: f64 = 12.0;
