@@ -281,16 +281,17 @@ mod tests {
 
     #[test]
     fn noise_is_seen_on_even_ground_first() {
-        let size = [96, 64];
+        let size = [240, 160];
         let mut rng = fastrand::Rng::with_seed(6);
         let mut noise = || rng.f32() - 0.5;
         // Even ground on the left, texture on the right.
-        let source: Vec<f32> =
-            (0..96 * 64).map(|at| if at % 96 < 48 { 0.5 } else { 0.5 + 0.6 * noise() }).collect();
+        let source: Vec<f32> = (0..240 * 160)
+            .map(|at| if at % 240 < 120 { 0.5 } else { 0.5 + 0.6 * noise() })
+            .collect();
         let mut with_noise = |left: bool, strength: f32| {
             let samples: Vec<f32> = (source.iter().enumerate())
                 .map(|(at, sample)| {
-                    let here = (at % 96 < 48) == left;
+                    let here = (at % 240 < 120) == left;
                     sample + if here { strength * noise() } else { 0.0 }
                 })
                 .collect();

@@ -370,7 +370,9 @@ mod tests {
                 (0..width * height * channels).map(|_| rng.u8(..).saturating_mul(2)).collect();
             let source = Source::new_u8(width as u32, height as u32, model, &samples)
                 .expect("the sizes agree");
-            let raster = unobserved(|observer| Raster::new(&source, Tune::Visual, observer));
+            let raster = unobserved(|observer| {
+                Raster::new(&source.keeping_invisible(true), Tune::Visual, observer)
+            });
             let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
             let mut residuals = unobserved(|observer| Residuals::new(&raster, observer));
             residuals.set(&raster, 0, &rendering);

@@ -170,7 +170,8 @@ fn every_gradient_equals_its_finite_difference() {
             let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
             let rows = scene(parameterization, channels, &mut rng);
             let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
-            let raster = unobserved(|observer| Raster::new(&source, tune, observer));
+            let raster =
+                unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
             let found = gradients(&rows, parameterization, kernel, &raster);
             for (index, found) in found.iter().enumerate() {
                 for component in 0..5 + channels {
@@ -220,7 +221,8 @@ fn every_simd_level_gives_the_same_bits() {
             .collect()
     };
     for tune in [Tune::Visual, Tune::Psnr] {
-        let raster = unobserved(|observer| Raster::new(&source, tune, observer));
+        let raster =
+            unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
         let expected = run(Level::baseline(), &raster);
         assert!(expected.0.squared > 0.0 && expected.0.distortion > 0.0);
         let expected = bits(expected);
@@ -237,7 +239,8 @@ fn every_simd_level_gives_the_same_bits() {
 fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let white = [255; 5 * 3 * 3];
     let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
-    let raster = unobserved(|observer| Raster::new(&source, Tune::Visual, observer));
+    let raster =
+        unobserved(|observer| Raster::new(&source.keeping_invisible(true), Tune::Visual, observer));
     let gaussian =
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
@@ -255,7 +258,8 @@ fn measured_distortions_are_those_of_the_tiles_rendered_again() {
     let rows = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats = splats_of(&rows, Parameterization::Cholesky, 3);
     for tune in [Tune::Visual, Tune::Psnr] {
-        let raster = unobserved(|observer| Raster::new(&source, tune, observer));
+        let raster =
+            unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
         let kernel = Kernel::Quartic;
         for measure in [Distortion::L1, Distortion::L3] {
             let mut pass = Pass::new(&raster);

@@ -46,7 +46,9 @@ fn scene(model: ColorModel, clamped: bool) -> Scene {
     let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
     let size = [WIDTH, HEIGHT].map(|length| length as u32);
     let of_raster = Source::new_u8(size[0], size[1], model, &source).expect("the sizes agree");
-    let raster = unobserved(|observer| Raster::new(&of_raster, Tune::Visual, observer));
+    let raster = unobserved(|observer| {
+        Raster::new(&of_raster.keeping_invisible(true), Tune::Visual, observer)
+    });
     Scene { model, source, rendering, raster }
 }
 
