@@ -1,5 +1,7 @@
 //! The bits and the Huffman codes of entropy-coded data (ITU-T T.81, F.2.2).
 
+/// Most bytes of padding after the data of a scan. More are what an interrupted copy leaves.
+const MAX_PADDING: usize = 32;
 /// Longest code in bits.
 const MAX_CODE: usize = 16;
 
@@ -12,6 +14,8 @@ pub(super) enum Damage {
     TooMany,
     /// No such code, or a coefficient that a block does not have.
     Code,
+    /// Zeros in place of data.
+    Zeros,
     /// A restart marker is missing or out of order.
     Restart,
     /// Parts of the picture do not come at all.
@@ -23,6 +27,7 @@ impl Damage {
         match self {
             Self::TooFew => "the data end too early",
             Self::TooMany => "there are data left over",
+            Self::Zeros => "there are zeros in place of data",
             Self::Code => "invalid code in the data",
             Self::Restart => "a restart marker is missing",
             Self::Missing => "a part is missing",
@@ -70,11 +75,13 @@ pub(super) struct Bits<'a> {
     buffer: u64,
     /// How many they are.
     count: u32,
+    /// How often there was another bit than 0 among those taken together.
+    ones: u64,
 }
 
 impl<'a> Bits<'a> {
     pub(super) fn new(data: &'a [u8], at: usize) -> Self {
-        Self { data, at, buffer: 0, count: 0 }
+        Self { data, at, buffer: 0, count: 0, ones: 0 }
     }
 
     /// The next data byte, without the zero that is stuffed after 255; `None` at a marker.
@@ -108,7 +115,13 @@ impl<'a> Bits<'a> {
         let value = (self.buffer >> 1 >> (63 - length)) as u32;
         self.buffer <<= length;
         self.count -= length;
+        self.ones += u64::from(value != 0);
         Ok(value)
+    }
+
+    /// A number that stays the same for as long as nothing but zeros is taken.
+    pub(super) fn ones(&self) -> u64 {
+        self.ones
     }
 
     /// The symbol of the next code.
@@ -130,7 +143,7 @@ impl<'a> Bits<'a> {
     pub(super) fn end(&mut self) -> Result<usize, Damage> {
         self.take(self.count % 8)?;
         let mut padding = None;
-        loop {
+        for _ in 0..=MAX_PADDING {
             let byte = match self.count {
                 0 => self.byte(),
                 _ => Some(self.take(8)? as u8),
@@ -138,9 +151,10 @@ impl<'a> Bits<'a> {
             match byte {
                 None => return Ok(self.at),
                 Some(byte @ (0 | 0xFF)) if *padding.get_or_insert(byte) == byte => {}
-                Some(_) => return Err(Damage::TooMany),
+                Some(_) => break,
             }
         }
+        Err(Damage::TooMany)
     }
 
     /// Goes on after the restart marker of this number, from 0 to 7.
@@ -151,7 +165,7 @@ impl<'a> Bits<'a> {
         }
         match self.data.get(at..at + 2) {
             Some(marker) if *marker == [0xFF, 0xD0 + number] => {
-                *self = Self::new(self.data, at + 2);
+                *self = Self { ones: self.ones, ..Self::new(self.data, at + 2) };
                 Ok(())
             }
             Some(_) => Err(Damage::Restart),
@@ -172,6 +186,13 @@ mod tests {
         assert_eq!(bits.end(), Err(Damage::TooMany));
         let mut bits = Bits::new(&[0xAA, 0xFF, 0, 0xFF, 0, 0xFF, 0xD9], 0);
         assert_eq!((bits.take(3), bits.end()), (Ok(0b101), Ok(5)));
+    }
+
+    #[test]
+    fn more_zeros_than_padding_are_damage() {
+        let zeros = |count| Bits::new(&vec![0; count], 0).end();
+        assert_eq!(zeros(MAX_PADDING), Ok(MAX_PADDING));
+        assert_eq!(zeros(MAX_PADDING + 1), Err(Damage::TooMany));
     }
 
     #[test]

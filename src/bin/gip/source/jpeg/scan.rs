@@ -4,6 +4,10 @@
 use super::bits::{Bits, Damage, Table};
 use super::frame::{COEFFICIENTS, Frame};
 
+/// Most coefficients of blocks in a row whose bits are all 0 and that have their last coefficient all the
+/// same. Zeros in place of data can be read as such blocks; pictures do not have more than some.
+const MAX_FULL_OF_ZEROS: usize = 4 * COEFFICIENTS;
+
 /// A scan: which coefficients of which components, and the tables of their codes.
 #[derive(Debug)]
 pub(super) struct Scan<'a> {
@@ -28,7 +32,7 @@ impl Scan<'_> {
         let (columns, rows) =
             if is_single { frame.components[self.components[0]].blocks } else { frame.units };
         let (mut until_restart, mut restarts) = (self.restart_interval, 0_u8);
-        let mut run = 0;
+        let (mut run, mut full_of_zeros) = (0, 0);
         for y in 0..rows {
             for x in 0..columns {
                 if self.restart_interval > 0 {
@@ -44,12 +48,21 @@ impl Scan<'_> {
                     let (across, down) = if is_single { (1, 1) } else { component.sampling };
                     for row in y * down..(y + 1) * down {
                         for column in x * across..(x + 1) * across {
-                            if frame.is_progressive {
+                            let ones = bits.ones();
+                            let is_full = if frame.is_progressive {
                                 let block = row * component.stride + column;
                                 let nonzero = &mut component.nonzero[block];
-                                self.progressive_block(&mut bits, *tables, nonzero, &mut run)?;
+                                self.progressive_block(&mut bits, *tables, nonzero, &mut run)?
                             } else {
-                                sequential_block(&mut bits, *tables)?;
+                                sequential_block(&mut bits, *tables)?
+                            };
+                            let is_of_zeros = is_full && bits.ones() == ones;
+                            full_of_zeros = match is_of_zeros {
+                                true => full_of_zeros + self.band.1 + 1 - self.band.0,
+                                false => 0,
+                            };
+                            if full_of_zeros > MAX_FULL_OF_ZEROS {
+                                return Err(Damage::Zeros);
                             }
                         }
                     }
@@ -63,20 +76,21 @@ impl Scan<'_> {
         bits.end()
     }
 
-    /// `run` is how many blocks, from this one on, have nothing new in the band.
+    /// Returns whether the block has its last coefficient. `run` is how many blocks, from this one on,
+    /// have nothing new in the band.
     fn progressive_block(
         &self,
         bits: &mut Bits<'_>,
         [lowest, others]: [Option<&Table>; 2],
         nonzero: &mut u64,
         run: &mut u32,
-    ) -> Result<(), Damage> {
+    ) -> Result<bool, Damage> {
         let is_refined = self.bits.0 > 0;
         match (self.band.0, is_refined) {
-            (0, false) => lowest.map_or(Ok(()), |table| difference(bits, table)),
-            (0, true) => bits.take(1).map(|_| ()),
+            (0, false) => lowest.map_or(Ok(()), |table| difference(bits, table)).map(|()| false),
+            (0, true) => bits.take(1).map(|_| false),
             (_, false) => self.first_of_band(bits, others, nonzero, run),
-            (_, true) => self.refinement_of_band(bits, others, nonzero, run),
+            (_, true) => self.refinement_of_band(bits, others, nonzero, run).map(|()| false),
         }
     }
 
@@ -86,11 +100,11 @@ impl Scan<'_> {
         table: Option<&Table>,
         nonzero: &mut u64,
         run: &mut u32,
-    ) -> Result<(), Damage> {
-        let Some(table) = table else { return Ok(()) };
+    ) -> Result<bool, Damage> {
+        let Some(table) = table else { return Ok(false) };
         if *run > 0 {
             *run -= 1;
-            return Ok(());
+            return Ok(false);
         }
         let mut at = self.band.0;
         while at <= self.band.1 {
@@ -100,7 +114,7 @@ impl Scan<'_> {
                 (15, 0) => at += 16,
                 (_, 0) => {
                     *run = (1 << zeros) + bits.take(zeros.into())? - 1;
-                    break;
+                    return Ok(false);
                 }
                 _ => {
                     at += usize::from(zeros);
@@ -113,7 +127,7 @@ impl Scan<'_> {
                 }
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     fn refinement_of_band(
@@ -166,11 +180,12 @@ impl Scan<'_> {
     }
 }
 
+/// Returns whether the block has its last coefficient.
 fn sequential_block(
     bits: &mut Bits<'_>,
     [lowest, others]: [Option<&Table>; 2],
-) -> Result<(), Damage> {
-    let (Some(lowest), Some(others)) = (lowest, others) else { return Ok(()) };
+) -> Result<bool, Damage> {
+    let (Some(lowest), Some(others)) = (lowest, others) else { return Ok(false) };
     difference(bits, lowest)?;
     let mut at = 1;
     while at < COEFFICIENTS {
@@ -178,7 +193,7 @@ fn sequential_block(
         let (zeros, size) = (symbol >> 4, symbol & 15);
         match (zeros, size) {
             (15, 0) => at += 16,
-            (_, 0) => break,
+            (_, 0) => return Ok(false),
             _ => {
                 at += usize::from(zeros) + 1;
                 if at > COEFFICIENTS {
@@ -188,7 +203,7 @@ fn sequential_block(
             }
         }
     }
-    Ok(())
+    Ok(true)
 }
 
 /// The difference of the lowest frequency from that of the block before.
