@@ -124,3 +124,90 @@ fn folders_that_cannot_be_read_are_failures() {
     fs::remove_dir_all(room.path("in").join("d".repeat(250))).expect("ours");
     room.batch(0, &[&args[..], &QUICK].concat());
 }
+
+#[test]
+fn decoded_pictures_replace_no_file_of_an_input() {
+    let room = Room::new();
+    for name in ["in/a.png", "in/b/c.png"] {
+        room.save_picture(name, &pictures::picture((40, 32), ColorType::Rgb8));
+    }
+    room.batch(0, &[&["in", "--out", "in"], &QUICK[..]].concat());
+    room.batch(0, &[&["in", "--out", "in"], &QUICK[..]].concat());
+    let before = room.files("in");
+    for (inputs, out) in [
+        (&["in"][..], "in"),
+        (&["in/b", "in"], "in/b/.."),
+        (&["in/a.gip"], "in"),
+        (&["in/b/c.gip"], "in/b"),
+        #[cfg(unix)]
+        (&["link"], "in"),
+        #[cfg(unix)]
+        (&["in"], "link"),
+    ] {
+        #[cfg(unix)]
+        let _ = std::os::unix::fs::symlink("in", room.path("link"));
+        for task in [&["--decode"][..], &["--thumbnail", "8"]] {
+            let (printed, errors) = room.batch(2, &[inputs, &["--out", out], task].concat());
+            assert!(errors.contains("a.png") || errors.contains("c.png"), "{errors}");
+            assert!(errors.starts_with("error: results would replace") && printed.is_empty());
+        }
+    }
+    assert_eq!(room.files("in"), before);
+    // One that is newer is taken for the result; another format has other names.
+    room.batch(0, &["in", "--out", "in", "--decode", "--format", "bmp"]);
+    room.batch(0, &["in", "--out", "in", "--decode", "--format", "bmp", "--resume"]);
+    room.batch(2, &["in", "--out", "in", "--decode", "--resume"]);
+    assert!(before.iter().all(|(name, bytes)| room.files("in")[name] == *bytes));
+    room.batch(0, &["in", "--out", "elsewhere", "--decode"]);
+    room.batch(0, &["in", "--out", "elsewhere", "--decode"]);
+}
+
+#[test]
+fn a_manifest_replaces_no_other_file() {
+    let room = Room::new();
+    room.save_picture("in/a.png", &pictures::picture((40, 32), ColorType::Rgb8));
+    for name in ["in/x.heic", "in/notes.txt", "in/.hidden.png", "in/no-end", "other.json"] {
+        for contents in ["precious\n", "{}\n", "precious", "{\"a\":", "\n"] {
+            room.write(name, contents);
+            let errors = room.fails(&["batch", "in", "--out", "out", "--manifest", name]);
+            assert!(errors.contains(name) && errors.contains("not replaced"), "{errors}");
+            assert_eq!(room.read(name), contents.as_bytes());
+        }
+    }
+    assert!(!room.path("out").exists(), "nothing is done");
+    room.write("empty", "");
+    room.batch(0, &[&["in", "--out", "out", "--manifest", "empty"], &QUICK[..]].concat());
+    room.batch(0, &[&["in", "--out", "out", "--manifest", "empty"], &QUICK[..]].concat());
+    assert_eq!(by_input(&room.read("empty")).len(), 2);
+}
+
+#[test]
+fn an_ignore_file_that_cannot_be_read_ends_the_run() {
+    let room = Room::new();
+    room.save_picture("in/b/a.png", &pictures::picture((40, 32), ColorType::Rgb8));
+    let utf16 = |bom: &[u8], text: &str| {
+        [bom, &text.encode_utf16().flat_map(u16::to_be_bytes).collect::<Vec<_>>()].concat()
+    };
+    for (contents, line) in [
+        (utf16(b"\xFE\xFF", "*.png\n"), 1),
+        (utf16(b"", "*.png\n"), 1),
+        (b"good\r\n[\r\n*.png".to_vec(), 2),
+        (b"good\n\n{a".to_vec(), 3),
+        (b"# caf\xE9".to_vec(), 1),
+    ] {
+        for folder in ["in", "in/b"] {
+            let name = format!("{folder}/.gipignore");
+            room.write(&name, &contents);
+            let errors = room.fails(&["batch", "in", "--out", "out"]);
+            assert!(errors.contains(&format!("{name}: line {line}")), "{errors}");
+            fs::remove_file(room.path(&name)).expect("it is there");
+        }
+    }
+    fs::create_dir(room.path("in/b/.gipignore")).expect("writable");
+    let errors = room.fails(&["batch", "in", "--out", "out"]);
+    assert!(errors.contains("in/b/.gipignore: "), "{errors}");
+    fs::remove_dir(room.path("in/b/.gipignore")).expect("it is there");
+    room.write("in/.gipignore", "\u{feff}a.png\r\n");
+    let (printed, _) = room.batch(0, &["in", "--out", "out"]);
+    assert!(printed.starts_with("0 files"), "{printed}");
+}

@@ -164,11 +164,14 @@ fn the_manifest_is_continued() {
     assert_eq!(fresh["in/0/0.png"][2], "written");
     assert_eq!(fresh.len(), PICTURES + 1);
 
-    // Something else is not taken for a manifest, and without --resume it is replaced.
+    // Something else is not taken for a manifest, and not replaced; a line that was torn is.
     room.write("m.jsonl", "precious\nwords\n");
-    let errors = room.fails(&args(&run));
-    assert!(errors.contains("m.jsonl") && errors.contains("line 1"), "{errors}");
-    assert_eq!(room.read("m.jsonl"), b"precious\nwords\n");
+    for run in [&run[..], &run[..4]] {
+        let errors = room.fails(&args(run));
+        assert!(errors.contains("m.jsonl") && errors.contains("line 1"), "{errors}");
+        assert_eq!(room.read("m.jsonl"), b"precious\nwords\n");
+    }
+    room.write("m.jsonl", torn);
     batch(&room, 0, &run[..4]);
     assert_eq!(self::results(&room.read("m.jsonl")).len(), PICTURES);
 }

@@ -18,12 +18,14 @@ use super::values::{bounds, extension, number};
 /// be read is a failure. Options of the encoder are those of `gip encode`.
 ///
 /// In every folder of an INPUT, a file .gipignore may say what to leave out there and below, with
-/// patterns as in .gitignore, where upper and lower case are the same.
+/// patterns as in .gitignore, where upper and lower case are the same. If it cannot be read, or has
+/// a line that is no pattern, nothing is done.
 ///
 /// If two results would get the same name, as those of a.png and a.jpg, or if a result would
-/// replace an INPUT, nothing is done. A picture that cannot be read is reported and skipped.
+/// replace an INPUT, nothing is done. Nor is it if a decoded picture would replace a file in a folder
+/// of an INPUT, which may be an original. A picture that cannot be read is reported and skipped.
 ///
-/// Every result gets its name when it is complete, and existing files are replaced. After an
+/// Every result gets its name when it is complete, and other existing files are replaced. After an
 /// interruption of any kind, even a crash, the same command with --resume does the rest, and removes
 /// temporary files that were left. If the disk is full, the run ends at once.
 #[derive(Debug, clap::Args)]
@@ -88,7 +90,7 @@ pub(crate) struct Batch {
     /// a name.
     ///
     /// Lines are written as files are finished, which is not the order of the inputs. An existing FILE
-    /// is replaced. With --resume, lines of files that are skipped are kept, and so are those of files
+    /// is replaced, if it is a manifest. With --resume, lines of files that are skipped are kept, and so are those of files
     /// that this run does not know; an incomplete last line is dropped. So there is one line per file.
     /// If a file is skipped that has no line, it gets one with what its result tells.
     #[arg(long, value_name = "FILE")]

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use ignore::gitignore::GitignoreBuilder;
 use ignore::{DirEntry, WalkBuilder};
 
 use super::left_out::LeftOut;
@@ -115,6 +116,7 @@ fn walk(
         }
         let path = entry.path();
         if entry.depth() == 0 || is_folder(&entry) {
+            check_ignore_file(path)?;
             rest.folders.push(path.to_owned());
             continue;
         }
@@ -132,6 +134,36 @@ fn walk(
             },
         }
     }
+    Ok(())
+}
+
+/// Refuses a file of patterns that cannot be read as a whole: what it says to leave out would be taken.
+fn check_ignore_file(folder: &Path) -> Result<()> {
+    let path = folder.join(IGNORE_FILE);
+    let name = || path.display().to_string();
+    // Where not even this can be asked, nothing in the folder can be read.
+    if fs::symlink_metadata(&path).is_err() {
+        return Ok(());
+    }
+    if !fs::metadata(&path).with_context(name)?.is_file() {
+        bail!("{}: not a file", name());
+    }
+    let bytes = fs::read(&path).with_context(name)?;
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes);
+    let mut builder = GitignoreBuilder::new(folder);
+    // As the walk has it, a class without an end is text: more likely it is a mistake.
+    builder.allow_unclosed_class(false);
+    for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
+        let place = || format!("{}: line {number}", name());
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        let line = str::from_utf8(line).with_context(place)?;
+        // These are of text in another encoding.
+        if line.contains('\0') {
+            bail!("{}: a NUL character", place());
+        }
+        builder.add_line(None, line).with_context(place)?;
+    }
+    builder.build().with_context(name)?;
     Ok(())
 }
 

@@ -84,7 +84,7 @@ fn counts(kinds: impl Iterator<Item = String>) -> String {
 }
 
 /// The first of some names, and how many more there are.
-fn listed(names: impl Iterator<Item = String>, count: usize) -> String {
+pub(super) fn listed(names: impl Iterator<Item = String>, count: usize) -> String {
     let mut text = names.take(NAMED).collect::<Vec<_>>().join(", ");
     if count > NAMED {
         text.push_str(&format!(" and {} more", count - NAMED));

@@ -3,11 +3,11 @@
 use core::mem;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::{File, Metadata, OpenOptions};
-use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 
 use super::inputs::{Item, Rest};
@@ -85,6 +85,35 @@ struct Known {
     output: Option<String>,
     status: Status,
     bytes: Option<u64>,
+}
+
+/// How every line begins.
+const START: &[u8] = b"{\"input\":";
+/// Most bytes of the first line of a manifest: a longer one is something else.
+const MAX_FIRST_LINE: u64 = 1 << 20;
+
+/// Refuses to replace a file that is no manifest. One without a whole line may be of a run that was killed.
+pub(crate) fn check(path: &Path) -> Result<()> {
+    if files::is_standard_stream(path) || !path.is_file() {
+        return Ok(());
+    }
+    let read = || -> io::Result<Vec<u8>> {
+        let mut line = Vec::new();
+        let file = File::open(path)?.take(MAX_FIRST_LINE);
+        BufReader::new(file).read_until(b'\n', &mut line)?;
+        Ok(line)
+    };
+    let line = read().with_context(|| path.display().to_string())?;
+    let is_known = if line.ends_with(b"\n") {
+        serde_json::from_slice::<Known>(&line).is_ok()
+    } else {
+        line.starts_with(START) || START.starts_with(&line)
+    };
+    if !is_known {
+        let name = path.display();
+        bail!("{name}: line 1 is not one of a manifest of gip batch, so the file is not replaced");
+    }
+    Ok(())
 }
 
 /// The manifest that is being written.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use super::inputs::Item;
+use super::left_out::listed;
 use crate::errors::WrongUsage;
 use crate::files;
 
@@ -66,6 +67,36 @@ impl Plan {
         }
         Ok(Self { items, folders })
     }
+}
+
+/// Refuses results that would replace files of the inputs: those in `folders`, which are the ones that were
+/// looked at, and those beside a source. Nobody knows whether such a file is an earlier result.
+pub(crate) fn protect<'a>(
+    results: impl Iterator<Item = &'a Item> + Clone,
+    folders: &[PathBuf],
+) -> Result<()> {
+    let sources = results.clone().filter_map(|item| item.source.parent());
+    let folders: HashSet<&Path> = folders.iter().map(PathBuf::as_path).chain(sources).collect();
+    let folders: HashSet<PathBuf> = folders.into_iter().map(|path| folded(&place(path))).collect();
+    let is_in_input =
+        |file: &Path| file.parent().is_some_and(|path| folders.contains(&folded(path)));
+    let replaced = |output: &Path| {
+        // A link in an input counts, and so does a file of an input that a link leads to.
+        let link = match (output.parent(), output.file_name()) {
+            (Some(parent), Some(name)) => place(parent).join(name),
+            _ => output.to_owned(),
+        };
+        link.exists() && (is_in_input(&link) || is_in_input(&place(output)))
+    };
+    let outputs = results.map(|item| item.output.as_path());
+    let lost: Vec<_> = outputs.filter(|path| replaced(path)).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let names = listed(lost.iter().map(|path| path.display().to_string()), lost.len());
+    bail!(WrongUsage(format!(
+        "results would replace files of the inputs: {names}; take another folder for --out"
+    )))
 }
 
 /// The file that is written under a name, which need not exist: an absolute path without links.

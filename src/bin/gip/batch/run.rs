@@ -18,8 +18,8 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use super::age;
 use super::budget::Budget;
 use super::inputs::{self, Item, Rest};
-use super::manifest::{Manifest, Record};
-use super::outputs::Plan;
+use super::manifest::{self, Manifest, Record};
+use super::outputs::{self, Plan};
 use super::selection::Selection;
 use super::stop::{self, Stop};
 use super::task::{Facts, Task};
@@ -40,6 +40,7 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let output = |below: &Path| args.out.join(below).with_extension(task.extension());
     let (items, rest) = inputs::find(&args.inputs, &selection, |path| task.kind(path), output)?;
     let Plan { items, folders } = Plan::new(items, args.manifest.as_deref())?;
+    args.manifest.as_deref().map_or(Ok(()), manifest::check)?;
     let jobs = match args.jobs {
         Some(jobs) => usize::from(jobs),
         None => thread::available_parallelism().map_or(1, usize::from),
@@ -52,11 +53,15 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let preserve_times = args.keep.preserve_times;
     let batch = Batch { task, items, rest, preserve_times, jobs, budget, stop };
 
+    let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
+    // A .gip file is a result, but a picture may be an original.
+    if matches!(batch.task, Task::Decode { .. }) && !batch.stop.is_asked_for() {
+        outputs::protect(batch.todo(&skipped), &batch.rest.folders)?;
+    }
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     for folder in &folders {
         files::remove_leftovers(folder);
     }
-    let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
     batch.tell_rest();
     let mut tally = Tally::default();
     // The manifest that is there needs all that was found out about the files that are skipped.
@@ -123,18 +128,19 @@ impl Batch {
         Ok(found.into_iter().map(OnceLock::into_inner).collect())
     }
 
+    /// What is not skipped.
+    fn todo(&self, skipped: &[Option<Facts>]) -> impl Iterator<Item = &Item> + Clone {
+        let items = self.items.iter().zip(skipped);
+        items.filter_map(|(item, facts)| facts.is_none().then_some(item))
+    }
+
     /// Does all that is not skipped.
     ///
     /// # Errors
     /// When the manifest cannot be written. What fails with a file is told, and counted.
     fn work(&self, skipped: &[Option<Facts>], manifest: Option<&Manifest>) -> Result<Tally> {
         let (tally, fatal) = (Tally::default(), OnceLock::new());
-        let todo: Vec<&Item> = self
-            .items
-            .iter()
-            .zip(skipped)
-            .filter_map(|(item, facts)| facts.is_none().then_some(item))
-            .collect();
+        let todo: Vec<&Item> = self.todo(skipped).collect();
         let bar = bar(todo.len())?;
         workers::for_each(self.jobs, todo.len(), &self.stop, |index| {
             let item = todo[index];
