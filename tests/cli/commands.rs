@@ -312,6 +312,9 @@ fn sizes_and_regions() {
         assert!(error.contains(reason), "{error}");
         assert!(!room.path("c.png").exists());
     }
+    let output = room.run(&["decode", "a.gip", "c.png", "--region", "-1,0,5,5"]);
+    let error = text(&output.stderr);
+    assert!(error.contains("not four whole numbers") && !error.contains("tip:"), "{error}");
 }
 
 #[test]

@@ -43,7 +43,7 @@ pub(crate) struct Decode {
     pub(crate) size: Option<(u32, u32)>,
     /// Render only a region: the W by H pixels whose first one is (X, Y). Coordinates are pixels of
     /// the upright output, after --scale or --size.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = region)]
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = region)]
     pub(crate) region: Option<Region>,
     /// If the file is truncated or damaged, write the picture of the Gaussians that can be decoded,
     /// and print a warning, instead of failing.
