@@ -40,7 +40,8 @@ fn a_pixel_takes_16_bytes_and_a_gaussian_330() {
             let encoded = encoded.expect("a sound picture");
             let case = format!("{width}x{height}, {gaussians} Gaussians, {precision:?}");
             let found = encoded.report.gaussians;
-            assert!(found > gaussians / 3, "{case}: only {found} are used");
+            // Most of the others are dropped by the descent, after the peak.
+            assert!(found > gaussians / 4, "{case}: only {found} are used");
             let allowed = 16 * u64::from(width * height) + 330 * u64::from(gaussians);
             assert!(peak <= allowed, "{case}: {peak} bytes held, {allowed} allowed");
             let reported = encoded.report.peak_memory as f64 / peak as f64;
