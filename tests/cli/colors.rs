@@ -89,6 +89,46 @@ fn chunks_of_png_become_a_profile() {
 }
 
 #[test]
+fn chunks_of_png_that_are_invalid_are_ignored_with_a_warning() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    let line = [31_270, 32_900, 10_000, 10_000, 20_000, 20_000, 60_000, 60_000];
+    let outside = [90_000, 90_000, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+    let garbage = vec![b'a', 0, 0, 1, 2, 3];
+    for (name, contents) in [
+        chromaticities([0; 8]),
+        chromaticities([31_270; 8]),
+        chromaticities(line),
+        chromaticities(outside),
+        gamma(0),
+        gamma(1),
+        gamma(u32::MAX),
+        (GAMMA, vec![1]),
+        (CODE_POINTS, vec![1, 13, 1, 1]),
+        (CODE_POINTS, vec![1, 13, 0, 7]),
+        (b"iCCP", garbage),
+        (b"sRGB", vec![9]),
+    ] {
+        let (profile, printed) = carried(&room, "a.png", &png(&picture, &[(name, contents)]));
+        assert!(profile.is_none());
+        let name = text(name);
+        let expected = format!("warning: a.png: its chunk {name} is invalid, and is ignored\n");
+        assert_eq!(printed, expected);
+    }
+    // A background before the palette that it needs is no concern of the picture.
+    let bad = png(&picture, &[(b"bKGD", vec![1]), code_points(12, 13)]);
+    assert!(carried(&room, "a.png", &bad).0.is_some());
+
+    let mut file = Vec::new();
+    let mut encoder = image::codecs::png::PngEncoder::new(&mut file);
+    encoder.set_icc_profile(vec![1; 200]).expect("PNG has it");
+    picture.write_with_encoder(encoder).expect("in memory");
+    let (profile, printed) = carried(&room, "a.png", &file);
+    assert!(profile.is_none());
+    assert_eq!(printed, "warning: a.png: its ICC profile is damaged and cannot be kept\n");
+}
+
+#[test]
 fn a_gamma_alone_is_turned_to_that_of_srgb() {
     let room = Room::new();
     let linear =

@@ -167,7 +167,9 @@ fn standard_streams() {
     assert_eq!(text(&info.stdout), room.ok(&["info", "a.gip"]));
     let compared = room.pipe(&["compare", "-", "b.png"], &encoded.stdout);
     assert_eq!(text(&compared.stdout), "identical\n");
-    assert!(room.fails(&["compare", "-", "-"]).contains("only one"));
+    let wrong = room.run(&["compare", "-", "-"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("only one"));
 }
 
 #[test]
@@ -274,11 +276,23 @@ fn every_output_format_can_be_read_back() {
         ("alpha.gip", "a.jpg", "alpha"),
         ("alpha.gip", "a.ppm", "alpha"),
         ("color.gip", "a.pgm", "colour"),
-        ("color.gip", "a", "extension"),
-        ("color.gip", "a.exr", "extension"),
     ] {
         let error = room.fails(&["decode", input, output]);
-        assert!(error.contains(missing), "{output}: {error}");
+        assert!(error.contains(missing) && error.contains(output), "{output}: {error}");
+        assert!(!room.path(output).exists());
+    }
+    for output in ["a", "a.exr"] {
+        let wrong = room.run(&["decode", "color.gip", output]);
+        assert_eq!(wrong.status.code(), Some(2));
+        assert!(text(&wrong.stderr).contains("extension"));
+        assert!(!room.path(output).exists());
+    }
+    // Formats have sides of so many pixels.
+    for (output, size, most) in
+        [("a.ico", "257x8", "256"), ("a.webp", "1x16385", "16384"), ("a.tga", "65536x1", "65535")]
+    {
+        let error = room.fails(&["decode", "color.gip", output, "--size", size]);
+        assert!(error.contains(output) && error.contains(&format!("{most}x{most}")), "{error}");
         assert!(!room.path(output).exists());
     }
 }

@@ -174,6 +174,16 @@ fn jpegs_that_are_only_unusual_are_whole() {
 }
 
 #[test]
+fn a_webp_has_as_many_bytes_as_it_says() {
+    let room = Room::new();
+    let file = written(ImageFormat::WebP);
+    for bytes in [1, 2, 100] {
+        assert_eq!(outcome(&room, "a.webp", &file[..file.len() - bytes]), Outcome::Partial);
+    }
+    assert_eq!(outcome(&room, "a.webp", &[&file[..], b"behind"].concat()), Outcome::Unnoticed);
+}
+
+#[test]
 fn a_batch_records_what_was_damaged() {
     let room = Room::new();
     room.write("in/whole.jpg", jpeg(80));

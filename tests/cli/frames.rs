@@ -23,6 +23,31 @@ fn gif(frames: usize) -> Vec<u8> {
     file
 }
 
+#[test]
+fn a_logical_screen_without_pixels_is_that_of_the_frame() {
+    let room = Room::new();
+    let file = gif(1);
+    room.write("a.gif", &file);
+    let mut zero = file;
+    zero[6..10].fill(0);
+    room.write("zero.gif", zero);
+    assert_eq!(room.ok(&["compare", "a.gif", "zero.gif"]), "identical\n");
+}
+
+#[test]
+fn icons_are_pngs_of_any_colours() {
+    let room = Room::new();
+    for color in [ColorType::Rgb8, ColorType::L8, ColorType::Rgba8] {
+        room.save_picture("a.png", &pictures::picture(SIZE, color));
+        let png = room.read("a.png");
+        let mut icon = b"\0\0\x01\0\x01\0\x18\x10\0\0\0\0\x20\0".to_vec();
+        icon.extend((png.len() as u32).to_le_bytes());
+        icon.extend(22_u32.to_le_bytes());
+        room.write("a.ico", [icon, png].concat());
+        assert_eq!(room.ok(&["compare", "a.ico", "a.png"]), "identical\n", "{color:?}");
+    }
+}
+
 /// `apart`: the picture of readers that know no animation is not one of its frames.
 fn apng(frames: u32, apart: bool) -> Vec<u8> {
     let mut file = Vec::new();

@@ -120,6 +120,29 @@ fn floats_from_0_to_1_are_samples_like_integers() {
 }
 
 #[test]
+fn floats_that_are_clipped_or_no_numbers_are_told() {
+    let room = Room::new();
+    let tags: [(u16, &[u32]); 3] = [(BITS, &[32]), (PHOTOMETRIC, &[1]), (FORMAT, &[3])];
+    for (samples, expected) in [
+        ([0.0, 0.5, 1.001, 1.0], ""),
+        (
+            [0.0, 51.0, -2.0, 255.0],
+            "75.00 % of its samples, which are from -2 to 255, are clipped to 0 to 1\n",
+        ),
+        ([0.0, f32::NAN, 1.0, 1.0], "25.00 % of its samples are not a number (NaN)"),
+    ] {
+        room.write("a.tif", file((4, 1), &tags, &samples.map(f32::to_le_bytes).concat()));
+        let output = room.run(&["encode", "a.tif", "a.gip", "--effort", "1"]);
+        let printed = text(&output.stderr);
+        assert!(output.status.success(), "{printed}");
+        assert!(
+            printed.contains(expected) && printed.is_empty() == expected.is_empty(),
+            "{printed}"
+        );
+    }
+}
+
+#[test]
 fn other_colour_models() {
     let room = Room::new();
     // White, black, a gray, and a red: by the formulas of CIE 1976 and ITU-R BT.601.

@@ -8,6 +8,7 @@ use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
 use image::{DynamicImage, ImageEncoder};
 use image_gip::{ColorModel, Metadata, SampleDepth};
 
+use crate::errors::WrongUsage;
 use crate::files;
 use crate::picture::{SampleSlice, StillImage};
 
@@ -51,7 +52,8 @@ impl Codec {
         }
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::named(&extension).with_context(|| {
-            format!("{}: the extension must name the format: {EXTENSIONS}", path.display())
+            let path = path.display();
+            WrongUsage(format!("{path}: the extension must name the format: {EXTENSIONS}"))
         })
     }
 
@@ -122,6 +124,22 @@ impl Codec {
         };
         let depths = self.depths();
         Ok((chosen, if depths.contains(&depth) { depth } else { depths[0] }))
+    }
+
+    /// Refuses a picture that is larger than the format has.
+    pub(crate) fn check_size(self, (width, height): (u32, u32)) -> Result<()> {
+        let most = match self {
+            Self::Ico => 256,
+            Self::WebP => 1 << 14,
+            Self::Gif | Self::Jpeg | Self::Tga => u16::MAX.into(),
+            _ => u32::MAX,
+        };
+        if width.max(height) > most {
+            bail!(
+                "{self:?} has at most {most}x{most} pixels, and the picture has {width}x{height}"
+            );
+        }
+        Ok(())
     }
 
     /// Drops the metadata that the format has no place for, or that `image` does not write to it. Returns

@@ -8,13 +8,14 @@ use serde::Serialize;
 
 use crate::args;
 use crate::encode::json_psnr;
+use crate::errors::WrongUsage;
 use crate::files;
 use crate::picture::{SampleSlice, StillImage, widest};
 use crate::source::Reading;
 
 pub(crate) fn run(args: &args::Compare) -> Result<()> {
     if files::is_standard_stream(&args.a) && files::is_standard_stream(&args.b) {
-        bail!("only one of the two pictures can come from standard input");
+        bail!(WrongUsage("only one of the two pictures can come from standard input".into()));
     }
     let reading = Reading { limits: args.limits.limits(), allow_partial: false };
     let (mut a, mut b) = (reading.read(&args.a)?, reading.read(&args.b)?);

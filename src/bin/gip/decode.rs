@@ -42,7 +42,8 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let mut decoder = Decoder::new_with_limits(file, limits).with_context(context)?;
     let metadata = decoder.metadata().clone();
     let options = render_options(args, decoder.header(), &metadata).with_context(context)?;
-    let wanted = Wanted::new(options, codec, decoder.header())?;
+    let wanted = Wanted::new(options, codec, decoder.header());
+    let wanted = wanted.with_context(|| files::output_name(&args.output))?;
     let image = wanted.decode(&mut decoder).with_context(context)?;
     Ok(StillImage { image, metadata, warnings: Vec::new() })
 }
@@ -91,6 +92,7 @@ impl Wanted {
         let (color, depth) = codec.choose(header.color, header.depth)?;
         let options = options.with_color(color);
         let (width, height) = options.output_size(header);
+        codec.check_size((width, height))?;
         Ok(Self { options, width, height, color, depth })
     }
 

@@ -44,8 +44,13 @@ impl StillImage {
         let is_foreign = |profile: &mut Vec<u8>| profile.get(16..20) != Some(expected);
         if let Some(profile) = self.metadata.icc_profile.take_if(is_foreign) {
             let space = String::from_utf8_lossy(profile.get(16..20).unwrap_or_default());
-            let space = space.trim().escape_debug().to_string();
-            self.warnings.push(format!("its ICC profile is one of {space} and cannot be kept"));
+            let space = space.trim();
+            let is_name = !space.is_empty() && space.chars().all(|c| c.is_ascii_alphanumeric());
+            self.warnings.push(if is_name {
+                format!("its ICC profile is one of {space} and cannot be kept")
+            } else {
+                "its ICC profile is damaged and cannot be kept".into()
+            });
         }
     }
 

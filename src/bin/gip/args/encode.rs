@@ -11,7 +11,7 @@ use super::values::{ThreadCount, number};
 
 /// Encodes a picture as a .gip file.
 ///
-/// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS, ICO, farbfeld, OpenEXR, Radiance
+/// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS (DXT1, 3 and 5), ICO, farbfeld, OpenEXR, Radiance
 /// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
 /// Alpha is dropped if every pixel is opaque. Of several pictures, the first is taken. Samples that are
 /// floats are clipped and stored with 16 bits: in OpenEXR and HDR they are linear light, and become

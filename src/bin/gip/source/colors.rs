@@ -1,6 +1,7 @@
 //! What files say about their colours beside an ICC profile.
 
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 
 use image::DynamicImage;
 use image_gip::Metadata;
@@ -16,6 +17,12 @@ use super::stored::Stored;
 /// The gamma that stands for sRGB, and how far others that do may be from it.
 const SRGB_GAMMA: f64 = 0.454_55;
 const SAME_GAMMA: f64 = 0.01;
+/// Gammas that pictures have.
+const GAMMAS: RangeInclusive<f64> = 0.1..=10.0;
+/// The least area of the triangle of primaries, a hundredth of sRGB's, and that of the three to the
+/// white relative to it.
+const LEAST_AREA: f64 = 0.001;
+const LEAST_SHARE: f64 = 0.001;
 /// How far chromaticities of sRGB may be from the standard's.
 const SAME_CHROMATICITY: f64 = 0.002;
 /// x and y of sRGB's white, red, green and blue.
@@ -111,10 +118,17 @@ fn lost(points: CodingIndependentCodePoints, has_other: bool) -> String {
 }
 
 fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stored) {
+    let mut invalid = |chunk, is_valid: bool| {
+        if !is_valid {
+            stored.warnings.push(format!("its chunk {chunk} is invalid, and is ignored"));
+        }
+        is_valid
+    };
     let gamma = info.gama_chunk.map(|gamma| f64::from(gamma.into_value()));
-    let gamma = gamma.filter(|gamma| *gamma > 0.0);
+    let gamma = gamma.filter(|gamma| invalid("gAMA", GAMMAS.contains(gamma)));
     let is_srgb_gamma = gamma.is_none_or(|gamma| (gamma / SRGB_GAMMA - 1.0).abs() < SAME_GAMMA);
     let chromaticities = info.chrm_chunk.filter(|_| !is_gray).map(points);
+    let chromaticities = chromaticities.filter(|points| invalid("cHRM", is_color_space(points)));
     let others = chromaticities.filter(|points| {
         let pairs = points.iter().zip(SRGB);
         pairs.into_iter().any(|(&(x, y), (u, v))| {
@@ -142,16 +156,26 @@ fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stor
             profile.blue_trc = Some(curve);
             let profile = named(profile, "PNG gAMA cHRM".into());
             let matrix = profile.colorant_matrix();
-            // Chromaticities on a line make no colour space.
             if matrix.v.iter().flatten().all(|value| value.is_finite() && value.abs() < 4.0)
                 && let Ok(profile) = profile.encode()
             {
                 stored.metadata.icc_profile = Some(profile);
             } else {
-                stored.warnings.push("its chromaticities (cHRM) are invalid".into());
+                stored.warnings.push("its chunk cHRM is invalid, and is ignored".into());
             }
         }
     }
+}
+
+/// Whether red, green and blue make a triangle that the white, which is the first, is in.
+fn is_color_space(&[white, red, green, blue]: &[(f64, f64); 4]) -> bool {
+    let area = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| {
+        ((b.0 - a.0) * (c.1 - a.1) - (c.0 - a.0) * (b.1 - a.1)) / 2.0
+    };
+    let whole = area(red, green, blue);
+    let parts = [area(white, green, blue), area(red, white, blue), area(red, green, white)];
+    let has_light = [white, red, green, blue].iter().all(|point| point.1 > 0.0);
+    has_light && whole.abs() > LEAST_AREA && parts.iter().all(|part| part / whole > LEAST_SHARE)
 }
 
 fn points(chromaticities: SourceChromaticities) -> [(f64, f64); 4] {

@@ -1,5 +1,6 @@
 //! The formats that `image` reads.
 
+use std::borrow::Cow;
 use std::io::{BufRead, Cursor, Seek};
 
 use anyhow::{Result, bail};
@@ -7,7 +8,7 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Ima
 use image_gip::Limits;
 
 use super::stored::{Stored, partly};
-use super::{colors, frames, jpeg, light, metadata};
+use super::{clipping, colors, frames, ico, jpeg, light, metadata, png_chunks, screen};
 use crate::limits::check_size;
 
 /// Width and height in pixels.
@@ -15,7 +16,11 @@ pub(super) fn dimensions(
     format: ImageFormat,
     file: impl BufRead + Seek,
     limits: &Limits,
-) -> ImageResult<(u32, u32)> {
+) -> Result<(u32, u32)> {
+    if format == ImageFormat::Png {
+        // Chunks that are damaged do not matter here.
+        return Ok(png::Decoder::new(file).read_header_info()?.size());
+    }
     Ok(decoder(format, file, limits)?.dimensions())
 }
 
@@ -25,28 +30,37 @@ pub(super) fn read(
     limits: &Limits,
     allow_partial: bool,
 ) -> Result<Stored> {
+    if format == ImageFormat::Ico
+        && let Some(png) = ico::png(file)
+    {
+        return read(ImageFormat::Png, png, limits, allow_partial);
+    }
+    let (file, mut warnings) = match format {
+        ImageFormat::Gif => (screen::of_first_frame(file), Vec::new()),
+        ImageFormat::Png => png_chunks::without_damaged(file),
+        _ => (Cow::Borrowed(file), Vec::new()),
+    };
+    let file = &file[..];
     let mut decoder = decoder(format, Cursor::new(file), limits)?;
     check_size(limits, decoder.dimensions())?;
     let (metadata, loss) = metadata::read(&mut decoder, file)?;
     // The decoders of `image` know nothing of the prefix that was removed from Exif.
     let orientation = metadata.orientation();
-    let mut warnings: Vec<_> = frames::warning(format, file).into_iter().collect();
+    warnings.extend(frames::warning(format, file));
     warnings.extend(loss.map(|loss| loss.to_string()));
-    if format == ImageFormat::Jpeg
-        && let Some(damage) = jpeg::damage(file)
-    {
-        if !allow_partial {
-            bail!("the file is damaged: {damage}");
-        }
-        warnings.push(partly(damage));
+    let mut damage = damage(format, file).map(String::from);
+    if let Some(damage) = damage.as_ref().filter(|_| !allow_partial) {
+        bail!("the file is damaged: {damage}");
     }
     let image = match DynamicImage::from_decoder(decoder) {
         Err(error) if allow_partial => {
-            warnings.push(partly(&error));
+            damage.get_or_insert_with(|| error.to_string());
             partial(format, file, limits).ok_or(error)?
         }
         image => image?,
     };
+    warnings.extend(damage.map(partly));
+    warnings.extend(clipping::warning_of(&image));
     let mut stored = Stored { image: light::encoded(image), orientation, metadata, warnings };
     match format {
         ImageFormat::Jpeg => colors::of_exif(&mut stored.metadata),
@@ -56,6 +70,18 @@ pub(super) fn read(
         _ => {}
     }
     Ok(stored)
+}
+
+/// Damage that the decoder says nothing of.
+fn damage(format: ImageFormat, file: &[u8]) -> Option<&'static str> {
+    match format {
+        ImageFormat::Jpeg => jpeg::damage(file),
+        ImageFormat::WebP => {
+            let length = u32::from_le_bytes(*file.get(4..)?.first_chunk()?);
+            (u64::from(length) + 8 > file.len() as u64).then_some("the data end too early")
+        }
+        _ => None,
+    }
 }
 
 /// The size of the picture has a limit of its own, so that of memory is for all else.

@@ -1,15 +1,19 @@
 //! Reading pictures of any format, and telling what of them cannot be kept.
 
+mod clipping;
 mod colors;
 mod extended_xmp;
 mod format;
 mod formats;
 mod frames;
 mod gip;
+mod ico;
 mod jpeg;
 mod light;
 mod metadata;
+mod png_chunks;
 mod read;
+mod screen;
 mod stored;
 mod tiff;
 

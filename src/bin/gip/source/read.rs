@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use image_gip::{Decoder, Limits};
 
 use super::format::{Format, START};
@@ -59,6 +59,9 @@ impl Reading {
                 Format::Image(format) => formats::read(format, file, limits, *allow_partial)?,
                 Format::Tiff => tiff::read(file, limits, *allow_partial)?,
             };
+        if image.width() == 0 || image.height() == 0 {
+            bail!("it has no pixels");
+        }
         let mut picture = StillImage { image, metadata, warnings };
         picture.make_upright(orientation);
         picture.drop_foreign_profile();

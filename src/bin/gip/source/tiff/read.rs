@@ -49,8 +49,9 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
         }
     }
     let memory = samples::limits(limits.max_memory, &tags);
-    let (samples, damage) = samples::read(file, &tags, memory, allow_partial)?;
+    let (samples, damage, clipped) = samples::read(file, &tags, memory, allow_partial)?;
     warnings.extend(damage.map(partly));
+    warnings.extend(clipped);
     if matches!(tags.photometric, Photometric::CieLab | Photometric::IccLab) {
         warnings.push("its CIELAB colours are turned to sRGB; what sRGB lacks is clipped".into());
     } else if tags.has_colorimetry && metadata.icc_profile.is_none() {

@@ -7,6 +7,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::{TiffError, TiffResult};
 
 use super::tags::Tags;
+use crate::source::clipping;
 
 /// The tag `PhotometricInterpretation`.
 const PHOTOMETRIC: u16 = 262;
@@ -21,13 +22,13 @@ pub(super) enum Samples {
     Sixteen(Vec<u16>),
 }
 
-/// Reads all samples, and an error if they are only those before it.
+/// Reads all samples, an error if they are only those before it, and what of floats is clipped.
 pub(super) fn read(
     file: &[u8],
     tags: &Tags,
     limits: Limits,
     allow_partial: bool,
-) -> Result<(Samples, Option<TiffError>)> {
+) -> Result<(Samples, Option<TiffError>, Option<String>)> {
     let mut file = without_colors(file).context("the directory of the page is damaged")?;
     let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits.clone());
     let layout = decoder.image_buffer_layout()?;
@@ -49,6 +50,12 @@ pub(super) fn read(
         bail!(TiffError::LimitsExceeded);
     }
     let planes = if layout.planes > 1 { tags.samples } else { 1 };
+    let clipped = match &decoded {
+        DecodingResult::F16(samples) => clipping::warning(samples.iter().map(|s| s.to_f32())),
+        DecodingResult::F32(samples) => clipping::warning(samples.iter().copied()),
+        DecodingResult::F64(samples) => clipping::warning(samples.iter().map(|&s| s as f32)),
+        _ => None,
+    };
     let samples = match decoded {
         DecodingResult::U8(bytes) if tags.bits < 8 => {
             Samples::Eight(unpacked(&bytes, tags, tags.samples / planes))
@@ -71,7 +78,7 @@ pub(super) fn read(
         Samples::Eight(samples) => Samples::Eight(interleaved(samples, planes)),
         Samples::Sixteen(samples) => Samples::Sixteen(interleaved(samples, planes)),
     };
-    Ok((samples, damage))
+    Ok((samples, damage, clipped))
 }
 
 /// A copy of the file whose samples are gray or have no meaning, so that the library gives them as they

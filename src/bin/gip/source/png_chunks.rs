@@ -1,0 +1,72 @@
+//! What a PNG tells beside its picture in chunks that are damaged.
+
+use std::borrow::Cow;
+use std::io::Cursor;
+
+/// Bytes of the signature, and of length, name and checksum of a chunk.
+const SIGNATURE: usize = 8;
+const AROUND: usize = 12;
+/// Signature and header of a picture of one gray pixel, which any chunk may follow.
+const BEFORE: &[u8] =
+    b"\x89PNG\r\n\x1A\n\0\0\0\x0DIHDR\0\0\0\x01\0\0\0\x01\x08\0\0\0\0\x3A\x7E\x9B\x55";
+/// Where the samples would begin.
+const AFTER: &[u8] = b"\0\0\0\x01IDAT";
+
+/// Chunks that the picture can do without, and whose meaning does not depend on others.
+const OPTIONAL: [&[u8]; 8] =
+    [b"cHRM", b"cICP", b"cLLI", b"eXIf", b"gAMA", b"iCCP", b"mDCV", b"sRGB"];
+
+/// The file without those [`OPTIONAL`] chunks before the samples that cannot be read, and a warning of
+/// each. The library ignores some of them without a word, and takes others for an error.
+pub(super) fn without_damaged(file: &[u8]) -> (Cow<'_, [u8]>, Vec<String>) {
+    let mut at = SIGNATURE;
+    let (mut ranges, mut warnings, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+    while let Some(length) = file.get(at..at + 4) {
+        let length = u32::from_be_bytes([length[0], length[1], length[2], length[3]]);
+        let end = at.saturating_add(length as usize).saturating_add(AROUND);
+        let Some(chunk) = file.get(at..end) else { break };
+        let name = &chunk[4..8];
+        if name == b"IDAT" {
+            break;
+        }
+        // Nothing is made of bKGD, which the library wants after the palette. Of others, the first counts.
+        if name == b"bKGD" || seen.contains(&name) {
+            ranges.push(at..end);
+        } else if OPTIONAL.contains(&name) {
+            seen.push(name);
+            if !is_readable(name, chunk) {
+                let name = name.escape_ascii();
+                warnings.push(format!("its chunk {name} is invalid, and is ignored"));
+                ranges.push(at..end);
+            }
+        }
+        at = end;
+    }
+    if ranges.is_empty() {
+        return (file.into(), warnings);
+    }
+    let (mut out, mut at) = (Vec::with_capacity(file.len()), 0);
+    for range in ranges {
+        out.extend_from_slice(&file[at..range.start]);
+        at = range.end;
+    }
+    out.extend_from_slice(&file[at..]);
+    (out.into(), warnings)
+}
+
+/// Whether the library gets from a chunk what it is for.
+fn is_readable(name: &[u8], chunk: &[u8]) -> bool {
+    let file = [BEFORE, chunk, AFTER].concat();
+    let Ok(reader) = png::Decoder::new(Cursor::new(file)).read_info() else { return false };
+    let info = reader.info();
+    match name {
+        b"cICP" => info.coding_independent_code_points.is_some(),
+        b"iCCP" => info.icc_profile.is_some(),
+        b"sRGB" => info.srgb.is_some(),
+        b"gAMA" => info.gama_chunk.is_some(),
+        b"cHRM" => info.chrm_chunk.is_some(),
+        b"eXIf" => info.exif_metadata.is_some(),
+        // What nothing is made of.
+        _ => true,
+    }
+}
