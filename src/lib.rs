@@ -61,7 +61,7 @@
 //!   has the output size, the [`Region`] and the [`ColorModel`].
 //! - **The model:** [`Gaussian`], its stored shape ([`Parameterization`]), the [`Kernel`], and the
 //!   [`Quantizer`]s or [`LatticeSteps`] that relate codes to values.
-//! - **Encoding** (feature `encode`): [`encode`](encode()), or an `Encoder`, which encodes a
+//! - **Encoding** (feature `encode`): `encode`, or an `Encoder`, which encodes a
 //!   `Source` for a `Target` and returns the file with a `Report`.
 //! - **The `image` crate** (feature `image`): `register` makes `image::open` read `.gip`.
 //!

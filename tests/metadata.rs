@@ -70,6 +70,9 @@ fn unsafe_fields() -> Vec<Field> {
         ascii(Tag(Context::Tiff, 0xEA1C), SECRET),
         ascii(Tag(Context::Exif, 0xFDE8), SECRET),
         // Of the right name, but not what the name says.
+        ascii(Tag::DateTimeDigitized, SECRET),
+        ascii(Tag::OffsetTime, "+SEC:RET"),
+        field(Tag(Context::Interop, 2), Value::Undefined(b"SECR".to_vec(), 0)),
         field(Tag::SubSecTime, secret()),
         field(Tag::YResolution, Value::Short(vec![0; 99])),
         ascii(Tag::WhitePoint, SECRET),
@@ -133,15 +136,131 @@ fn all_keeps_all_and_none_keeps_nothing() {
     assert_eq!(MetadataPolicy::default(), MetadataPolicy::All);
 }
 
+/// Exif in big-endian order with the entries of two directories, the second of which the first refers to:
+/// tag, type, number of values, and the value or its offset. The values come after them, at an offset of
+/// 200. Neither directory ends with the offset of another one.
+fn exif_of_entries(
+    tiff: &[(Tag, u16, u32, u32)],
+    exif: &[(Tag, u16, u32, u32)],
+    values: &[u8],
+) -> Vec<u8> {
+    let mut bytes = b"MM\0*\0\0\0\x08".to_vec();
+    let second = 8 + 2 + 12 * (tiff.len() as u32 + 1);
+    let pointer = (Tag::ExifIFDPointer, 4, 1, second);
+    for directory in [&[tiff, &[pointer]].concat()[..], exif] {
+        bytes.extend((directory.len() as u16).to_be_bytes());
+        for &(tag, kind, count, value) in directory {
+            bytes.extend([tag.number().to_be_bytes(), kind.to_be_bytes()].concat());
+            bytes.extend([count.to_be_bytes(), value.to_be_bytes()].concat());
+        }
+    }
+    assert!(bytes.len() <= 200);
+    bytes.resize(200, 0xA5);
+    bytes.extend(values);
+    bytes
+}
+
 #[test]
-fn exif_that_is_damaged_is_dropped_but_for_its_orientation() {
+fn what_can_be_read_of_damaged_exif_is_kept() {
     let whole = write(&[safe(), unsafe_fields()].concat(), None, true);
     let mut metadata = of_exif(whole[..whole.len() - 1].to_vec());
+    assert!(
+        metadata.retain(MetadataPolicy::Safe).is_empty(),
+        "the last value is none that is kept"
+    );
+    assert_eq!(metadata.exif, Some(write(&safe(), None, true)));
+
+    // One of the texts is beyond the end.
+    let tiff = [(Tag::Artist, 2, 5, 200), (Tag::Copyright, 2, 50, 200)];
+    let exif = [(Tag::DateTimeOriginal, 2, 20, 206)];
+    let bytes = exif_of_entries(&tiff, &exif, b"Emma\0\x002020:01:02 03:04:05\0");
+    let expected =
+        [ascii(Tag::Artist, "Emma"), ascii(Tag::DateTimeOriginal, "2020:01:02 03:04:05")];
+    let mut metadata = of_exif(bytes.clone());
     assert_eq!(metadata.retain(MetadataPolicy::Safe), [MetadataLoss::DamagedExif]);
-    assert_eq!(metadata.exif, Some(write(&safe()[..1], None, false)));
+    assert_eq!(metadata.exif, Some(write(&expected, None, false)));
+
+    // A directory is beyond the end, or ends there.
+    for cut in [44, 50] {
+        let mut metadata = of_exif(bytes[..cut].to_vec());
+        assert_eq!(metadata.retain(MetadataPolicy::Safe), [MetadataLoss::DamagedExif]);
+        assert_eq!(metadata.exif, None);
+    }
 
     let mut metadata = of_exif(SECRET.into());
     assert_eq!(metadata.retain(MetadataPolicy::Safe), [MetadataLoss::DamagedExif]);
+    assert_eq!(metadata.exif, None);
+}
+
+#[test]
+fn directories_need_not_end_with_the_offset_of_another_one() {
+    let tiff = [(Tag::Artist, 2, 5, 200)];
+    let exif = [(Tag::SubSecTimeOriginal, 2, 3, u32::from_be_bytes(*b"12\0\0"))];
+    let mut metadata = of_exif(exif_of_entries(&tiff, &exif, b"Emma\0"));
+    assert!(metadata.retain(MetadataPolicy::Safe).is_empty());
+    let expected = [ascii(Tag::Artist, "Emma"), ascii(Tag::SubSecTimeOriginal, "12")];
+    assert_eq!(metadata.exif, Some(write(&expected, None, false)));
+}
+
+#[test]
+fn safe_texts_of_exif_end_where_they_are_seen_to_end() {
+    let text = |tag: Tag, texts: &[&str]| {
+        let texts = texts.iter().map(|text| text.as_bytes().to_vec());
+        field(tag, Value::Ascii(texts.collect()))
+    };
+    let bytes = write(
+        &[
+            text(Tag::Artist, &["Emma", SECRET]),
+            text(Tag::ImageDescription, &["", SECRET]),
+            text(Tag::Copyright, &[" ", "An editor", SECRET]),
+            text(Tag::DateTime, &["2020:01:02 03:04:05", SECRET]),
+            text(Tag::DateTimeOriginal, &["    :  :     :  :  "]),
+            text(Tag::DateTimeDigitized, &["2020-01-02 03:04:05"]),
+            text(Tag::SubSecTime, &["1234567890"]),
+            text(Tag::SubSecTimeOriginal, &["12 "]),
+        ],
+        None,
+        true,
+    );
+    let mut metadata = of_exif(bytes);
+    assert!(metadata.retain(MetadataPolicy::Safe).is_empty());
+    let expected = [
+        text(Tag::Artist, &["Emma"]),
+        text(Tag::Copyright, &[" ", "An editor"]),
+        text(Tag::DateTime, &["2020:01:02 03:04:05"]),
+        text(Tag::DateTimeOriginal, &["    :  :     :  :  "]),
+        text(Tag::SubSecTimeOriginal, &["12 "]),
+    ];
+    assert_eq!(metadata.exif, Some(write(&expected, None, true)));
+}
+
+#[test]
+fn types_of_exif_that_are_newer_or_unknown() {
+    // 129 is UTF-8.
+    let tiff = [
+        (Tag::Artist, 129, 6, 200),
+        (Tag::Copyright, 130, 9, 200),
+        (Tag::XResolution, 0xFFFF, u32::MAX, 200),
+        (Tag::ImageDescription, 0, 1, 200),
+    ];
+    let mut metadata = of_exif(exif_of_entries(&tiff, &[], "Zo\u{eb}\0\0SECRET".as_bytes()));
+    assert!(metadata.retain(MetadataPolicy::Safe).is_empty());
+    assert_eq!(metadata.exif, Some(write(&[ascii(Tag::Artist, "Zo\u{eb}")], None, false)));
+}
+
+#[test]
+fn directories_that_share_their_bytes_take_no_more_memory() {
+    // Each entry refers to a directory of all entries that follow.
+    const ENTRIES: u16 = 5_400;
+    let mut bytes = b"MM\0*\0\0\0\x08".to_vec();
+    bytes.extend(ENTRIES.to_be_bytes());
+    for number in 0..u32::from(ENTRIES) {
+        bytes.extend([0x8769_0004, 1, 8 + 12 * (number + 1)].map(u32::to_be_bytes).concat());
+    }
+    let mut metadata = of_exif(bytes.clone());
+    metadata.retain(MetadataPolicy::Safe);
+    assert_eq!(metadata.exif, None);
+    metadata.set_exif_of_tiff(&bytes);
     assert_eq!(metadata.exif, None);
 }
 

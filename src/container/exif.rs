@@ -1,4 +1,4 @@
-//! Exif data: a TIFF stream.
+//! Exif data: a TIFF stream, whose directories are read as far as they go.
 
 use crate::orientation::Orientation;
 
@@ -27,33 +27,99 @@ pub(super) fn reset_orientation(exif: &mut [u8]) {
 
 /// Where the value of the orientation is.
 fn find_orientation(exif: &[u8]) -> Option<(usize, ByteOrder)> {
-    let order = match exif.first_chunk()? {
-        b"II*\0" => ByteOrder::Little,
-        b"MM\0*" => ByteOrder::Big,
-        _ => return None,
-    };
-    // The first directory is that of the picture. Files are untrusted, so that sums may overflow.
-    let directory = usize::try_from(order.long(exif, 4)?).ok()?;
-    let entries = directory.checked_add(2)?;
-    for entry in 0..usize::from(order.short(exif, directory)?) {
-        let at = entries.checked_add(entry * ENTRY)?;
-        let head = (order.short(exif, at)?, order.short(exif, at + 2)?, order.long(exif, at + 4)?);
-        let value = at + 8;
-        if head == (ORIENTATION, SHORT, 1) {
-            return exif.get(value..value + 2).map(|_| (value, order));
-        }
+    let directory = Directory::first(exif)?;
+    let mut entries = directory.entries();
+    let found =
+        entries.find(|entry| (entry.tag, entry.kind, entry.count) == (ORIENTATION, SHORT, 1));
+    let value = found?.value;
+    exif.get(value..value + 2).map(|_| (value, directory.order))
+}
+
+/// A directory of a TIFF stream.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Directory<'a> {
+    stream: &'a [u8],
+    pub(crate) order: ByteOrder,
+    /// Where the first entry is, and how many there are said to be.
+    first: usize,
+    pub(crate) count: u16,
+}
+
+/// An entry of a directory. Its value is untrusted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub(crate) tag: u16,
+    /// The type of the value.
+    pub(crate) kind: u16,
+    /// How many numbers or characters the value has.
+    pub(crate) count: u32,
+    /// Where the value is, or, if it has more than four bytes, the offset of it.
+    value: usize,
+}
+
+impl<'a> Directory<'a> {
+    /// The directory of the picture; `None` if this is no TIFF stream, or if the directory is not there.
+    pub(crate) fn first(stream: &'a [u8]) -> Option<Self> {
+        let order = match stream.first_chunk()? {
+            b"II*\0" => ByteOrder::Little,
+            b"MM\0*" => ByteOrder::Big,
+            _ => return None,
+        };
+        Self::at(stream, order, order.long(stream, 4)?)
     }
-    None
+
+    fn at(stream: &'a [u8], order: ByteOrder, offset: u32) -> Option<Self> {
+        let at = usize::try_from(offset).ok()?;
+        // Files are untrusted, so that sums may overflow.
+        Some(Self { stream, order, first: at.checked_add(2)?, count: order.short(stream, at)? })
+    }
+
+    /// The entries that are there.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = Entry> {
+        let &Self { stream, order, first, count } = self;
+        (0..usize::from(count)).map_while(move |number| {
+            let at = first.checked_add(number * ENTRY)?;
+            stream.get(at..at.checked_add(ENTRY)?)?;
+            Some(Entry {
+                tag: order.short(stream, at)?,
+                kind: order.short(stream, at + 2)?,
+                count: order.long(stream, at + 4)?,
+                value: at + 8,
+            })
+        })
+    }
+}
+
+#[cfg(feature = "metadata")]
+impl<'a> Directory<'a> {
+    /// The directory that an entry refers to; `None` if it is not there.
+    pub(crate) fn child(&self, entry: Entry) -> Option<Self> {
+        const LONG: u16 = 4;
+        const IFD: u16 = 13;
+        let is_offset = matches!(entry.kind, LONG | IFD) && entry.count == 1;
+        let offset = self.order.long(self.stream, entry.value).filter(|_| is_offset)?;
+        Self::at(self.stream, self.order, offset)
+    }
+
+    /// The bytes of a value whose numbers have so many; `None` if they are not all there.
+    pub(crate) fn bytes(&self, entry: Entry, each: usize) -> Option<&'a [u8]> {
+        let length = usize::try_from(entry.count).ok()?.checked_mul(each)?;
+        let at = match length {
+            0..=4 => entry.value,
+            _ => usize::try_from(self.order.long(self.stream, entry.value)?).ok()?,
+        };
+        self.stream.get(at..at.checked_add(length)?)
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
-enum ByteOrder {
+pub(crate) enum ByteOrder {
     Little,
     Big,
 }
 
 impl ByteOrder {
-    fn short(self, bytes: &[u8], at: usize) -> Option<u16> {
+    pub(crate) fn short(self, bytes: &[u8], at: usize) -> Option<u16> {
         let bytes = *bytes.get(at..)?.first_chunk()?;
         Some(match self {
             Self::Little => u16::from_le_bytes(bytes),
@@ -61,7 +127,7 @@ impl ByteOrder {
         })
     }
 
-    fn long(self, bytes: &[u8], at: usize) -> Option<u32> {
+    pub(crate) fn long(self, bytes: &[u8], at: usize) -> Option<u32> {
         let bytes = *bytes.get(at..)?.first_chunk()?;
         Some(match self {
             Self::Little => u32::from_le_bytes(bytes),

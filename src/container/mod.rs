@@ -7,6 +7,8 @@ mod parser;
 #[cfg(feature = "encode")]
 mod writer;
 
+#[cfg(feature = "metadata")]
+pub(crate) use exif::{ByteOrder, Directory, Entry};
 pub use header::{Coding, Header};
 #[cfg(feature = "encode")]
 pub(crate) use header::{MAX_SIDE, VERSION};

@@ -36,7 +36,7 @@ pub enum MetadataPolicy {
 pub enum MetadataLoss {
     /// A colour profile that is not sRGB's: the same samples now stand for other colours.
     ColorProfile,
-    /// Exif that is damaged, and therefore was dropped as a whole, but for its orientation.
+    /// Exif that is damaged: what could be read of it is kept, as the policy says.
     DamagedExif,
     /// XMP that is damaged, and therefore was dropped as a whole.
     DamagedXmp,
@@ -65,11 +65,11 @@ impl Metadata {
             MetadataPolicy::Safe => {
                 let orientation = self.orientation();
                 if let Some(exif) = self.exif.take() {
-                    let exif = exif::read(exif);
-                    if exif.is_none() {
+                    let (safe, is_damaged) = exif::safe(&exif, orientation);
+                    if is_damaged {
                         losses.push(MetadataLoss::DamagedExif);
                     }
-                    self.exif = exif::safe(exif.as_ref(), orientation);
+                    self.exif = safe;
                 }
                 if let Some(xmp) = self.xmp.take() {
                     self.xmp = xmp::safe(&xmp).unwrap_or_else(|_| {
@@ -96,7 +96,9 @@ impl fmt::Display for MetadataLoss {
             Self::ColorProfile => {
                 "the colour profile was dropped, so the colours are taken for sRGB"
             }
-            Self::DamagedExif => "the Exif is damaged and was dropped",
+            Self::DamagedExif => {
+                "the Exif is damaged, and what could not be read of it was dropped"
+            }
             Self::DamagedXmp => "the XMP is damaged and was dropped",
             Self::XmpExtension => {
                 "the second part of the XMP is missing or damaged and was dropped"

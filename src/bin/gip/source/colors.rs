@@ -201,14 +201,7 @@ fn named(mut profile: ColorProfile, name: String) -> ColorProfile {
 
 /// Adds the profile of Adobe RGB, which cameras name by a code in Exif in its place (DCF, 2.0).
 pub(super) fn of_exif(metadata: &mut Metadata) {
-    let Some(bytes) = metadata.exif.as_ref().filter(|_| metadata.icc_profile.is_none()) else {
-        return;
-    };
-    let Ok(exif) = exif::Reader::new().read_raw(bytes.clone()) else { return };
-    let index = exif.get_field(exif::Tag::InteroperabilityIndex, exif::In::PRIMARY);
-    if let Some(exif::Value::Ascii(texts)) = index.map(|field| &field.value)
-        && texts.first().is_some_and(|text| text.starts_with(b"R03"))
-    {
+    if metadata.icc_profile.is_none() && metadata.is_adobe_rgb() {
         metadata.icc_profile = ColorProfile::new_adobe_rgb().encode().ok();
     }
 }

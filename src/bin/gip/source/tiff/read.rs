@@ -12,7 +12,6 @@ use tiff::tags::Tag;
 use super::tags::{Photometric, Tags};
 use super::{colors, samples};
 use crate::limits::check_size;
-use crate::source::metadata::exif_of_tiff;
 use crate::source::stored::{Stored, partly};
 use crate::source::{frames, jpeg};
 
@@ -33,7 +32,7 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     }
     let mut metadata = Metadata::default();
     metadata.icc_profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
-    metadata.exif = exif_of_tiff(file);
+    metadata.set_exif_of_tiff(file);
     metadata.xmp = decoder.get_tag_u8_vec(Tag::Unknown(700)).ok();
     let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?;
     let orientation = orientation.and_then(|code| Orientation::from_exif(code.min(255) as u8));
