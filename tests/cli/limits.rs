@@ -54,7 +54,6 @@ fn limits_may_be_lowered_too() {
         ("pixels=2k", "pixels"),
         ("gaussians=4", "gaussians"),
         ("memory=100", "memory"),
-        ("work=1", "work"),
     ] {
         let args = ["encode", "a.png", "a.gip", "--limit", limit];
         let error = room.fails(&[&args[..], &QUICK].concat());
@@ -63,4 +62,11 @@ fn limits_may_be_lowered_too() {
     let usage = room.run(&["info", "a.gip", "--limit", "size=5"]);
     assert_eq!(usage.status.code(), Some(2));
     assert_eq!(room.names(), ["a.png"]);
+
+    // 64 evaluations for a pixel are always allowed, and each Gaussian takes them all.
+    room.ok(&[&["encode", "a.png", "a.gip", "--limit", "work=1"], &QUICK[..]].concat());
+    let small = ["decode", "a.gip", "small.png", "--size", "1x1", "--limit"];
+    let error = room.fails(&[&small[..], &["work=1"]].concat());
+    assert!(error.contains("65 allowed") && error.contains("--limit work=N"), "{error}");
+    room.ok(&[&small[..], &["work=256"]].concat());
 }

@@ -154,6 +154,6 @@ export interface Limits {
   gaussians?: number;
   /** Bytes that the decoder may hold, the output not counted. Default 512 MiB. */
   memory?: number;
-  /** Kernel evaluations of one rendering. Default 2^32: some ten seconds. */
+  /** Kernel evaluations of one rendering beyond 64 for each pixel. Default 2^32: some ten seconds. */
   work?: number;
 }

@@ -85,7 +85,7 @@ test('errors have a class, a kind and a chunk', async () => {
         unreachable: await outcome(gip.decode('http://127.0.0.1:1/')),
         limit: await outcome(gip.decode(bytes, { limits: { gaussians: 10 } })),
         output: await outcome(gip.decode(bytes, { width: 100_000, height: 100_000 })),
-        work: await outcome(gip.decode(bytes, { limits: { work: 1000 } })),
+        work: await outcome(gip.decode(bytes, { width: 1, height: 1, limits: { work: 1000 } })),
         region: await outcome(gip.decode(bytes, { region: { x: 90, y: 0, width: 7, height: 1 } })),
         width: await outcome(gip.decode(bytes, { width: 1.5 })),
         source: await outcome(gip.decode(12)),

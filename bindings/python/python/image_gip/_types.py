@@ -17,8 +17,8 @@ MetadataPolicy: TypeAlias = Literal["all", "safe", "none"]
 class Limits:
     """What decoding a file may cost at most.
 
-    The defaults accept every ordinary picture, and bound what a hostile file costs to a few seconds
-    and a few hundred megabytes.
+    The defaults accept every ordinary picture, and bound what a hostile file costs to a few hundred
+    megabytes and a few seconds more than an ordinary picture of its size.
     """
 
     #: Largest width in pixels, of the file and of what is rendered.
@@ -31,7 +31,7 @@ class Limits:
     max_gaussians: int = 1 << 22
     #: Most bytes that the decoder holds; the output array does not count.
     max_memory: int = 512 << 20
-    #: Most evaluations of the kernel in one rendering.
+    #: Most evaluations of the kernel in one rendering beyond 64 for each pixel.
     max_work: int = 1 << 32
 
     @classmethod

@@ -8,7 +8,7 @@ use crate::limits::{NAMES, set};
 pub(crate) struct LimitArgs {
     /// Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or
     /// pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel
-    /// evaluations of a rendering); or `none` for no limits.
+    /// evaluations of a rendering beyond 64 for each pixel); or `none` for no limits.
     ///
     /// VALUE may end in k, M or G: thousands, millions or billions, of memory KiB, MiB or GiB. Defaults:
     /// width=65536, height=65536, pixels=268435456, gaussians=4194304, memory=512M and
