@@ -3,6 +3,8 @@
 //! All functions take interleaved samples of `u8`, `u16`, `f32` or any other type that converts to
 //! `f64`, and compute in `f64`.
 
+use crate::color::ColorModel;
+
 /// Standard deviation of the Gaussian window of SSIM, in pixels.
 const SIGMA: f64 = 1.5;
 /// Taps of the Gaussian window of SSIM along each axis.
@@ -81,6 +83,32 @@ pub fn ms_ssim<T: Copy + Into<f64>>(
         .map(|c| ms_ssim_of_planes(channel(a, c), channel(b, c), scales, full_scale))
         .sum();
     sum / channels as f64
+}
+
+/// The samples of a picture as they show: colours times their alpha, if there is one. `full_scale` is the
+/// value of a full sample: 255.0, 65535.0 or 1.0.
+///
+/// ```
+/// use image_gip::{ColorModel, metrics};
+///
+/// let shown = metrics::premultiplied(&[200_u8, 51, 30, 0], ColorModel::GrayAlpha, 255.0);
+/// assert_eq!(shown, [40.0, 51.0, 0.0, 0.0]);
+/// ```
+#[must_use]
+pub fn premultiplied<T: Copy + Into<f64>>(
+    samples: &[T],
+    color: ColorModel,
+    full_scale: f64,
+) -> Vec<f64> {
+    let mut samples: Vec<f64> = samples.iter().map(|&sample| sample.into()).collect();
+    if color.has_alpha() {
+        for pixel in samples.chunks_exact_mut(color.channels()) {
+            if let Some((alpha, colors)) = pixel.split_last_mut() {
+                colors.iter_mut().for_each(|sample| *sample *= *alpha / full_scale);
+            }
+        }
+    }
+    samples
 }
 
 fn check<T>(a: &[T], b: &[T]) {

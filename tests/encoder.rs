@@ -98,27 +98,14 @@ fn psnr_u8(a: &[u8], b: &[u8]) -> f64 {
     metrics::psnr(a, b, 255.0)
 }
 
-/// Colours as they show, times their alpha.
-fn premultiplied(samples: &[u8], color: ColorModel) -> Vec<f64> {
-    let shown = samples.chunks_exact(color.channels()).flat_map(|pixel| {
-        let alpha = if color.has_alpha() { pixel[pixel.len() - 1] } else { 255 };
-        pixel.iter().enumerate().map(move |(channel, &sample)| {
-            let is_alpha = color.has_alpha() && channel + 1 == color.channels();
-            let opacity = if is_alpha { 1.0 } else { f64::from(alpha) / 255.0 };
-            f64::from(sample) * opacity
-        })
-    });
-    shown.collect()
-}
-
 /// Checks what every file must hold, and returns the decoder.
 fn check(encoded: &Encoded, source: &[u8]) -> StreamDecoder {
     let stream = decode(&encoded.bytes);
     assert_eq!(stream.header().expect("read").gaussians, encoded.report.gaussians);
     assert!(stream.gaussians().iter().all(Gaussian::is_drawable), "a Gaussian is lost");
     let color = stream.header().expect("read").color;
-    let [found, source] =
-        [&pixels_u8(&stream)[..], source].map(|samples| premultiplied(samples, color));
+    let [found, source] = [&pixels_u8(&stream)[..], source]
+        .map(|samples| metrics::premultiplied(samples, color, 255.0));
     let (psnr, reported) = (metrics::psnr(&found, &source, 255.0), encoded.report.psnr);
     let is_reported = psnr == reported || (psnr - reported).abs() < 1e-4;
     assert!(is_reported, "the PSNR is {psnr}, but {reported} is reported");

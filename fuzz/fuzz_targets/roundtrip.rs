@@ -120,16 +120,9 @@ fn psnr<T: Copy + Into<f64>>(
     is_premultiplied: bool,
     full: f64,
 ) -> f64 {
-    let channels = color.channels();
-    let shown = |samples: &[T]| -> Vec<f64> {
-        let pixels = samples.chunks_exact(channels).map(|pixel| {
-            let mut pixel: Vec<f64> = pixel.iter().map(|&sample| sample.into()).collect();
-            if is_premultiplied && let Some((alpha, colors)) = pixel.split_last_mut() {
-                colors.iter_mut().for_each(|sample| *sample *= *alpha / full);
-            }
-            pixel
-        });
-        pixels.flatten().collect()
+    let shown = |samples: &[T]| match is_premultiplied {
+        true => metrics::premultiplied(samples, color, full),
+        false => samples.iter().map(|&sample| sample.into()).collect(),
     };
     metrics::psnr(&shown(a), &shown(b), full)
 }

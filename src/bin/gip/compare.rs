@@ -41,7 +41,7 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
 
 /// The samples of a picture, with colours times their alpha unless those under alpha 0 count, too.
 fn shown(picture: &StillImage, keep_invisible: bool) -> Vec<f64> {
-    let (mut samples, full): (Vec<f64>, _) = match picture.samples() {
+    let (samples, full): (Vec<f64>, _) = match picture.samples() {
         SampleSlice::Eight(samples) => {
             (samples.iter().map(|&s| s.into()).collect(), u8::MAX.into())
         }
@@ -49,16 +49,7 @@ fn shown(picture: &StillImage, keep_invisible: bool) -> Vec<f64> {
             (samples.iter().map(|&s| s.into()).collect(), f64::from(u16::MAX))
         }
     };
-    let color = picture.color();
-    if color.has_alpha() && !keep_invisible {
-        for pixel in samples.chunks_exact_mut(color.channels()) {
-            let (alpha, colors) = pixel.split_last_mut().expect("a pixel has samples");
-            for sample in colors {
-                *sample *= *alpha / full;
-            }
-        }
-    }
-    samples
+    if keep_invisible { samples } else { metrics::premultiplied(&samples, picture.color(), full) }
 }
 
 /// What `--json` prints.
