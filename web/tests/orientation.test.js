@@ -3,22 +3,11 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { exif, makePicture, withExif } from '../../bindings/wasm/tests/picture.js';
+import { exif, makePicture, turns, withExif } from '../../bindings/wasm/tests/picture.js';
 import { assertShows, drop, missing, openViewer, settled, start, viewOf } from './viewer.js';
 
 const [WIDTH, HEIGHT] = [96, 64];
-
-/** By Exif's values: where a place of the picture as stored is in the upright one. */
-const TURNS = {
-  1: ([x, y]) => [x, y],
-  2: ([x, y]) => [WIDTH - x, y],
-  3: ([x, y]) => [WIDTH - x, HEIGHT - y],
-  4: ([x, y]) => [x, HEIGHT - y],
-  5: ([x, y]) => [y, x],
-  6: ([x, y]) => [HEIGHT - y, x],
-  7: ([x, y]) => [HEIGHT - y, WIDTH - x],
-  8: ([x, y]) => [y, WIDTH - x],
-};
+const TURNS = turns(WIDTH, HEIGHT);
 
 let viewer;
 

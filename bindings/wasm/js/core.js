@@ -2,7 +2,7 @@
 
 import init, { Decoder as Native } from './image_gip.js';
 import { defaultLimits } from './limits.js';
-import { naturalSize, turnedSize, turnGaussians } from './orientation.js';
+import { turnedSize, turnGaussians, Upright } from './orientation.js';
 
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
@@ -56,12 +56,13 @@ function outputSize(picture, { width, height }) {
 }
 
 /** Decodes bytes as they arrive, and renders what has arrived. */
-export class Decoder {
+export class Decoder extends Upright {
   #native;
   #header = null;
   #orientation = null;
 
   constructor({ limits = {}, statistics = false } = {}) {
+    super();
     const numbers = Object.entries(defaultLimits).map(([name, value]) => limits[name] ?? value);
     this.#native = new Native(statistics, ...numbers);
   }
@@ -87,18 +88,6 @@ export class Decoder {
   get orientation() {
     this.#orientation ??= this.#native.orientation() ?? null;
     return this.#orientation;
-  }
-
-  get naturalWidth() {
-    return this.#natural.width;
-  }
-
-  get naturalHeight() {
-    return this.#natural.height;
-  }
-
-  get #natural() {
-    return naturalSize(this.header, this.orientation);
   }
 
   get metadata() {

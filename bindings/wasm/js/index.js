@@ -1,6 +1,6 @@
 // The package's interface for scripts. It works in a worker of its own, and never blocks the page.
 
-import { naturalSize } from './orientation.js';
+import { Upright } from './orientation.js';
 import { RemoteDecoder } from './remote.js';
 import { read } from './source.js';
 
@@ -27,11 +27,12 @@ function abortable(promise, signal) {
 }
 
 /** Decodes bytes as they arrive, and renders what has arrived. */
-export class StreamDecoder {
+export class StreamDecoder extends Upright {
   #remote;
   #progress = { header: null, orientation: null, gaussians: 0, complete: false };
 
   constructor({ limits, statistics } = {}) {
+    super();
     this.#remote = new RemoteDecoder({ limits, statistics });
   }
 
@@ -41,18 +42,6 @@ export class StreamDecoder {
 
   get orientation() {
     return this.#progress.orientation;
-  }
-
-  get naturalWidth() {
-    return this.#natural.width;
-  }
-
-  get naturalHeight() {
-    return this.#natural.height;
-  }
-
-  get #natural() {
-    return naturalSize(this.header, this.orientation);
   }
 
   get complete() {

@@ -14,6 +14,17 @@ export function naturalSize(header, orientation) {
   return orientation === null ? { width: 0, height: 0 } : turnedSize(header, orientation);
 }
 
+/** What has a header and an orientation, and the size that follows from them. */
+export class Upright {
+  get naturalWidth() {
+    return naturalSize(this.header, this.orientation).width;
+  }
+
+  get naturalHeight() {
+    return naturalSize(this.header, this.orientation).height;
+  }
+}
+
 /** Turns Gaussians, nine numbers each, of a picture with this stored size. */
 export function turnGaussians(numbers, { width, height }, orientation) {
   for (let at = 0; at < numbers.length; at += 9) {

@@ -6,21 +6,10 @@ import { before, test } from 'node:test';
 
 import { Decoder, load } from '../dist/core.js';
 import { file, harness, script, settled, slow, until, withPage } from './harness.js';
-import { exif, makePicture, withExif } from './picture.js';
+import { exif, makePicture, turns, withExif } from './picture.js';
 
 const [WIDTH, HEIGHT] = [48, 32];
-
-/** By Exif's values: where a place of the picture as stored is in the upright one. */
-const TURNS = {
-  1: ([x, y]) => [x, y],
-  2: ([x, y]) => [WIDTH - x, y],
-  3: ([x, y]) => [WIDTH - x, HEIGHT - y],
-  4: ([x, y]) => [x, HEIGHT - y],
-  5: ([x, y]) => [y, x],
-  6: ([x, y]) => [HEIGHT - y, x],
-  7: ([x, y]) => [HEIGHT - y, WIDTH - x],
-  8: ([x, y]) => [y, WIDTH - x],
-};
+const TURNS = turns(WIDTH, HEIGHT);
 const orientations = Object.keys(TURNS).map(Number);
 const sizeOf = (orientation) =>
   orientation > 4 ? { width: HEIGHT, height: WIDTH } : { width: WIDTH, height: HEIGHT };

@@ -19,6 +19,18 @@ export function exif(orientation) {
   return bytes;
 }
 
+/** By Exif's values: where a place of a picture of this size, as stored, is in the upright one. */
+export const turns = (width, height) => ({
+  1: ([x, y]) => [x, y],
+  2: ([x, y]) => [width - x, y],
+  3: ([x, y]) => [width - x, height - y],
+  4: ([x, y]) => [x, height - y],
+  5: ([x, y]) => [y, x],
+  6: ([x, y]) => [height - y, x],
+  7: ([x, y]) => [height - y, width - x],
+  8: ([x, y]) => [y, width - x],
+});
+
 /** A PNG file with Exif data. */
 export function withExif(png, exif) {
   const body = Buffer.concat([Buffer.from('eXIf'), exif]);
