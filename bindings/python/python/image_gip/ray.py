@@ -74,6 +74,7 @@ def encode_dataset(
     effort: int = 4,
     tune: Tune = "visual",
     seed: int = 0,
+    keep_invisible: bool = False,
     metadata: MetadataPolicy = "all",
 ) -> Summary:
     """Encodes pictures of the formats that Pillow reads to ``.gip``.
@@ -95,6 +96,7 @@ def encode_dataset(
         effort: As in :func:`image_gip.encode`.
         tune: As in :func:`image_gip.encode`.
         seed: As in :func:`image_gip.encode`.
+        keep_invisible: As in :func:`image_gip.encode`.
         metadata: As in :func:`image_gip.encode`.
 
     Raises:
@@ -106,6 +108,7 @@ def encode_dataset(
     targets = {"bpp": bpp, "bytes": bytes, "quality": quality, "psnr": psnr, "gaussians": gaussians}
     options: dict[str, Any] = {name: v for name, v in targets.items() if v is not None}
     options |= {"effort": effort, "tune": tune, "seed": seed, "metadata": metadata}
+    options |= {"keep_invisible": keep_invisible}
     _check_encoder_options(options)
     return _run("encode", options, pictures, out_uri, container, shard_size)
 
