@@ -163,6 +163,49 @@ fn decoded_pictures_replace_no_file_of_an_input() {
 }
 
 #[test]
+fn results_in_a_folder_of_an_input_are_replaced_if_the_manifest_knows_them() {
+    let room = Room::new();
+    let picture = pictures::picture((40, 32), ColorType::Rgb8);
+    for name in ["in/a.png", "in/b/c.png"] {
+        room.save_picture(name, &picture);
+    }
+    room.batch(0, &[&["in", "--out", "gips"], &QUICK[..]].concat());
+    let thumbs = ["gips", "--out", "gips/thumbs", "--thumbnail", "16"];
+    let known = [&thumbs[..], &["--manifest", "m.jsonl"]].concat();
+    room.batch(0, &known);
+    let (_, errors) = room.batch(2, &thumbs);
+    assert!(errors.contains("would replace") && errors.contains("--manifest"), "{errors}");
+    for options in [&[][..], &["--resume"], &["--thumbnail", "8"]] {
+        let args = match options {
+            ["--thumbnail", _] => [&known[..3], options, &known[5..]].concat(),
+            _ => [&known, options].concat(),
+        };
+        room.batch(0, &args);
+    }
+    // What has come in the place of a result since then is another file.
+    room.save_picture("gips/thumbs/a.png", &picture);
+    let before = room.files("gips");
+    let (_, errors) = room.batch(2, &known);
+    assert!(errors.contains("thumbs/a.png") && !errors.contains("c.png"), "{errors}");
+    assert_eq!(room.files("gips"), before);
+}
+
+#[test]
+#[cfg(unix)]
+fn an_ignore_file_that_is_a_pipe_ends_the_run() {
+    let room = Room::new();
+    for folder in ["in", "in/b"] {
+        room.save_picture("in/b/a.png", &pictures::picture((40, 32), ColorType::Rgb8));
+        let name = format!("{folder}/.gipignore");
+        let made = std::process::Command::new("mkfifo").arg(room.path(&name)).status();
+        assert!(made.expect("there is mkfifo").success());
+        let errors = room.fails(&["batch", "in", "--out", "out"]);
+        assert_eq!(errors, format!("error: {name}: not a file\n"));
+        fs::remove_file(room.path(&name)).expect("it is there");
+    }
+}
+
+#[test]
 fn a_manifest_replaces_no_other_file() {
     let room = Room::new();
     room.save_picture("in/a.png", &pictures::picture((40, 32), ColorType::Rgb8));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use anyhow::{Context, Result, bail};
 use ignore::gitignore::GitignoreBuilder;
@@ -89,9 +90,21 @@ fn walk(
     rest: &mut Rest,
 ) -> Result<()> {
     let is_folder = |entry: &DirEntry| entry.file_type().is_some_and(|kind| kind.is_dir());
+    // The walk reads the patterns of a folder before it returns the folder: those of the first one, which
+    // no filter is asked about, are checked here.
+    check_ignore_file(folder)?;
+    let unreadable = Arc::new(OnceLock::new());
     let is_met = {
         let (selection, folder) = (selection.clone(), folder.to_owned());
-        move |entry: &DirEntry| !is_folder(entry) || selection.enters(below(&folder, entry.path()))
+        let unreadable = Arc::clone(&unreadable);
+        move |entry: &DirEntry| {
+            if !is_folder(entry) {
+                return true;
+            }
+            let path = entry.path();
+            selection.enters(below(&folder, path))
+                && check_ignore_file(path).map_err(|error| unreadable.set(error)).is_ok()
+        }
     };
     let walk = WalkBuilder::new(folder)
         // What git ignores are often pictures: they are too large for it.
@@ -116,7 +129,6 @@ fn walk(
         }
         let path = entry.path();
         if entry.depth() == 0 || is_folder(&entry) {
-            check_ignore_file(path)?;
             rest.folders.push(path.to_owned());
             continue;
         }
@@ -134,7 +146,7 @@ fn walk(
             },
         }
     }
-    Ok(())
+    Arc::into_inner(unreadable).and_then(OnceLock::into_inner).map_or(Ok(()), Err)
 }
 
 /// Refuses a file of patterns that cannot be read as a whole: what it says to leave out would be taken.

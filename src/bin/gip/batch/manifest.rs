@@ -6,6 +6,7 @@ use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
@@ -114,6 +115,42 @@ pub(crate) fn check(path: &Path) -> Result<()> {
         bail!("{name}: line 1 is not one of a manifest of gip batch, so the file is not replaced");
     }
     Ok(())
+}
+
+/// The results that an earlier run wrote, as its manifest says, and that nobody has changed since: each by
+/// its name, with its bytes.
+#[derive(Debug, Default)]
+pub(crate) struct Written {
+    results: HashMap<String, u64>,
+    /// When the manifest got its last line.
+    end: Option<SystemTime>,
+}
+
+impl Written {
+    /// `path` has passed [`check`]. What cannot be read tells of no result.
+    pub(crate) fn read(path: &Path) -> Self {
+        let mut written = Self::default();
+        let file = (!files::is_standard_stream(path) && path.is_file()).then(|| File::open(path));
+        let Some(Ok(file)) = file else { return written };
+        written.end = file.metadata().and_then(|metadata| metadata.modified()).ok();
+        for line in BufReader::new(file).lines().map_while(Result::ok) {
+            let Ok(known) = serde_json::from_str::<Known>(&line) else { continue };
+            let Some(output) = known.output else { continue };
+            match (known.status, known.bytes) {
+                (Status::Written | Status::Skipped, Some(bytes)) => {
+                    written.results.insert(output, bytes)
+                }
+                _ => written.results.remove(&output),
+            };
+        }
+        written
+    }
+
+    pub(crate) fn includes(&self, output: &Path) -> bool {
+        let Ok(metadata) = output.metadata() else { return false };
+        self.results.get(&files::unique_text(output)) == Some(&metadata.len())
+            && metadata.modified().ok().is_some_and(|time| Some(time) <= self.end)
+    }
 }
 
 /// The manifest that is being written.

@@ -2,6 +2,7 @@
 
 mod age;
 mod budget;
+mod failure;
 mod inputs;
 mod left_out;
 mod manifest;

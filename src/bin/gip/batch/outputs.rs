@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use super::inputs::Item;
 use super::left_out::listed;
+use super::manifest::Written;
 use crate::errors::WrongUsage;
 use crate::files;
 
@@ -70,10 +71,12 @@ impl Plan {
 }
 
 /// Refuses results that would replace files of the inputs: those in `folders`, which are the ones that were
-/// looked at, and those beside a source. Nobody knows whether such a file is an earlier result.
+/// looked at, and those beside a source. Nobody knows whether such a file is an earlier result, unless the
+/// manifest says so.
 pub(crate) fn protect<'a>(
     results: impl Iterator<Item = &'a Item> + Clone,
     folders: &[PathBuf],
+    earlier: &Written,
 ) -> Result<()> {
     let sources = results.clone().filter_map(|item| item.source.parent());
     let folders: HashSet<&Path> = folders.iter().map(PathBuf::as_path).chain(sources).collect();
@@ -86,7 +89,9 @@ pub(crate) fn protect<'a>(
             (Some(parent), Some(name)) => place(parent).join(name),
             _ => output.to_owned(),
         };
-        link.exists() && (is_in_input(&link) || is_in_input(&place(output)))
+        link.exists()
+            && !earlier.includes(output)
+            && (is_in_input(&link) || is_in_input(&place(output)))
     };
     let outputs = results.map(|item| item.output.as_path());
     let lost: Vec<_> = outputs.filter(|path| replaced(path)).collect();
@@ -95,7 +100,8 @@ pub(crate) fn protect<'a>(
     }
     let names = listed(lost.iter().map(|path| path.display().to_string()), lost.len());
     bail!(WrongUsage(format!(
-        "results would replace files of the inputs: {names}; take another folder for --out"
+        "results would replace files of the inputs: {names}; take another folder for --out, or the --manifest \
+         of the run that wrote them"
     )))
 }
 

@@ -2,8 +2,7 @@
 
 use core::fmt;
 use std::fs;
-use std::io::{self, ErrorKind, Write};
-use std::panic::{self, AssertUnwindSafe};
+use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -11,14 +10,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Error, Result, bail};
+use anyhow::{Context, Result, bail};
 use image_gip::EncodeError;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::age;
 use super::budget::Budget;
+use super::failure::{catch_panic, is_disk_full};
 use super::inputs::{self, Item, Rest};
-use super::manifest::{self, Manifest, Record};
+use super::manifest::{self, Manifest, Record, Written};
 use super::outputs::{self, Plan};
 use super::selection::Selection;
 use super::stop::{self, Stop};
@@ -56,7 +56,8 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
     // A .gip file is a result, but a picture may be an original.
     if matches!(batch.task, Task::Decode { .. }) && !batch.stop.is_asked_for() {
-        outputs::protect(batch.todo(&skipped), &batch.rest.folders)?;
+        let earlier = args.manifest.as_deref().map(Written::read).unwrap_or_default();
+        outputs::protect(batch.todo(&skipped), &batch.rest.folders, &earlier)?;
     }
     fs::create_dir_all(&args.out).with_context(|| args.out.display().to_string())?;
     for folder in &folders {
@@ -232,49 +233,11 @@ fn bar(length: usize) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// Makes an error of a panic, so that one picture on which a library fails does not end the batch.
-fn catch_panic<T>(item: &Item, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().map(|text| text.to_string());
-        let text = text.or_else(|| panic.downcast_ref().cloned()).unwrap_or_default();
-        bail!("{}: internal error: {text}", item.source.display())
-    })
-}
-
-/// Whether an error is that of a full disk, or of a full quota.
-fn is_disk_full(error: &Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<io::Error>())
-        .any(|error| matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::source::Reading;
     use image_gip::Limits;
-
-    #[test]
-    fn a_panic_is_an_error_with_the_name_of_the_file() {
-        let item = Item { source: "a.png".into(), output: "a.gip".into() };
-        let error = |work: fn() -> Result<()>| one_line(&catch_panic(&item, work).unwrap_err());
-        assert_eq!(error(|| panic!("of a {}", "library")), "a.png: internal error: of a library");
-        assert_eq!(error(|| panic!("fixed")), "a.png: internal error: fixed");
-        assert_eq!(error(|| bail!("plain")), "plain");
-    }
-
-    #[test]
-    fn a_full_disk_is_told_from_other_errors() {
-        for (kind, is_full) in [
-            (ErrorKind::StorageFull, true),
-            (ErrorKind::QuotaExceeded, true),
-            (ErrorKind::PermissionDenied, false),
-        ] {
-            let error = Error::from(io::Error::from(kind)).context("a.gip");
-            assert_eq!(is_disk_full(&error), is_full, "{kind}");
-        }
-    }
 
     #[test]
     #[cfg(unix)]
