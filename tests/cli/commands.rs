@@ -392,6 +392,7 @@ fn metadata_is_carried_and_orientation_applied_once() {
     let room = Room::new();
     let source = room.save("a.png", ColorType::Rgb8);
     let mut profile = vec![7; 200];
+    profile[..4].copy_from_slice(&200_u32.to_be_bytes());
     profile[16..20].copy_from_slice(b"RGB ");
     let mut file = Vec::new();
     let mut png = image::codecs::png::PngEncoder::new(&mut file);
@@ -421,9 +422,31 @@ fn metadata_is_carried_and_orientation_applied_once() {
 }
 
 #[test]
+fn gif_has_no_alpha_between_transparent_and_opaque() {
+    let room = Room::new();
+    let encode = |alpha: fn(u32) -> u8| {
+        let picture = image::RgbaImage::from_fn(16, 8, |x, _| image::Rgba([200, 60, 20, alpha(x)]));
+        room.save_picture("a.png", &picture.into());
+        room.ok(&["encode", "a.png", "a.gip", "--psnr", "60"]);
+        let output = room.run(&["decode", "a.gip", "a.gif"]);
+        assert!(output.status.success());
+        let gif = ImageReader::open(room.path("a.gif")).expect("it was written").decode();
+        let alphas = gif.expect("a picture").to_rgba8();
+        (
+            alphas.rows().next().expect("a row").map(|pixel| pixel.0[3]).collect::<Vec<_>>(),
+            text(&output.stderr),
+        )
+    };
+    let (alphas, warning) = encode(|x| (x * 17) as u8);
+    assert_eq!(alphas, [[0; 8], [255; 8]].concat());
+    assert_eq!(warning, "warning: a.gip: its alpha is rounded to transparent or opaque\n");
+}
+
+#[test]
 fn a_profile_for_another_color_space_is_dropped() {
     let room = Room::new();
     let mut profile = vec![7; 200];
+    profile[..4].copy_from_slice(&200_u32.to_be_bytes());
     profile[16..20].copy_from_slice(b"CMYK");
     let mut file = Vec::new();
     let mut png = image::codecs::png::PngEncoder::new(&mut file);

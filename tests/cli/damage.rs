@@ -180,6 +180,39 @@ fn jpegs_that_are_only_unusual_are_whole() {
 }
 
 #[test]
+fn zeros_in_place_of_data_are_damage() {
+    let room = Room::new();
+    for quality in [50, 90] {
+        let file = jpeg(quality);
+        let end = file.len() - 2;
+        for from in [end / 2, end * 3 / 4, end - 200] {
+            // What an interrupted copy leaves: with the last marker, without it, and with more zeros.
+            let zeros = vec![0; end - from];
+            for rest in [&file[end..], &[], &[0; 3000]] {
+                let damaged = [&file[..from], &zeros, rest].concat();
+                assert_eq!(outcome(&room, "a.jpg", &damaged), Outcome::Partial, "from {from}");
+            }
+        }
+        // Some zeros are padding.
+        let padded = [&file[..end], &[0; 16], &file[end..]].concat();
+        assert_eq!(outcome(&room, "a.jpg", &padded), Outcome::Unnoticed);
+    }
+}
+
+#[test]
+fn dds_without_compression_is_refused_in_plain_words() {
+    let room = Room::new();
+    let mut file = dds();
+    // The pixel format: flags of RGB, no code of a compression, 32 bits.
+    for (at, number) in [(80, 0x40_u32), (84, 0), (88, 32)] {
+        file[at..at + 4].copy_from_slice(&number.to_le_bytes());
+    }
+    room.write("a.dds", file);
+    let error = room.fails(&["encode", "a.dds", "a.gip"]);
+    assert_eq!(error, "error: a.dds: DDS is read with the compression DXT1, DXT3 or DXT5 alone\n");
+}
+
+#[test]
 fn a_webp_has_as_many_bytes_as_it_says() {
     let room = Room::new();
     let file = written(ImageFormat::WebP);

@@ -10,6 +10,7 @@ mod common;
 mod damage;
 mod frames;
 mod jpeg;
+mod jpeg_kinds;
 mod limits;
 mod metadata;
 mod orientation;

@@ -47,6 +47,7 @@ fn xmp(properties: &str) -> String {
 /// An ICC profile of RGB that is not sRGB's.
 fn profile() -> Vec<u8> {
     let mut profile = vec![7; 200];
+    profile[..4].copy_from_slice(&200_u32.to_be_bytes());
     profile[16..20].copy_from_slice(b"RGB ");
     profile
 }

@@ -65,12 +65,15 @@ pub(crate) fn partial(
 }
 
 /// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, and with such
-/// metadata as was asked for and the format takes. Without a policy, which is for thumbnails, it has what is safe,
+/// metadata and alpha as was asked for and the format takes. Without a policy, which is for thumbnails, it has what is safe,
 /// and nobody misses what the format does not take.
 pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
     picture.make_upright(picture.metadata.orientation());
     picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));
-    picture.drop_foreign_profile();
+    picture.drop_unfit_profile();
+    if codec == Codec::Gif {
+        picture.round_alpha();
+    }
     let dropped = codec.drop_unwritable(&mut picture.metadata);
     if policy.is_some() {
         picture.warnings.extend(dropped);

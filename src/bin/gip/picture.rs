@@ -3,6 +3,9 @@
 use image::DynamicImage;
 use image_gip::{ColorModel, Metadata, MetadataPolicy, Orientation, SampleDepth};
 
+/// What is said of an ICC profile of which a part is missing or wrong.
+pub(crate) const DAMAGED_PROFILE: &str = "its ICC profile is damaged and cannot be kept";
+
 /// An upright picture, its metadata, and what was lost on the way to it.
 #[derive(Debug)]
 pub(crate) struct StillImage {
@@ -37,20 +40,38 @@ impl StillImage {
         self.warnings.extend(losses.iter().map(ToString::to_string));
     }
 
-    /// Drops an ICC profile for another colour space than that of the samples, such as the profile
-    /// of a CMYK picture that was converted to RGB.
-    pub(crate) fn drop_foreign_profile(&mut self) {
+    /// Drops an ICC profile that has not as many bytes as it says, or is for another colour space than that
+    /// of the samples, such as the profile of a CMYK picture that was converted to RGB.
+    pub(crate) fn drop_unfit_profile(&mut self) {
         let expected: &[u8] = if self.color().channels() < 3 { b"GRAY" } else { b"RGB " };
-        let is_foreign = |profile: &mut Vec<u8>| profile.get(16..20) != Some(expected);
-        if let Some(profile) = self.metadata.icc_profile.take_if(is_foreign) {
+        let size = |profile: &[u8]| Some(u32::from_be_bytes(*profile.first_chunk()?));
+        let is_whole = |profile: &[u8]| size(profile).map(u64::from) == Some(profile.len() as u64);
+        let is_unfit =
+            |profile: &mut Vec<u8>| !is_whole(profile) || profile.get(16..20) != Some(expected);
+        if let Some(profile) = self.metadata.icc_profile.take_if(is_unfit) {
             let space = String::from_utf8_lossy(profile.get(16..20).unwrap_or_default());
             let space = space.trim();
             let is_name = !space.is_empty() && space.chars().all(|c| c.is_ascii_alphanumeric());
-            self.warnings.push(if is_name {
+            self.warnings.push(if is_name && is_whole(&profile) {
                 format!("its ICC profile is one of {space} and cannot be kept")
             } else {
-                "its ICC profile is damaged and cannot be kept".into()
+                DAMAGED_PROFILE.into()
             });
+        }
+    }
+
+    /// Rounds alpha to transparent or opaque, for a format that has nothing between, with a warning if there
+    /// was something.
+    pub(crate) fn round_alpha(&mut self) {
+        let DynamicImage::ImageRgba8(image) = &mut self.image else { return };
+        let mut is_changed = false;
+        for image::Rgba([.., alpha]) in image.pixels_mut() {
+            let rounded = if *alpha < 128 { 0 } else { u8::MAX };
+            is_changed |= *alpha != rounded;
+            *alpha = rounded;
+        }
+        if is_changed {
+            self.warnings.push("its alpha is rounded to transparent or opaque".into());
         }
     }
 

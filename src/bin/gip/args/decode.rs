@@ -13,7 +13,7 @@ use super::values::{ThreadCount, number, region, size};
 /// The extension of OUTPUT sets the format: png, tif, webp, jpg, bmp, tga, qoi, gif, ico, ff, pgm,
 /// ppm, pnm or pam. On standard output it is PNG. Gray becomes RGB if the format has no gray, and
 /// 16 bits become 8 if it has no more. Alpha is never dropped: a picture with alpha cannot be
-/// written in a format without it.
+/// written in a format without it. For GIF it is rounded to transparent or opaque, with a warning.
 ///
 /// The picture is written upright: an orientation in the file's Exif is applied, and reset in Exif and XMP. Sizes
 /// and regions are those of the upright picture. ICC profile and Exif are written to PNG, JPEG and WebP, to TIFF

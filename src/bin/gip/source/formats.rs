@@ -3,25 +3,41 @@
 use std::borrow::Cow;
 use std::io::{BufRead, Cursor, Seek};
 
-use anyhow::{Result, bail};
-use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
+use anyhow::{Error, Result, anyhow, bail};
+use image::{
+    ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult,
+};
 use image_gip::Limits;
 
 use super::stored::{Stored, partly};
 use super::{clipping, colors, frames, ico, jpeg, light, metadata, png_chunks, screen};
 use crate::limits::check_size;
+use crate::picture::DAMAGED_PROFILE;
 
 /// Width and height in pixels.
 pub(super) fn dimensions(
     format: ImageFormat,
-    file: impl BufRead + Seek,
+    mut file: impl BufRead + Seek,
     limits: &Limits,
 ) -> Result<(u32, u32)> {
     if format == ImageFormat::Png {
         // Chunks that are damaged do not matter here.
         return Ok(png::Decoder::new(file).read_header_info()?.size());
     }
-    Ok(decoder(format, file, limits)?.dimensions())
+    let size = usual_decoder(format, &mut file, limits).map(|decoder| decoder.dimensions());
+    match size {
+        Ok(size) => Ok(size),
+        Err(error) if format == ImageFormat::Jpeg => {
+            let mut bytes = Vec::new();
+            file.rewind()?;
+            file.read_to_end(&mut bytes)?;
+            jpeg::dimensions(&bytes).ok_or_else(|| match jpeg::survey(&bytes).unread() {
+                Some(reason) => anyhow!(reason),
+                None => told(error, format),
+            })
+        }
+        Err(error) => Err(told(error, format)),
+    }
 }
 
 pub(super) fn read(
@@ -40,22 +56,38 @@ pub(super) fn read(
         ImageFormat::Png => png_chunks::without_damaged(file),
         _ => (Cow::Borrowed(file), Vec::new()),
     };
+    let jpeg = (format == ImageFormat::Jpeg).then(|| jpeg::survey(&file));
+    if let Some(reason) = jpeg.as_ref().and_then(jpeg::Survey::unread) {
+        bail!(reason);
+    }
+    let file = match &jpeg {
+        Some(jpeg) if allow_partial => jpeg.closed(file),
+        _ => file,
+    };
     let file = &file[..];
-    let mut decoder = decoder(format, Cursor::new(file), limits)?;
+    let told = |error| told(error, format);
+    let mut decoder = decoder(format, file, jpeg.as_ref(), limits).map_err(told)?;
     check_size(limits, decoder.dimensions())?;
     let (metadata, loss) = metadata::read(&mut decoder, file)?;
     // The decoders of `image` know nothing of the prefix that was removed from Exif.
     let orientation = metadata.orientation();
     warnings.extend(frames::warning(format, file));
     warnings.extend(loss.map(|loss| loss.to_string()));
-    let mut damage = damage(format, file).map(String::from);
+    if metadata.icc_profile.is_none() && jpeg.as_ref().is_some_and(|jpeg| jpeg.has_profile) {
+        warnings.push(DAMAGED_PROFILE.to_owned());
+    }
+    let damage = match &jpeg {
+        Some(jpeg) => jpeg.damage(),
+        None => damage(format, file),
+    };
+    let mut damage = damage.map(String::from);
     if let Some(damage) = damage.as_ref().filter(|_| !allow_partial) {
         bail!("the file is damaged: {damage}");
     }
-    let image = match DynamicImage::from_decoder(decoder) {
+    let image = match DynamicImage::from_decoder(decoder).map_err(told) {
         Err(error) if allow_partial => {
             damage.get_or_insert_with(|| error.to_string());
-            partial(format, file, limits).ok_or(error)?
+            partial(format, file, jpeg.as_ref(), limits).ok_or(error)?
         }
         image => image?,
     };
@@ -75,7 +107,6 @@ pub(super) fn read(
 /// Damage that the decoder says nothing of.
 fn damage(format: ImageFormat, file: &[u8]) -> Option<&'static str> {
     match format {
-        ImageFormat::Jpeg => jpeg::damage(file),
         ImageFormat::WebP => {
             let length = u32::from_le_bytes(*file.get(4..)?.first_chunk()?);
             (u64::from(length) + 8 > file.len() as u64).then_some("the data end too early")
@@ -84,8 +115,34 @@ fn damage(format: ImageFormat, file: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// The size of the picture has a limit of its own, so that of memory is for all else.
+/// An error in words that are not those of a library's code.
+fn told(error: ImageError, format: ImageFormat) -> Error {
+    match error {
+        ImageError::Decoding(_) | ImageError::Unsupported(_) if format == ImageFormat::Jpeg => {
+            anyhow!("the file is damaged, or of a kind of JPEG that is not read")
+        }
+        ImageError::Unsupported(_) if format == ImageFormat::Dds => {
+            anyhow!("DDS is read with the compression DXT1, DXT3 or DXT5 alone")
+        }
+        error => error.into(),
+    }
+}
+
+/// The decoder that reads the file right.
 fn decoder<'a>(
+    format: ImageFormat,
+    file: &'a [u8],
+    jpeg: Option<&jpeg::Survey>,
+    limits: &Limits,
+) -> ImageResult<Box<dyn ImageDecoder + 'a>> {
+    Ok(match jpeg.and_then(jpeg::Survey::unusual) {
+        Some(colors) => Box::new(jpeg::Unusual::new(file, colors, limits.max_memory)?),
+        None => Box::new(usual_decoder(format, Cursor::new(file), limits)?),
+    })
+}
+
+/// The size of the picture has a limit of its own, so that of memory is for all else.
+fn usual_decoder<'a>(
     format: ImageFormat,
     file: impl BufRead + Seek + 'a,
     limits: &Limits,
@@ -98,23 +155,26 @@ fn decoder<'a>(
 }
 
 /// What can be read before an error; `None` if that is nothing.
-fn partial(format: ImageFormat, file: &[u8], limits: &Limits) -> Option<DynamicImage> {
-    let first = decoder(format, Cursor::new(file), limits).ok()?;
+fn partial(
+    format: ImageFormat,
+    file: &[u8],
+    jpeg: Option<&jpeg::Survey>,
+    limits: &Limits,
+) -> Option<DynamicImage> {
+    let first = decoder(format, file, jpeg, limits).ok()?;
     let bytes = usize::try_from(first.total_bytes()).ok()?;
-    let read = |decoder| {
+    let read = |decoder: Box<dyn ImageDecoder + '_>| {
         let image = DynamicImage::from_decoder(decoder).ok()?;
         let bytes = image.as_bytes();
         bytes.iter().any(|byte| *byte != bytes[0]).then_some(image)
     };
     let is_big_endian = format == ImageFormat::Png && has_16_bits(first.color_type());
-    read(Box::new(Partial { decoder: first, is_big_endian }) as Box<dyn ImageDecoder>).or_else(
-        || {
-            // Some decoders take all or nothing. They get as many zeros as there are samples.
-            let mut longer = file.to_vec();
-            longer.resize(file.len() + bytes, 0);
-            read(Box::new(decoder(format, Cursor::new(longer), limits).ok()?))
-        },
-    )
+    read(Box::new(Partial { decoder: first, is_big_endian })).or_else(|| {
+        // Some decoders take all or nothing. They get as many zeros as there are samples.
+        let mut longer = file.to_vec();
+        longer.resize(file.len() + bytes, 0);
+        read(decoder(format, &longer, jpeg, limits).ok()?)
+    })
 }
 
 /// A decoder that takes the samples before an error for all of them.

@@ -64,7 +64,7 @@ impl Reading {
         }
         let mut picture = StillImage { image, metadata, warnings };
         picture.make_upright(orientation);
-        picture.drop_foreign_profile();
+        picture.drop_unfit_profile();
         Ok(picture)
     }
 }

@@ -28,6 +28,18 @@ pub(super) struct Component {
     pub(super) missing_bits: [Option<u8>; COEFFICIENTS],
 }
 
+/// Why no decoder reads a picture with this payload of a start of frame.
+pub(super) fn unread(payload: &[u8]) -> Option<&'static str> {
+    let (&bits, rest) = payload.split_first()?;
+    if bits != 8 {
+        return Some("JPEG with other samples than those of 8 bits is not read");
+    }
+    if rest.starts_with(&[0, 0]) {
+        return Some("JPEG whose height comes after its data is not read");
+    }
+    None
+}
+
 impl Frame {
     /// Reads the payload of a start of frame; `None` if it is not one of pictures with 8 bits.
     pub(super) fn parse(payload: &[u8], is_progressive: bool) -> Option<Self> {
@@ -64,6 +76,29 @@ impl Frame {
             }
         };
         Some(Self { is_progressive, units, components: parts.iter().map(component).collect() })
+    }
+
+    /// Whether factors are others than 1, 2 and 4, or a component has more samples than the first one.
+    pub(super) fn has_unusual_sampling(&self) -> bool {
+        let [first, others @ ..] = &self.components[..] else { return false };
+        let (across, down) = first.sampling;
+        self.factors().any(|factor| !factor.is_power_of_two())
+            || others.iter().any(|other| other.sampling.0 > across || other.sampling.1 > down)
+    }
+
+    /// Whether samples of a component lie between those of another one: no decoder reads them.
+    pub(super) fn has_broken_sampling(&self) -> bool {
+        let most = self.components.iter().fold((1, 1), |most, component| {
+            (component.sampling.0.max(most.0), component.sampling.1.max(most.1))
+        });
+        let components = &self.components;
+        components
+            .iter()
+            .any(|Component { sampling: (x, y), .. }| most.0 % x != 0 || most.1 % y != 0)
+    }
+
+    fn factors(&self) -> impl Iterator<Item = usize> {
+        self.components.iter().flat_map(|component| [component.sampling.0, component.sampling.1])
     }
 
     /// Whether every component has come, if only with its lowest frequency or its highest bits.

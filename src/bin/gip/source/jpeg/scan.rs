@@ -25,6 +25,14 @@ pub(super) struct Scan<'a> {
 }
 
 impl Scan<'_> {
+    /// Whether it is one of several for all components of a frame that is not progressive, and these differ
+    /// in sampling: the usual decoder reads it wrong.
+    pub(super) fn is_unusual(&self, frame: &Frame) -> bool {
+        let is_part = self.components.len() < frame.components.len();
+        let is_subsampled = frame.components.iter().any(|component| component.sampling != (1, 1));
+        !frame.is_progressive && is_part && is_subsampled
+    }
+
     /// Reads the data of the scan. Returns where the next marker is.
     pub(super) fn read(&self, frame: &mut Frame, data: &[u8], at: usize) -> Result<usize, Damage> {
         let mut bits = Bits::new(data, at);

@@ -1,19 +1,24 @@
 //! From marker to marker through a JPEG (ITU-T T.81, B).
 
 use super::bits::{Damage, Table};
-use super::frame::{COEFFICIENTS, Frame};
+use super::frame::{COEFFICIENTS, Frame, unread};
 use super::scan::Scan;
+use super::survey::Survey;
 
-/// What is wrong with the data of a JPEG, as far as data without a checksum tell: whether there are just
-/// as many as the picture takes, of the codes that there are. It says nothing about what the decoder
-/// refuses by itself, such as an invalid header.
-pub(crate) fn damage(file: &[u8]) -> Option<&'static str> {
-    Segments::default().read(file).err().map(Damage::text)
+/// What a segment with a part of an ICC profile begins with.
+const PROFILE: &[u8] = b"ICC_PROFILE\0";
+
+/// Goes through all segments and data.
+pub(crate) fn survey(file: &[u8]) -> Survey {
+    let mut segments = Segments::default();
+    segments.survey.damage = segments.read(file).err();
+    segments.survey
 }
 
 /// What the segments have set so far.
 #[derive(Debug, Default)]
 struct Segments {
+    survey: Survey,
     /// For the lowest frequency, and for the others.
     tables: [[Option<Table>; 4]; 2],
     frame: Option<Frame>,
@@ -58,17 +63,52 @@ impl Segments {
             0x01 | 0xD0..=0xD8 => return Ok(Next::At(at)),
             _ => {}
         }
-        let Some(&[high, low]) = file.get(at..at + 2) else { return Err(Damage::TooFew) };
-        let end = at + usize::from(u16::from_be_bytes([high, low]));
-        let Some(payload) = file.get((at + 2).min(end)..end) else { return Err(Damage::TooFew) };
+        let mut payload = || {
+            self.survey.cut = Some(at - 2);
+            let &[high, low] = file.get(at..at + 2)? else { return None };
+            let end = at + usize::from(u16::from_be_bytes([high, low]));
+            let payload = file.get((at + 2).min(end)..end)?;
+            self.survey.cut = None;
+            Some((payload, end))
+        };
+        let Some((payload, end)) = payload() else { return Err(Damage::TooFew) };
+        let survey = &mut self.survey;
         let is_known = match marker {
             0xC0..=0xC2 => {
+                survey.unread = unread(payload);
                 self.frame = Frame::parse(payload, marker == 0xC2);
+                if let Some(frame) = &self.frame {
+                    if frame.has_broken_sampling() {
+                        survey.unread = Some("JPEG with such sampling is not read");
+                    }
+                    survey.is_unusual = frame.has_unusual_sampling();
+                    survey.ids = frame.components.iter().map(|component| component.id).collect();
+                }
                 self.frame.is_some()
             }
             0xC4 => self.add_tables(payload).is_some(),
-            // Other processes, with which the decoder does nothing.
-            0xC3 | 0xC5..=0xCF => false,
+            0xC3 | 0xC5..=0xC7 | 0xC9..=0xCB | 0xCD..=0xCF => {
+                survey.unread = Some(match marker {
+                    0xC3 | 0xCB => "lossless JPEG is not read",
+                    0xC9 | 0xCA => "JPEG with arithmetic coding is not read",
+                    _ => "hierarchical JPEG is not read",
+                });
+                false
+            }
+            0xE0 => {
+                survey.is_jfif |= payload.starts_with(b"JFIF\0");
+                true
+            }
+            0xE2 => {
+                survey.has_profile |= payload.starts_with(PROFILE);
+                true
+            }
+            0xEE => {
+                if let [b'A', b'd', b'o', b'b', b'e', _, _, _, _, _, _, transform, ..] = payload {
+                    survey.adobe = Some(*transform);
+                }
+                true
+            }
             0xDD => match payload {
                 &[high, low] => {
                     self.restart_interval = u16::from_be_bytes([high, low]).into();
@@ -79,9 +119,11 @@ impl Segments {
             0xDA => {
                 let Some(mut frame) = self.frame.take() else { return Ok(Next::End) };
                 let Some(scan) = self.scan(payload, &frame) else { return Ok(Next::End) };
-                let next = scan.read(&mut frame, file, end)?;
+                let is_unusual = scan.is_unusual(&frame);
+                let next = scan.read(&mut frame, file, end);
+                self.survey.is_unusual |= is_unusual;
                 self.frame = Some(frame);
-                return Ok(Next::At(next));
+                return next.map(Next::At);
             }
             _ => true,
         };

@@ -12,6 +12,7 @@ use tiff::tags::Tag;
 use super::tags::{Photometric, Tags};
 use super::{colors, samples};
 use crate::limits::check_size;
+use crate::picture::DAMAGED_PROFILE;
 use crate::source::stored::{Stored, partly};
 use crate::source::{frames, jpeg};
 
@@ -32,15 +33,19 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     }
     let mut metadata = Metadata::default();
     metadata.icc_profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
+    let has_profile = matches!(decoder.find_tag(Tag::IccProfile), Err(_) | Ok(Some(_)));
     metadata.set_exif_of_tiff(file);
     metadata.xmp = decoder.get_tag_u8_vec(Tag::Unknown(700)).ok();
     let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?;
     let orientation = orientation.and_then(|code| Orientation::from_exif(code.min(255) as u8));
 
     let mut warnings: Vec<_> = frames::warning(ImageFormat::Tiff, file).into_iter().collect();
+    if has_profile && metadata.icc_profile.is_none() {
+        warnings.push(DAMAGED_PROFILE.to_owned());
+    }
     if tags.is_jpeg {
         let jpegs = samples::jpegs(&mut decoder, file)?;
-        if let Some(damage) = jpegs.iter().find_map(|data| jpeg::damage(data)) {
+        if let Some(damage) = jpegs.iter().find_map(|data| jpeg::survey(data).damage()) {
             if !allow_partial {
                 bail!("the file is damaged: {damage}");
             }
