@@ -53,7 +53,7 @@ type Around<'a> = [[&'a [Lanes]; 2]; 2 * RADIUS + 1];
 #[inline(always)]
 pub(super) fn differences<S: Simd>(simd: S, rows: &Rows, y: usize) -> Sums {
     let around: Around<'_> =
-        core::array::from_fn(|offset| rows.row((y + offset).checked_sub(RADIUS)));
+        core::array::from_fn(|offset| rows.row((y + offset) as isize - RADIUS as isize));
     let mut sums = Sums::default();
     let vectors = rows.width.div_ceil(16);
     for first in (0..vectors).step_by(VECTORS) {
@@ -156,16 +156,29 @@ mod tests {
     use fearless_simd::dispatch;
 
     use super::*;
+    use crate::encode::quality::rows::Border;
     use crate::testing::simd_levels;
 
     /// The sums over all rows in f64, directly from the definition.
-    fn plain([width, height]: [usize; 2], a: &[f32], b: &[f32]) -> Sums {
+    fn plain([width, height]: [usize; 2], border: Border, a: &[f32], b: &[f32]) -> Sums {
+        let inside = |at: isize, length: usize| {
+            let mut walk = (0..length).chain((1..length.max(2) - 1).rev()).cycle();
+            match usize::try_from(at) {
+                Ok(at) if at < length => Some(at),
+                _ if border == Border::Zeros => None,
+                // The mirror images have a period, which divides this.
+                _ => walk.nth((at + 100 * 2 * (length as isize - 1)).max(0) as usize),
+            }
+        };
         let blurred = |value: &dyn Fn(usize) -> f64, x: usize, y: usize| {
+            let reach = RADIUS as isize;
             let mut sum = 0.0;
-            for row in 0..height {
-                for column in 0..width {
-                    let [dx, dy] = [column.abs_diff(x), row.abs_diff(y)];
-                    if dx <= RADIUS && dy <= RADIUS {
+            for dy in -reach..=reach {
+                for dx in -reach..=reach {
+                    let column = inside(x as isize + dx, width);
+                    let row = inside(y as isize + dy, height);
+                    if let (Some(column), Some(row)) = (column, row) {
+                        let [dx, dy] = [dx, dy].map(isize::unsigned_abs);
                         let weight = f64::from(WINDOW[dx]) * f64::from(WINDOW[dy]);
                         sum += weight * value(row * width + column);
                     }
@@ -200,8 +213,8 @@ mod tests {
     }
 
     /// All rows of two pictures.
-    fn rows(size: [usize; 2], pictures: [&[f32]; 2]) -> Rows {
-        let mut rows = Rows::new(size, 4);
+    fn rows(size: [usize; 2], border: Border, pictures: [&[f32]; 2]) -> Rows {
+        let mut rows = Rows::new(size, border, 4);
         for first in (0..size[1]).step_by(4) {
             let mut group = rows.blank();
             for (which, picture) in pictures.into_iter().enumerate() {
@@ -219,11 +232,13 @@ mod tests {
     fn sums_are_those_of_the_definition() {
         let mut rng = fastrand::Rng::with_seed(1);
         // More vectors than are compared at a time, and fewer columns than the window has.
-        for size in [[16 * VECTORS + 9, 6], [23, 41], [3, 5], [1, 1]] {
+        let sizes = [[16 * VECTORS + 9, 6], [23, 41], [3, 5], [1, 1]];
+        let cases = sizes.map(|size| [(size, Border::Zeros), (size, Border::Mirrored)]);
+        for (size, border) in cases.into_iter().flatten() {
             let mut picture = || (0..size[0] * size[1]).map(|_| rng.f32()).collect::<Vec<_>>();
             let (a, b) = (picture(), picture());
-            let expected = plain(size, &a, &b);
-            let (different, same) = (rows(size, [&a, &b]), rows(size, [&a, &a]));
+            let expected = plain(size, border, &a, &b);
+            let (different, same) = (rows(size, border, [&a, &b]), rows(size, border, [&a, &a]));
             let total = |level, rows: &Rows| {
                 let mut total = Sums::default();
                 for y in 0..size[1] {
@@ -243,7 +258,10 @@ mod tests {
                 ];
                 for (found, expected) in pairs {
                     let error = (found - expected).abs();
-                    assert!(error < 1e-4 * expected + 1e-6, "{name}: {found}, {expected}");
+                    assert!(
+                        error < 1e-4 * expected + 1e-6,
+                        "{name} {border:?}: {found}, {expected}"
+                    );
                 }
                 assert_eq!(found, total(simd_levels()[0].1, &different), "{name}");
                 assert_eq!(total(level, &same), Sums::default(), "{name}");

@@ -7,14 +7,12 @@ use super::light::Channel;
 const MOST_SCALES: usize = 6;
 /// Scales with a norm of any weight: full size, a half, and so on.
 pub(super) const SCALES: usize = 5;
-/// The least side in pixels, up to which smaller pictures are padded, and of a scale that the next one
-/// is made from.
-pub(super) const LEAST_SIDE: usize = 8;
+/// The least side in pixels of a picture that SSIMULACRA2 measures, and of a scale that the next one is
+/// made from.
+const LEAST_SIDE: usize = 8;
 /// Norms of a channel on a scale.
 const NORMS: usize = 6;
-/// The weights, first those of the first channel on all scales. A picture with fewer scales has the first
-/// ones, so that its channels have other weights than those of a large picture: so does the reference.
-/// Weights below 0.01 are left out.
+/// The weights, first those of the first channel on all scales. Weights below 0.01 are left out.
 const WEIGHTS: [f64; 3 * MOST_SCALES * NORMS] = weights(&[
     (9, 1.104_172_64),
     (15, 1.842_245_55),
@@ -66,13 +64,29 @@ pub(super) struct Measured {
 }
 
 impl Measured {
-    /// All that counts for a picture of a size, from the finest scale on.
-    pub(super) fn of_size(size: [usize; 2]) -> Vec<Self> {
-        let next = |size: &[usize; 2]| {
-            let has_next = size.iter().all(|&side| side >= LEAST_SIDE);
-            has_next.then(|| size.map(|side| side.div_ceil(2)))
-        };
+    /// All that SSIMULACRA2 measures of a picture of a size, from the finest scale on; `None` of a
+    /// picture that is too small for it. One with fewer scales has the first weights, so that its channels
+    /// have other ones than those of a large picture: so does the reference.
+    pub(super) fn by_metric(size: [usize; 2]) -> Option<Vec<Self>> {
+        let is_measured = |size: &[usize; 2]| size.iter().all(|&side| side >= LEAST_SIDE);
+        let next = |size: &[usize; 2]| is_measured(size).then(|| size.map(|side| side.div_ceil(2)));
         let scales = core::iter::successors(Some(size), next).take(MOST_SCALES).count();
+        is_measured(&size).then(|| Self::of_scales(scales))
+    }
+
+    /// All that is measured of a large picture.
+    pub(super) fn of_large() -> Vec<Self> {
+        Self::of_scales(MOST_SCALES)
+    }
+
+    /// Whether SSIMULACRA2 gives a picture of a size the weights that people's judgement of large
+    /// pictures led to.
+    pub(super) fn is_large(size: [usize; 2]) -> bool {
+        // The last scale is made from one of at least that side.
+        size.iter().all(|&side| side.div_ceil(1 << (MOST_SCALES - 2)) >= LEAST_SIDE)
+    }
+
+    fn of_scales(scales: usize) -> Vec<Self> {
         let channels = [Channel::Opponent, Channel::Luma, Channel::Blue];
         let all = (0..scales.min(SCALES)).flat_map(|scale| {
             channels.into_iter().enumerate().map(move |(index, channel)| {

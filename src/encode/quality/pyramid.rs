@@ -3,7 +3,7 @@
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 use super::light::{BlockRow, COLUMNS, Channel, Samples, linear_row, responses};
-use super::norms::{LEAST_SIDE, Measured, SCALES};
+use super::norms::{Measured, SCALES};
 use super::rows::Group;
 
 /// Rows that make one row on the coarsest scale.
@@ -23,11 +23,6 @@ pub(super) struct Shown<'a, P> {
     pub(super) background: f32,
 }
 
-/// The size of a picture with what is added to a small one: its mirror image.
-pub(super) fn padded(size: [usize; 2]) -> [usize; 2] {
-    size.map(|side| side.max(LEAST_SIDE))
-}
-
 /// Fills groups with rows of a picture, [`ROWS`] of them or as many as there are from the row `first`
 /// on: one group for all that is measured. It is picture number `which` of the groups.
 #[inline(always)]
@@ -39,19 +34,13 @@ pub(super) fn fill<S: Simd, P: Samples>(
     measured: &[Measured],
     groups: &mut [Group],
 ) {
-    let Shown { picture, size, background } = *shown;
-    let [width, height] = padded(size);
+    let Shown { picture, size: [width, height], background } = *shown;
     let mut samples = [[0.0; COLUMNS]; 4];
     let mut block = Block { planes: [[[[0.0; 16]; COLUMNS / 16]; ROWS]; 3], columns: 0, rows: 0 };
     for x in (0..width).step_by(COLUMNS) {
         (block.columns, block.rows) = (COLUMNS.min(width - x), ROWS.min(height - first));
         for row in 0..block.rows {
-            picture.read(x, mirrored(first + row, size[1]), &mut samples);
-            for column in size[0]..width {
-                for channel in &mut samples {
-                    channel[column] = channel[mirrored(column, size[0])];
-                }
-            }
+            picture.read(x, first + row, &mut samples);
             let light = block.planes.each_mut().map(|plane| &mut plane[row]);
             linear_row(simd, picture.model(), &samples, background, light);
         }
@@ -65,13 +54,6 @@ pub(super) fn fill<S: Simd, P: Samples>(
             at = end;
         }
     }
-}
-
-/// An index inside of a length, mirrored at its ends.
-fn mirrored(at: usize, length: usize) -> usize {
-    let period = (2 * (length - 1)).max(1);
-    let at = at % period;
-    at.min(period - at).min(length - 1)
 }
 
 impl Block {
@@ -150,7 +132,7 @@ mod tests {
 
     use super::*;
     use crate::color::ColorModel;
-    use crate::encode::quality::rows::Rows;
+    use crate::encode::quality::rows::{Border, Rows};
     use crate::encode::source::Source;
     use crate::testing::simd_levels;
 
@@ -200,23 +182,18 @@ mod tests {
                     ((encoded + 0.055) / 1.055).powf(2.4)
                 }
             };
-            let [width, height] = padded(size);
-            let mirrored = |at: usize, length: usize| {
-                let mut walk = (0..length).chain((1..length.max(2) - 1).rev()).cycle();
-                walk.nth(at).expect("it goes on")
-            };
-            let light: Vec<[f64; 3]> = (0..width * height)
-                .map(|at| {
-                    let [x, y] = [mirrored(at % width, size[0]), mirrored(at / width, size[1])];
-                    [0, 1, 2].map(|channel| linear(samples[(y * size[0] + x) * 3 + channel]))
-                })
-                .collect();
-            let measured = Measured::of_size([width, height]);
+            let [width, height] = size;
+            let pixels = samples.chunks_exact(3);
+            let light: Vec<[f64; 3]> =
+                pixels.map(|pixel| [0, 1, 2].map(|channel| linear(pixel[channel]))).collect();
+            let measured = Measured::of_large();
             for (name, level) in simd_levels() {
                 let scaled = |scale: usize| [width, height].map(|side| side.div_ceil(1 << scale));
                 let mut groups: Vec<Group> = measured
                     .iter()
-                    .map(|found| Rows::new(scaled(found.scale), ROWS >> found.scale).blank())
+                    .map(|found| {
+                        Rows::new(scaled(found.scale), Border::Zeros, ROWS >> found.scale).blank()
+                    })
                     .collect();
                 let shown = Shown { picture: &source, size, background: 0.0 };
                 dispatch!(level, simd => fill(simd, &shown, 0, 1, &measured, &mut groups));

@@ -5,8 +5,17 @@ use std::collections::VecDeque;
 /// Sixteen neighbours in a row.
 pub(super) type Lanes = [f32; 16];
 
-/// Columns of zeros before a row; there are at least as many after it.
+/// Columns before a row that are no part of it; there are at least as many after it.
 const MARGIN: usize = 16;
+
+/// What is taken to be around a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Border {
+    /// Nothing: zeros, as SSIMULACRA2 has it.
+    Zeros,
+    /// The picture's mirror images.
+    Mirrored,
+}
 
 /// Some rows of the source and of a rendering.
 #[derive(Clone, Debug)]
@@ -29,6 +38,18 @@ impl Group {
         &mut row.as_flattened_mut()[MARGIN + x..]
     }
 
+    /// Fills the margins with mirror images of rows of a width.
+    fn mirror(&mut self, width: usize) {
+        for row in self.values.chunks_exact_mut(self.stride) {
+            let row = row.as_flattened_mut();
+            for distance in 1..=MARGIN as isize {
+                row[MARGIN - distance as usize] = row[MARGIN + mirrored(-distance, width)];
+                let after = width as isize - 1 + distance;
+                row[MARGIN + after as usize] = row[MARGIN + mirrored(after, width)];
+            }
+        }
+    }
+
     /// A row of both, with margins.
     fn row(&self, row: usize) -> [&[Lanes]; 2] {
         [0, 1].map(|which| &self.values[(2 * row + which) * self.stride..][..self.stride])
@@ -40,6 +61,7 @@ impl Group {
 pub(super) struct Rows {
     pub(super) width: usize,
     pub(super) height: usize,
+    border: Border,
     /// Rows of a group.
     by_group: usize,
     /// The first of the groups, as its number from the top.
@@ -53,10 +75,10 @@ pub(super) struct Rows {
 
 impl Rows {
     /// No rows yet of pictures of a size.
-    pub(super) fn new([width, height]: [usize; 2], by_group: usize) -> Self {
+    pub(super) fn new([width, height]: [usize; 2], border: Border, by_group: usize) -> Self {
         let zeros = vec![[0.0; 16]; stride(width)];
         let (groups, spare) = (VecDeque::new(), Vec::new());
-        Self { width, height, by_group, first: 0, groups, spare, zeros }
+        Self { width, height, border, by_group, first: 0, groups, spare, zeros }
     }
 
     /// A group to be filled.
@@ -65,7 +87,10 @@ impl Rows {
     }
 
     /// Appends the next rows.
-    pub(super) fn push(&mut self, group: Group) {
+    pub(super) fn push(&mut self, mut group: Group) {
+        if self.border == Border::Mirrored {
+            group.mirror(self.width);
+        }
         self.groups.push_back(group);
     }
 
@@ -89,15 +114,23 @@ impl Rows {
         (groups + before.div_ceil(self.by_group)) * group
     }
 
-    /// The row at y of both, with margins; zeros outside the picture.
-    pub(super) fn row(&self, y: Option<usize>) -> [&[Lanes]; 2] {
-        match y {
-            Some(y) if y < self.height => {
-                self.groups[y / self.by_group - self.first].row(y % self.by_group)
-            }
-            _ => [&self.zeros; 2],
+    /// The row at y of both, with margins. Up to so many rows outside the picture can be asked for as
+    /// rows inside it are known.
+    pub(super) fn row(&self, y: isize) -> [&[Lanes]; 2] {
+        let is_inside = (0..self.height as isize).contains(&y);
+        if !is_inside && self.border == Border::Zeros {
+            return [&self.zeros; 2];
         }
+        let y = mirrored(y, self.height);
+        self.groups[y / self.by_group - self.first].row(y % self.by_group)
     }
+}
+
+/// An index inside of a length, mirrored at its ends.
+fn mirrored(at: isize, length: usize) -> usize {
+    let period = (2 * (length as isize - 1)).max(1);
+    let at = at.rem_euclid(period);
+    at.min(period - at).min(length as isize - 1) as usize
 }
 
 /// Vectors of a row with its margins.
