@@ -111,8 +111,14 @@ fn encode_for_target(
     let is_exact = distortion.psnr == f64::INFINITY;
     let quality = if is_exact { 100.0 } else { verdict.quality() };
     let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
-    let reached =
-        Reached { bytes: file.len(), psnr: distortion.psnr, exact_psnr, quality, gaussians };
+    let reached = Reached {
+        bytes: file.len(),
+        psnr: distortion.psnr,
+        exact_psnr,
+        quality,
+        verdict,
+        gaussians,
+    };
     let shortfall = Shortfall::of(target, job.pixels(), reached);
     Ok(Outcome { file, work, gaussians, distortion, quality, shortfall })
 }

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use super::options::{PSNR_TOLERANCE, QUALITY_TOLERANCE, SIZE_TOLERANCE, Target};
-use super::quality::MOST_QUALITY;
+use super::quality::{MOST_QUALITY, Verdict};
 
 /// Why a file does not meet its target within 1 % of size, 0.05 dB, or 1 of quality. The text says it
 /// in words.
@@ -77,13 +77,15 @@ pub(crate) struct Reached {
     pub(crate) exact_psnr: f64,
     /// From 0 to 100.
     pub(crate) quality: f64,
+    /// All that a quality asks for.
+    pub(crate) verdict: Verdict,
     pub(crate) gaussians: u32,
 }
 
 impl Shortfall {
     /// That of a file; `None` if it meets its target.
     pub(crate) fn of(target: Target, pixels: usize, reached: Reached) -> Option<Self> {
-        let Reached { bytes, psnr, exact_psnr, quality, gaussians } = reached;
+        let Reached { bytes, psnr, exact_psnr, quality, verdict, gaussians } = reached;
         if let Target::Psnr(target) = target {
             return if psnr < target {
                 Some(Self::PsnrBelow { psnr })
@@ -98,7 +100,9 @@ impl Shortfall {
             } else if quality < target - QUALITY_TOLERANCE {
                 Some(Self::QualityCapped { quality })
             } else {
-                let is_above = quality > target + QUALITY_TOLERANCE;
+                // What keeps gradients clean and small pictures sound is no surplus.
+                let most = target + QUALITY_TOLERANCE;
+                let is_above = quality > most && verdict.excess(most) < 1.0;
                 is_above.then_some(Self::QualityAbove { quality, gaussians })
             };
         }
