@@ -1,7 +1,5 @@
 //! Areas of a picture without noise: flat ones and gradients.
 
-#![expect(clippy::needless_range_loop, reason = "loops over indices are vectorized")]
-
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
