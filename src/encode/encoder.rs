@@ -297,7 +297,8 @@ pub struct Report {
     pub psnr_float: f64,
     /// An estimate of the visual quality of the decoded file, from 0 to 100: the score that the metric
     /// SSIMULACRA2 would give, within about 2. Of a picture with alpha it is the lower one of those over
-    /// black and over white.
+    /// black and over white; of a picture below 8 x 8 pixels, which the metric does not take, that among
+    /// its mirror images.
     pub quality: f64,
     /// Iterations of training.
     pub iterations: u32,

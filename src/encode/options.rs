@@ -26,7 +26,9 @@ pub enum Target {
     /// A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 30 is low, 50
     /// medium, 70 high, and from 90 on people see no difference. The encoder aims at its estimate of
     /// the metric, [`Report::quality`](crate::Report), and no higher than 97. Where the picture is smooth,
-    /// as in a gradient, it aims at more, so that there are no blotches.
+    /// as in a gradient, it aims at more, so that there are no blotches. So it does where a side has less
+    /// than 113 pixels: of such pictures the metric says little, and they must have the quality among
+    /// their mirror images as well, as a part of a large one.
     Quality(f64),
     /// A Lagrange multiplier lambda from 0.01 to 10^6: with all files of a set at the same lambda, no
     /// bit would bring more in another one. It is the squared error that a bit must save, where
