@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 use exif::experimental::Writer;
 use exif::{Exif, Field, In, Reader, Tag, Value};
-use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
+use image::codecs::{jpeg::JpegEncoder, png::PngEncoder, tiff::TiffEncoder, webp::WebPEncoder};
 use image::{ColorType, ImageDecoder, ImageEncoder, ImageReader};
 use image_gip::{Metadata, StreamDecoder};
 
@@ -283,6 +283,43 @@ fn extended_xmp_is_put_together_or_dropped_as_a_whole() {
         );
         assert!(xmp.contains("<dc:title>A lake</dc:title>") && !xmp.contains(GUID), "{xmp}");
         assert!(!xmp.contains("xxxx"));
+    }
+}
+
+#[test]
+fn a_profile_that_is_not_as_long_as_it_says_is_dropped_with_a_warning() {
+    fn with(profile: &[u8], encoder: impl FnOnce(&mut Vec<u8>, Vec<u8>)) -> Vec<u8> {
+        let mut file = Vec::new();
+        encoder(&mut file, profile.to_vec());
+        file
+    }
+    fn save(mut encoder: impl ImageEncoder, profile: Vec<u8>) {
+        encoder.set_icc_profile(profile).expect("the format has profiles");
+        pictures::picture(SIZE, ColorType::Rgb8).write_with_encoder(encoder).expect("in memory");
+    }
+    let room = Room::new();
+    let whole = profile();
+    let longer = [&whole[..], &[0]].concat();
+    for (profile, is_kept) in [(&whole[..], true), (&whole[..199], false), (&longer, false)] {
+        for (name, file) in [
+            ("a.jpg", with(profile, |file, profile| save(JpegEncoder::new(file), profile))),
+            ("a.png", with(profile, |file, profile| save(PngEncoder::new(file), profile))),
+            (
+                "a.webp",
+                with(profile, |file, profile| save(WebPEncoder::new_lossless(file), profile)),
+            ),
+            (
+                "a.tif",
+                with(profile, |file, profile| save(TiffEncoder::new(Cursor::new(file)), profile)),
+            ),
+        ] {
+            room.write(name, file);
+            let warnings = room.warnings(&[&["encode", name, "a.gip"], &FAST[..]].concat());
+            let expected =
+                format!("warning: {name}: its ICC profile is damaged and cannot be kept\n");
+            assert_eq!(warnings, if is_kept { "" } else { &expected });
+            assert_eq!(room.gip_metadata("a.gip").icc_profile.is_some(), is_kept, "{name}");
+        }
     }
 }
 

@@ -269,6 +269,19 @@ def test_metadata(policy: str, tags: int, tmp_path: Path) -> None:
         assert len(image.getexif()) == tags
 
 
+@pytest.mark.parametrize("keep", [False, True])
+def test_colours_that_do_not_show(keep: bool, tmp_path: Path) -> None:
+    pixels = np.full((16, 24, 4), (200, 40, 90, 0), np.uint8)
+    pixels[:, :12, 3] = 255
+    pixels[:, 12:, :3] = (0, 250, 0)
+    Image.fromarray(pixels).save(tmp_path / "photo.png")
+    options = OPTIONS | {"keep_invisible": keep}
+    out = run_serially([tmp_path / "photo.png"], tmp_path / "out", options=options)
+    ((_, file),) = containers.pictures(out / "shard-000000.parquet")
+    hidden = image_gip.decode(file, dtype=np.uint8)[8, 20]
+    assert (hidden[1] > 150) == keep
+
+
 def test_folders(tmp_path: Path) -> None:
     out = tmp_path / "new" / "out"
     folder.begin(out, {"effort": 1, "seed": 0})
