@@ -39,6 +39,11 @@ use smooth::SmoothAreas;
 /// The highest quality that is aimed at. People see no difference from 90 on.
 pub(crate) const MOST_QUALITY: f64 = 97.0;
 
+/// The mean sensitivity of a picture without any variance, from how far below it on a picture is taken to
+/// have large even areas, and the least share of Gaussians that those take.
+const MOST_SENSITIVITY: f64 = 20.07;
+const EVEN: f64 = 6.0;
+const LEAST_SHARE: f64 = 0.15;
 /// Most Gaussians per pixel that are tried first.
 const MOST_DENSITY: f64 = 0.25;
 
@@ -206,6 +211,8 @@ pub(crate) fn count_for(wanted: f64, pixels: usize, means: [f64; SCALES]) -> usi
     let [fine, .., coarse] = means;
     let dissimilarity = dissimilarity_at(wanted.min(MOST_QUALITY));
     let density = 0.5 * dissimilarity.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);
+    // On even ground, sensitivities do not tell how smooth it is.
+    let density = density * ((MOST_SENSITIVITY - fine) / EVEN).clamp(LEAST_SHARE, 1.0);
     // The cast saturates.
     ((pixels as f64 * density.min(MOST_DENSITY)) as usize).max(1)
 }
