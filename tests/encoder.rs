@@ -651,6 +651,29 @@ fn more_bits_and_more_effort_give_no_worse_picture() {
 }
 
 #[test]
+fn rounding_does_not_undo_smooth_pictures() {
+    let side = 96;
+    let samples: Vec<u8> = (0..side * side)
+        .flat_map(|i| [i % side * 2, i / side * 2, (i % side + i / side), 90 + i % side])
+        .map(|value| value as u8)
+        .collect();
+    let side = side as u32;
+    let source = Source::new_u8(side, side, ColorModel::Rgba, &samples).expect("sizes agree");
+    let report = |target| {
+        let encoder = quick(target).with_precision(Precision::Packed).with_effort(3);
+        encoder.encode(&source).expect("it encodes").report
+    };
+    for psnr in [30.0, 40.0] {
+        let report = report(Target::Psnr(psnr));
+        assert!(report.psnr >= psnr && report.gaussians < 150, "{psnr}: {report:?}");
+    }
+    let psnrs = [0.5, 1.0, 2.0, 4.0].map(|rate| report(Target::BitsPerPixel(rate)).psnr);
+    assert!(psnrs.iter().all(|&psnr| psnr > 42.0), "{psnrs:?}");
+    let largest = psnrs.iter().copied().fold(0.0, f64::max);
+    assert!(psnrs[3] > largest - 2.0, "{psnrs:?}");
+}
+
+#[test]
 fn progress_is_told_and_may_cancel() {
     let samples = scene(64, 64, 3);
     let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("sizes agree");

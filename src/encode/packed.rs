@@ -15,6 +15,12 @@ use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
 
 /// How often a finished fit may be extended to meet its target.
 const MAX_ROUNDS: u32 = 8;
+/// How many times as many Gaussians more a decibel takes, somewhat more than it needs.
+const GAUSSIANS_PER_DECIBEL: f64 = 0.3;
+/// From how many decibels below a PSNR on training begins again.
+const FAR: f64 = 1.0;
+/// How often in a row more Gaussians may bring nothing.
+const MAX_FAILURES: u32 = 2;
 /// From which factor on the error that a quality allows Gaussians are added, and the most times as many
 /// that there are then.
 const CLOSE: f64 = 1.05;
@@ -54,27 +60,17 @@ pub(crate) fn finish(
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
     let Job { source, target, .. } = *job;
-    let mut file = layout.write_packed(&fit.fitted());
-    for _ in 0..MAX_ROUNDS {
-        let more = missing(target, budget, &file, source, &fit, observer)?;
-        let more = more.min(fit.most().saturating_sub(fit.len()));
-        if more == 0 {
-            break;
+    let file = if let Target::Psnr(target) = target {
+        let fitted = raised(&mut fit, target, layout, source, observer)?;
+        trimmed(layout, layout.ordered(&fitted), source, target, observer)?
+    } else if let Some(quality) = target.quality() {
+        extended(&mut fit, quality, layout, source, observer)?
+    } else {
+        if let (Some(_), Budget::Count(count)) = (target.bytes(job.pixels()), budget) {
+            fill(&mut fit, count, observer)?;
         }
-        let before = fit.len();
-        fit.resize(fit.len() + more, observer)?;
-        file = layout.write_packed(&fit.fitted());
-        if fit.len() == before {
-            // There is nothing left to correct.
-            break;
-        }
-    }
-    if let Some(quality) = target.quality() {
-        file = extended(&mut fit, file, quality, layout, source, observer)?;
-    }
-    if let Target::Psnr(target) = target {
-        file = trimmed(layout, layout.ordered(&fit.fitted()), file, source, target, observer)?;
-    }
+        layout.write_packed(&fit.fitted())
+    };
     Ok((file, fit.work()))
 }
 
@@ -94,11 +90,68 @@ fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec
         .collect()
 }
 
+/// Adds to a fit what pruning left it short of a size that holds so many Gaussians.
+fn fill(fit: &mut Fit<'_>, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    let count = count.min(fit.most());
+    for _ in 0..MAX_ROUNDS {
+        let before = fit.len();
+        if before as f64 >= count as f64 * (1.0 + SIZE_TOLERANCE) / 2.0 {
+            break;
+        }
+        fit.resize(count, observer)?;
+        if fit.len() == before {
+            // There is nothing left to correct.
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// The best codes of a fit that gets more Gaussians until its file has a PSNR. Far below it, training
+/// begins again: rounding may have undone what few strong Gaussians had learnt.
+fn raised(
+    fit: &mut Fit<'_>,
+    target: f64,
+    layout: &FileLayout<'_>,
+    source: &Source<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<PackedCodes, EncodeError> {
+    let psnr = |fitted: &PackedCodes, observer: &mut Observer<'_>| {
+        let file = layout.write_packed(fitted);
+        Ok::<_, EncodeError>(
+            Verified::new(&file, source, observer)?.distortion(u32::MAX, observer)?.psnr,
+        )
+    };
+    let fitted = fit.fitted();
+    let mut reached = psnr(&fitted, observer)?;
+    let mut best = (reached, fitted);
+    let mut failures = 0;
+    for _ in 0..MAX_ROUNDS {
+        let missing = target - reached;
+        let factor = (1.0 + GAUSSIANS_PER_DECIBEL * missing).min(MOST_FACTOR);
+        let count = ((fit.len().max(1) as f64 * factor).ceil() as usize).min(fit.most());
+        if missing <= 0.0 || count <= fit.len() || failures == MAX_FAILURES {
+            break;
+        }
+        if missing > FAR {
+            fit.restart(count, observer)?;
+        } else {
+            fit.resize(count, observer)?;
+        }
+        let fitted = fit.fitted();
+        reached = psnr(&fitted, observer)?;
+        failures += 1;
+        if reached > best.0 {
+            (best, failures) = ((reached, fitted), 0);
+        }
+    }
+    Ok(best.1)
+}
+
 /// The best file of a fit that is extended until it has a quality. Codes of fixed depths are too coarse
 /// to ask for smooth gradients as well.
 fn extended(
     fit: &mut Fit<'_>,
-    file: Vec<u8>,
     wanted: f64,
     layout: &FileLayout<'_>,
     source: &Source<'_>,
@@ -109,8 +162,9 @@ fn extended(
         let verdict = judge(source, &verified.picture(), observer)?;
         Ok::<_, EncodeError>(verdict.excess_of_structure(wanted))
     };
-    let mut best = (excess(&file, observer)?, file);
-    let mut factor = best.0;
+    let file = layout.write_packed(&fit.fitted());
+    let mut factor = excess(&file, observer)?;
+    let mut best = (factor, file);
     for _ in 0..MAX_EXTENSIONS {
         let count = fit.len().max(1) as f64 * factor.min(MOST_FACTOR);
         let count = (count.ceil() as usize).min(fit.most());
@@ -127,46 +181,17 @@ fn extended(
     Ok(best.1)
 }
 
-/// How many Gaussians a finished fit still needs for its target.
-fn missing(
-    target: Target,
-    budget: Budget,
-    file: &[u8],
-    source: &Source<'_>,
-    fit: &Fit<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<usize, EncodeError> {
-    Ok(match (target, budget) {
-        (Target::Psnr(target), _) => {
-            let psnr = Verified::new(file, source, observer)?.distortion(u32::MAX, observer)?.psnr;
-            // A decibel takes somewhat less than 0.3 times as many Gaussians again.
-            if psnr >= target {
-                0
-            } else {
-                (fit.len() as f64 * 0.3 * (target - psnr)).ceil() as usize
-            }
-        }
-        // Pruning may have left a file too small.
-        (Target::Bytes(_) | Target::BitsPerPixel(_), Budget::Count(count))
-            if (fit.len() as f64) < count as f64 * (1.0 + SIZE_TOLERANCE) / 2.0 =>
-        {
-            count.saturating_sub(fit.len())
-        }
-        _ => 0,
-    })
-}
-
 /// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
 /// those that are not needed among the last ones, where one Gaussian is worth more than the
 /// tolerance. The file as it is if it falls short.
 fn trimmed(
     layout: &FileLayout<'_>,
     mut fitted: PackedCodes,
-    mut file: Vec<u8>,
     source: &Source<'_>,
     target: f64,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<u8>, EncodeError> {
+    let mut file = layout.write_packed(&fitted);
     let fewest = least_prefix(&Verified::new(&file, source, observer)?, target, observer)?;
     fitted.codes.truncate(fewest as usize);
     file = layout.write_packed(&fitted);

@@ -39,30 +39,37 @@ pub(crate) struct Outcome {
     /// The visual quality, from 0 to 100.
     pub(crate) quality: f64,
     pub(crate) shortfall: Option<Shortfall>,
+    /// Whether most of the error is that of codes of fixed depths.
+    is_lost_to_rounding: bool,
 }
 
 /// The file for the target, or a smaller one where the target's size brings too little.
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
     verify::check_limits(job)?;
-    let outcome = encode_for_target(job, Work::default(), observer)?;
-    let (pixels, gaussians) = (job.pixels(), outcome.gaussians as usize);
-    let is_large = gaussians > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
-    // An effort that finds no use for the bytes may have begun with too many Gaussians.
-    let is_unused = matches!(outcome.shortfall, Some(Shortfall::SizeUnused { .. }));
-    let Some(most_bytes) = job.target.bytes(pixels).filter(|_| is_large || is_unused) else {
-        return Ok(outcome);
-    };
-    let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
-    let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
-    let modest = encode_for_target(&modest_job, outcome.work, observer)?;
-    let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
-    let gain = outcome.distortion.psnr - modest.distortion.psnr;
-    let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
-    if gain >= least || modest.file.len() as u64 > most_bytes {
-        return Ok(Outcome { work: modest.work, ..outcome });
+    let mut outcome = encode_for_target(job, Work::default(), observer)?;
+    let pixels = job.pixels();
+    let Some(most_bytes) = job.target.bytes(pixels) else { return Ok(outcome) };
+    loop {
+        let gaussians = outcome.gaussians as usize;
+        let is_large = gaussians > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
+        // An effort that finds no use for the bytes may have begun with too many Gaussians.
+        let is_unused = matches!(outcome.shortfall, Some(Shortfall::SizeUnused { .. }));
+        if !(is_large || is_unused || outcome.is_lost_to_rounding) || gaussians < 2 {
+            return Ok(outcome);
+        }
+        let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
+        let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
+        let modest = encode_for_target(&modest_job, outcome.work, observer)?;
+        let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
+        let gain = outcome.distortion.psnr - modest.distortion.psnr;
+        let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
+        if gain >= least || modest.file.len() as u64 > most_bytes {
+            return Ok(Outcome { work: modest.work, ..outcome });
+        }
+        let (bytes, gaussians) = (modest.file.len(), modest.gaussians);
+        let shortfall = Some(Shortfall::SizeUseless { bytes, gaussians });
+        outcome = Outcome { shortfall, ..modest };
     }
-    let (bytes, gaussians) = (modest.file.len(), modest.gaussians);
-    Ok(Outcome { shortfall: Some(Shortfall::SizeUseless { bytes, gaussians }), ..modest })
 }
 
 /// Fits the source, codes the Gaussians for the target, and decodes the file to tell what it shows.
@@ -92,6 +99,7 @@ fn encode_for_target(
     let work = Work { peak_memory: 0, ..work };
     let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
     fit.run(job.workload(expected), observer)?;
+    let is_lost_to_rounding = fit.is_lost_to_rounding();
 
     let (file, mut work) = match precision {
         Precision::Entropy => entropy::finish(fit, job, &raster, &layout, observer),
@@ -120,7 +128,7 @@ fn encode_for_target(
         gaussians,
     };
     let shortfall = Shortfall::of(target, job.pixels(), reached);
-    Ok(Outcome { file, work, gaussians, distortion, quality, shortfall })
+    Ok(Outcome { file, work, gaussians, distortion, quality, shortfall, is_lost_to_rounding })
 }
 
 /// The work from training on, about, with so many Gaussians.

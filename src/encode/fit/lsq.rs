@@ -41,6 +41,14 @@ struct LsqQuantizer {
     square: [f32; 2],
 }
 
+/// The least scale, for values that are all equal.
+const MIN_SCALE: f32 = 1e-9;
+/// How many wider ranges of colour are tried than three standard deviations.
+const WIDENINGS: u8 = 16;
+/// What an error counts that clipping makes: training corrects it by other Gaussians, as it cannot with
+/// coarse steps.
+const CLIPPED: f64 = 0.2;
+
 /// Gradients by the scale and the offset of every component's quantizer.
 pub(crate) type QuantizerGradients = [[f32; 2]; MAX_COMPONENTS];
 
@@ -55,6 +63,12 @@ impl LsqQuantizers {
         let replacements: Vec<_> = (others.into_iter())
             .filter_map(|(range, other)| Some((range, other.clone()?)))
             .collect();
+        let area = |row: &Row| {
+            let [l11, _, l22] =
+                Gaussian::from_components(&row[..], bounds.parameterization).cholesky;
+            f64::from(l11 * l22)
+        };
+        let areas: Vec<f64> = rows.iter().map(area).collect();
         let components = (0..5 + bounds.channels).map(|index| {
             let (bits, min_logarithm, has_zero) = match index {
                 0 | 1 => (options.position_bits, None, false),
@@ -67,16 +81,18 @@ impl LsqQuantizers {
                 _ => (options.color_bits, None, false),
             };
             let values = rows.iter().map(|row| to_uniform(row[index], min_logarithm));
-            let (low, high) = if index < 5 { range(values) } else { three_sigma_range(values) };
+            let (low, high) = match index {
+                ..5 => range(values),
+                _ => least_error_range(values.zip(areas.iter().copied()), bits),
+            };
             let mut component = LsqQuantizer {
-                quantizer: UniformQuantizer { bits, scale: 1.0, offset: low },
+                quantizer: covering((low, high), bits),
                 is_replaced: replacements.iter().any(|(range, _)| range.contains(&index)),
                 min_logarithm,
                 has_zero,
                 mean: [0.0; 2],
                 square: [0.0; 2],
             };
-            component.quantizer.scale = (high - low) / component.quantizer.max_code() as f32;
             component.clamp();
             component
         });
@@ -236,7 +252,7 @@ impl LsqQuantizer {
     /// Clamps scale and offset to what a decoder accepts, and so that decoded values are valid.
     fn clamp(&mut self) {
         let UniformQuantizer { bits: _, scale, offset } = &mut self.quantizer;
-        *scale = scale.clamp(1e-9, MAX_PARAMETER);
+        *scale = scale.clamp(MIN_SCALE, MAX_PARAMETER);
         *offset = offset.clamp(-MAX_PARAMETER, MAX_PARAMETER);
         if let Some(min_logarithm) = self.min_logarithm {
             *offset = offset.max(min_logarithm);
@@ -262,6 +278,34 @@ fn range(values: impl Iterator<Item = f32>) -> (f32, f32) {
             Some((low, high)) => Some((low.min(value), high.max(value))),
         })
         .unwrap_or_default()
+}
+
+/// The quantizer of a depth whose codes cover a range.
+fn covering((low, high): (f32, f32), bits: u8) -> UniformQuantizer {
+    let mut quantizer = UniformQuantizer { bits, scale: 1.0, offset: low };
+    quantizer.scale = ((high - low) / quantizer.max_code() as f32).max(MIN_SCALE);
+    quantizer
+}
+
+/// The range with which a quantizer makes the least squared error, where each value counts by a weight:
+/// between [`three_sigma_range`] and the range of all values. In smooth pictures a few large Gaussians
+/// have the strongest colours, and clipping those may show more than coarse steps.
+fn least_error_range(weighted: impl Iterator<Item = (f32, f64)> + Clone, bits: u8) -> (f32, f32) {
+    let values = weighted.clone().map(|(value, _)| value);
+    let (inner, outer) = (three_sigma_range(values.clone()), range(values));
+    let candidate = |index: u8| {
+        let share = f32::from(index) / f32::from(WIDENINGS);
+        let low = inner.0 + share * (outer.0 - inner.0);
+        let high = inner.1 + share * (outer.1 - inner.1);
+        let quantizer = covering((low, high), bits);
+        let error = |(value, weight): (f32, f64)| {
+            let share = if (low..=high).contains(&value) { 1.0 } else { CLIPPED };
+            share * weight * f64::from(quantizer.value(quantizer.code(value)) - value).powi(2)
+        };
+        (weighted.clone().map(error).sum::<f64>(), (low, high))
+    };
+    let best = (0..=WIDENINGS).map(candidate).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.expect("there are candidates").1
 }
 
 /// Three standard deviations to both sides of the mean, but at most the range of the values: how

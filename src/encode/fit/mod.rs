@@ -47,6 +47,8 @@ use crate::render::splat::Splat;
 /// The error after training as a share of the error during growth: training continues to lower the
 /// error when no more Gaussians are added.
 const FORESEEN: f64 = 0.75;
+/// The squared error, as a multiple of that before quantization, from which on it is mostly rounding.
+const LOST: f64 = 2.0;
 /// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
 /// Work to turn a Gaussian into a splat, or to look at it.
@@ -76,6 +78,8 @@ pub(crate) struct Fit<'a> {
     parameters: Parameters,
     /// Those of quantization-aware training, once it has started.
     quantizers: Option<LsqQuantizers>,
+    /// The squared error before quantization started; 0 without it.
+    float_error: f64,
     /// The state of least error since Gaussians were last added or removed.
     best: Option<Checkpoint>,
     pass: Pass,
@@ -114,6 +118,7 @@ impl<'a> Fit<'a> {
             },
             parameters: Parameters::new(&training.optimizer),
             quantizers: None,
+            float_error: 0.0,
             best: None,
             pass: Pass::new(raster),
             binned_for: 0,
@@ -170,8 +175,22 @@ impl<'a> Fit<'a> {
         self.settle(observer)
     }
 
+    /// Trains from nothing again, with this many Gaussians.
+    pub(crate) fn restart(
+        &mut self,
+        count: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        self.budget = Budget::Count(count);
+        self.parameters = Parameters::new(&self.training.optimizer);
+        self.quantizers = None;
+        self.invalidate();
+        self.run(Workload::new(self.raster.pixels(), count), observer)
+    }
+
     /// Adds or removes Gaussians of a finished fit, so that there are `count`, and trains all for a
-    /// quarter of the iterations more.
+    /// quarter of the iterations more: at first without quantization, because quantizers of the others
+    /// would round what is new to nothing.
     pub(crate) fn resize(
         &mut self,
         count: usize,
@@ -179,18 +198,21 @@ impl<'a> Fit<'a> {
     ) -> Result<(), EncodeError> {
         if let Some(best) = self.best.take() {
             self.parameters.replace(best.rows);
-            self.quantizers = best.quantizers;
-            self.binned_for = 0;
-            self.has_splats = false;
         }
+        let was_quantized = self.quantizers.take().is_some();
+        self.invalidate();
         self.forward(true, observer)?;
         self.cull(self.len().saturating_sub(count), observer)?;
         self.grow(count.saturating_sub(self.len()), observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
+        let quantized_from = (self.training.quantization.warm_up * iterations as f32) as u32;
         let workload = Workload::new(self.raster.pixels(), self.len());
         for iteration in 0..iterations {
             observer.advance(workload.iteration(1.0))?;
+            if was_quantized && iteration == quantized_from.min(iterations - 1) {
+                self.start_quantization();
+            }
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);
             self.iterate(factor, total, false, observer)?;
         }
@@ -226,6 +248,12 @@ impl<'a> Fit<'a> {
     /// The error of the best Gaussians so far.
     pub(crate) fn best_error(&self) -> RenderingError {
         self.best.as_ref().map_or(self.error, |best| best.error)
+    }
+
+    /// Whether most of the error is that of quantization: fewer Gaussians, which overlap less, may show a
+    /// better picture.
+    pub(crate) fn is_lost_to_rounding(&self) -> bool {
+        self.quantizers.is_some() && self.best_error().squared > LOST * self.float_error
     }
 
     /// What training has cost so far.
@@ -294,8 +322,7 @@ impl<'a> Fit<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         self.forward(grows, observer)?;
-        let samples = self.raster.pixels() * self.raster.channels;
-        if self.best.as_ref().is_some_and(|best| best.is_lost(self.error, samples)) {
+        if self.is_lost() {
             self.return_to_best();
             self.forward(grows, observer)?;
         }
@@ -306,6 +333,14 @@ impl<'a> Fit<'a> {
         let memory = self.memory();
         self.work.peak_memory = self.work.peak_memory.max(memory);
         Ok(())
+    }
+
+    /// Whether the last step lost what training had. Codes that flip make the error jump, which is no
+    /// loss: the best state is kept in any case.
+    fn is_lost(&self) -> bool {
+        let samples = self.raster.pixels() * self.raster.channels;
+        let best = self.best.as_ref().filter(|_| self.quantizers.is_none());
+        best.is_some_and(|best| best.is_lost(self.error, samples))
     }
 
     /// Renders the Gaussians as the file would store them, and computes error and gradients.
@@ -503,6 +538,7 @@ impl<'a> Fit<'a> {
         for row in &mut self.parameters.values {
             *row = self.bounds.clamped(*row);
         }
+        self.float_error = self.error.squared;
         self.quantizers = Some(LsqQuantizers::new(
             &self.parameters.values,
             self.bounds,
@@ -544,7 +580,6 @@ impl<'a> Fit<'a> {
         let Some(best) = &mut self.best else { return };
         let blamed = best.blamed(self.pass.tile_distortions());
         self.parameters.values.copy_from_slice(&best.rows);
-        self.quantizers.clone_from(&best.quantizers);
         let pass = &self.pass;
         self.parameters.slow_down(|row| blamed[pass.tile_near([row[0], row[1]])]);
         self.binned_for = 0;
