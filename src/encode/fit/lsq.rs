@@ -83,7 +83,7 @@ impl LsqQuantizers {
             let values = rows.iter().map(|row| to_uniform(row[index], min_logarithm));
             let (low, high) = match index {
                 ..5 => range(values),
-                _ => least_error_range(values.zip(areas.iter().copied()), bits),
+                _ => least_error_range(&values.zip(areas.iter().copied()), bits),
             };
             let mut component = LsqQuantizer {
                 quantizer: covering((low, high), bits),
@@ -290,7 +290,10 @@ fn covering((low, high): (f32, f32), bits: u8) -> UniformQuantizer {
 /// The range with which a quantizer makes the least squared error, where each value counts by a weight:
 /// between [`three_sigma_range`] and the range of all values. In smooth pictures a few large Gaussians
 /// have the strongest colours, and clipping those may show more than coarse steps.
-fn least_error_range(weighted: impl Iterator<Item = (f32, f64)> + Clone, bits: u8) -> (f32, f32) {
+fn least_error_range(
+    weighted: &(impl Iterator<Item = (f32, f64)> + Clone),
+    bits: u8,
+) -> (f32, f32) {
     let values = weighted.clone().map(|(value, _)| value);
     let (inner, outer) = (three_sigma_range(values.clone()), range(values));
     let candidate = |index: u8| {
