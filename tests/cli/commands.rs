@@ -424,21 +424,16 @@ fn metadata_is_carried_and_orientation_applied_once() {
 #[test]
 fn gif_has_no_alpha_between_transparent_and_opaque() {
     let room = Room::new();
-    let encode = |alpha: fn(u32) -> u8| {
-        let picture = image::RgbaImage::from_fn(16, 8, |x, _| image::Rgba([200, 60, 20, alpha(x)]));
-        room.save_picture("a.png", &picture.into());
-        room.ok(&["encode", "a.png", "a.gip", "--psnr", "60"]);
-        let output = room.run(&["decode", "a.gip", "a.gif"]);
-        assert!(output.status.success());
-        let gif = ImageReader::open(room.path("a.gif")).expect("it was written").decode();
-        let alphas = gif.expect("a picture").to_rgba8();
-        (
-            alphas.rows().next().expect("a row").map(|pixel| pixel.0[3]).collect::<Vec<_>>(),
-            text(&output.stderr),
-        )
-    };
-    let (alphas, warning) = encode(|x| (x * 17) as u8);
-    assert_eq!(alphas, [[0; 8], [255; 8]].concat());
+    let color = |x: u32| image::Rgba([200, 60, 20, (x * 17) as u8]);
+    room.save_picture("a.png", &image::RgbaImage::from_fn(16, 8, |x, _| color(x)).into());
+    room.ok(&["encode", "a.png", "a.gip", "--psnr", "60"]);
+    let output = room.run(&["decode", "a.gip", "a.gif"]);
+    assert!(output.status.success());
+    let gif = ImageReader::open(room.path("a.gif")).expect("it was written").decode();
+    let gif = gif.expect("a picture").to_rgba8();
+    let alphas = gif.rows().next().expect("a row").map(|pixel| pixel.0[3]);
+    assert_eq!(alphas.collect::<Vec<_>>(), [[0; 8], [255; 8]].concat());
+    let warning = text(&output.stderr);
     assert_eq!(warning, "warning: a.gip: its alpha is rounded to transparent or opaque\n");
 }
 
