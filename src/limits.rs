@@ -6,7 +6,8 @@ use crate::error::{DecodeError, LimitKind};
 /// the work is done (spec, section 10).
 ///
 /// The defaults accept every ordinary picture, and bound what a hostile file costs to a few hundred
-/// megabytes and a few seconds more than an ordinary picture of its size. All fields may be changed; [`Limits::none`] removes all limits.
+/// megabytes and a few seconds more than an ordinary picture of its size. All fields may be changed;
+/// [`Limits::none`] removes all limits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {

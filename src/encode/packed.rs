@@ -22,7 +22,7 @@ const FAR: f64 = 1.0;
 /// How often in a row more Gaussians may bring nothing.
 const MAX_FAILURES: u32 = 2;
 /// From which factor on the error that a quality allows Gaussians are added, and the most times as many
-/// that there are then.
+/// that there are after an addition.
 const CLOSE: f64 = 1.05;
 const MOST_FACTOR: f64 = 2.0;
 /// How often a finished fit may be extended for a quality.
@@ -116,20 +116,13 @@ fn raised(
     source: &Source<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<PackedCodes, EncodeError> {
-    let psnr = |fitted: &PackedCodes, observer: &mut Observer<'_>| {
-        let file = layout.write_packed(fitted);
-        Ok::<_, EncodeError>(
-            Verified::new(&file, source, observer)?.distortion(u32::MAX, observer)?.psnr,
-        )
-    };
     let fitted = fit.fitted();
-    let mut reached = psnr(&fitted, observer)?;
+    let mut reached = psnr(&layout.write_packed(&fitted), source, observer)?;
     let mut best = (reached, fitted);
     let mut failures = 0;
     for _ in 0..MAX_ROUNDS {
         let missing = target - reached;
-        let factor = (1.0 + GAUSSIANS_PER_DECIBEL * missing).min(MOST_FACTOR);
-        let count = ((fit.len().max(1) as f64 * factor).ceil() as usize).min(fit.most());
+        let count = more(fit, 1.0 + GAUSSIANS_PER_DECIBEL * missing);
         if missing <= 0.0 || count <= fit.len() || failures == MAX_FAILURES {
             break;
         }
@@ -139,7 +132,7 @@ fn raised(
             fit.resize(count, observer)?;
         }
         let fitted = fit.fitted();
-        reached = psnr(&fitted, observer)?;
+        reached = psnr(&layout.write_packed(&fitted), source, observer)?;
         failures += 1;
         if reached > best.0 {
             (best, failures) = ((reached, fitted), 0);
@@ -166,8 +159,7 @@ fn extended(
     let mut factor = excess(&file, observer)?;
     let mut best = (factor, file);
     for _ in 0..MAX_EXTENSIONS {
-        let count = fit.len().max(1) as f64 * factor.min(MOST_FACTOR);
-        let count = (count.ceil() as usize).min(fit.most());
+        let count = more(fit, factor);
         if factor < CLOSE || count <= fit.len() {
             break;
         }
@@ -179,6 +171,17 @@ fn extended(
         }
     }
     Ok(best.1)
+}
+
+/// How many Gaussians are so many times as many as a fit has, as far as may be added at once.
+fn more(fit: &Fit<'_>, factor: f64) -> usize {
+    let count = fit.len().max(1) as f64 * factor.min(MOST_FACTOR);
+    (count.ceil() as usize).min(fit.most())
+}
+
+/// The PSNR of a file in dB.
+fn psnr(file: &[u8], source: &Source<'_>, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
+    Ok(Verified::new(file, source, observer)?.distortion(u32::MAX, observer)?.psnr)
 }
 
 /// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
@@ -195,17 +198,17 @@ fn trimmed(
     let fewest = least_prefix(&Verified::new(&file, source, observer)?, target, observer)?;
     fitted.codes.truncate(fewest as usize);
     file = layout.write_packed(&fitted);
-    let mut psnr = Verified::new(&file, source, observer)?.distortion(u32::MAX, observer)?.psnr;
+    let mut reached = psnr(&file, source, observer)?;
     for index in (0..fitted.codes.len()).rev().take(MAX_TRIALS) {
-        if psnr <= target + PSNR_TOLERANCE {
+        if reached <= target + PSNR_TOLERANCE {
             break;
         }
         let mut fewer = fitted.clone();
         fewer.codes.remove(index);
         let trial = layout.write_packed(&fewer);
-        let reached = Verified::new(&trial, source, observer)?.distortion(u32::MAX, observer)?.psnr;
-        if reached >= target {
-            (fitted, file, psnr) = (fewer, trial, reached);
+        let reached_with_fewer = psnr(&trial, source, observer)?;
+        if reached_with_fewer >= target {
+            (fitted, file, reached) = (fewer, trial, reached_with_fewer);
         }
     }
     Ok(file)

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use anyhow::{Result, bail};
-use image_gip::{SampleDepth, metrics};
+use image_gip::{ColorModel, SampleDepth, metrics};
 use serde::Serialize;
 
 use crate::args;
@@ -41,15 +41,16 @@ pub(crate) fn run(args: &args::Compare) -> Result<()> {
 
 /// The samples of a picture, with colours times their alpha unless those under alpha 0 count, too.
 fn shown(picture: &StillImage, keep_invisible: bool) -> Vec<f64> {
-    let (samples, full): (Vec<f64>, _) = match picture.samples() {
-        SampleSlice::Eight(samples) => {
-            (samples.iter().map(|&s| s.into()).collect(), u8::MAX.into())
+    fn of<T: Copy + Into<f64>>(samples: &[T], color: ColorModel, full: T, keep: bool) -> Vec<f64> {
+        match keep {
+            true => samples.iter().map(|&sample| sample.into()).collect(),
+            false => metrics::premultiplied(samples, color, full.into()),
         }
-        SampleSlice::Sixteen(samples) => {
-            (samples.iter().map(|&s| s.into()).collect(), f64::from(u16::MAX))
-        }
-    };
-    if keep_invisible { samples } else { metrics::premultiplied(&samples, picture.color(), full) }
+    }
+    match picture.samples() {
+        SampleSlice::Eight(samples) => of(samples, picture.color(), u8::MAX, keep_invisible),
+        SampleSlice::Sixteen(samples) => of(samples, picture.color(), u16::MAX, keep_invisible),
+    }
 }
 
 /// What `--json` prints.

@@ -64,9 +64,9 @@ pub(crate) fn partial(
     Ok(Some(StillImage { image, metadata, warnings }))
 }
 
-/// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, and with such
-/// metadata and alpha as was asked for and the format takes. Without a policy, which is for thumbnails, it has what is safe,
-/// and nobody misses what the format does not take.
+/// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, with such
+/// alpha as the format takes, and with such metadata as was asked for and the format takes. Without a policy,
+/// which is for thumbnails, it has what is safe, and nobody misses what the format does not take.
 pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
     picture.make_upright(picture.metadata.orientation());
     picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));

@@ -207,10 +207,11 @@ impl<'a> Fit<'a> {
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
         let quantized_from = (self.training.quantization.warm_up * iterations as f32) as u32;
+        let quantized_from = quantized_from.min(iterations - 1);
         let workload = Workload::new(self.raster.pixels(), self.len());
         for iteration in 0..iterations {
             observer.advance(workload.iteration(1.0))?;
-            if was_quantized && iteration == quantized_from.min(iterations - 1) {
+            if was_quantized && iteration == quantized_from {
                 self.start_quantization();
             }
             let factor = 0.5 * (1.0 - iteration as f32 / iterations as f32);

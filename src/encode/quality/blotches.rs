@@ -24,52 +24,34 @@ pub(super) fn allowed(quality: f64) -> f64 {
     (ALLOWED * ((75.0 - quality) / DOUBLED_BY).exp2()).max(LEAST_ALLOWED).powi(2)
 }
 
-/// The sum of the mean squares of deviations of blocks in the areas of a picture, by weight.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Blotches {
-    squares: f64,
-}
-
-impl core::ops::AddAssign for Blotches {
-    fn add_assign(&mut self, other: Self) {
-        self.squares += other.squares;
-    }
-}
-
-impl Blotches {
-    /// The mean square of deviations, over all of so many areas.
-    pub(super) fn mean_square(&self, areas: usize) -> f64 {
-        self.squares / areas as f64
-    }
-
-    /// Those of the areas from row `first` on, of which there are `rows` rows, given their weights.
-    #[inline(always)]
-    pub(super) fn of_rows<A: Samples, B: Samples>(
-        source: &Shown<'_, A>,
-        rendering: &Shown<'_, B>,
-        weights: &[f32],
-        first: usize,
-        rows: usize,
-    ) -> Self {
-        let mut found = Self::default();
-        let width = source.size[0];
-        for (x, weights) in (0..width).step_by(COLUMNS).zip(weights.chunks(COLUMNS / AREA)) {
-            if weights.iter().all(|&weight| weight == 0.0) {
-                continue;
-            }
-            let columns = COLUMNS.min(width - x);
-            let blocks = deviations(source, rendering, [x, first], [columns, rows]);
-            for (weight, blocks) in weights.iter().zip(blocks.chunks_exact(AREA / BLOCK)) {
-                let (mut sum, mut count) = (0.0, 0.0);
-                for &[square, of] in blocks {
-                    sum += square;
-                    count += of;
-                }
-                found.squares += f64::from(weight * sum / count);
-            }
+/// The sum over areas of their mean square deviations of blocks, by weight: of the areas from row `first`
+/// on, of which there are `rows` rows, given their weights.
+#[inline(always)]
+pub(super) fn squares<A: Samples, B: Samples>(
+    source: &Shown<'_, A>,
+    rendering: &Shown<'_, B>,
+    weights: &[f32],
+    first: usize,
+    rows: usize,
+) -> f64 {
+    let mut squares = 0.0;
+    let width = source.size[0];
+    for (x, weights) in (0..width).step_by(COLUMNS).zip(weights.chunks(COLUMNS / AREA)) {
+        if weights.iter().all(|&weight| weight == 0.0) {
+            continue;
         }
-        found
+        let columns = COLUMNS.min(width - x);
+        let blocks = deviations(source, rendering, [x, first], [columns, rows]);
+        for (weight, blocks) in weights.iter().zip(blocks.chunks_exact(AREA / BLOCK)) {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for &[square, of] in blocks {
+                sum += square;
+                count += of;
+            }
+            squares += f64::from(weight * sum / count);
+        }
     }
+    squares
 }
 
 /// The sum over the channels of squared mean deviations in each column of blocks, and their number.

@@ -30,7 +30,6 @@ use super::source::Source;
 use super::strips;
 use crate::region::Region;
 use crate::render::Picture;
-use blotches::Blotches;
 use light::Strip;
 use pyramid::Shown;
 use scales::Scales;
@@ -122,7 +121,8 @@ struct View {
     metric: Option<Scales>,
     mirrored: Option<Scales>,
     smooth: SmoothAreas,
-    blotches: Blotches,
+    /// The sum over areas so far of what there is of blotches.
+    blotches: f64,
 }
 
 impl<'a> Judgement<'a> {
@@ -134,7 +134,7 @@ impl<'a> Judgement<'a> {
             smooth: SmoothAreas::new(&Shown { picture: source, size, background }, level),
             metric: Scales::of_metric(size),
             mirrored: Scales::of_mirrored(size),
-            blotches: Blotches::default(),
+            blotches: 0.0,
         };
         let views = source.backgrounds().iter().map(view).collect();
         Self { source, level, views }
@@ -157,8 +157,7 @@ impl<'a> Judgement<'a> {
         Verdict {
             dissimilarity: worst(|view| view.metric.as_ref().map(Scales::dissimilarity)),
             mirrored: worst(|view| view.mirrored.as_ref().map(Scales::dissimilarity)),
-            blotches: worst(|view| Some(view.blotches.mean_square(view.smooth.count())))
-                .unwrap_or(0.0),
+            blotches: worst(|view| Some(view.blotches / view.smooth.count() as f64)).unwrap_or(0.0),
         }
     }
 }
@@ -175,7 +174,7 @@ impl View {
         let areas: Vec<_> = smooth::rows_of_areas(rows).collect();
         let found = areas.into_par_iter().map(|(row, rows)| {
             let y = first + row;
-            dispatch!(level, _ => Blotches::of_rows(&source, &rendering, smooth.row(y), y, rows))
+            dispatch!(level, _ => blotches::squares(&source, &rendering, smooth.row(y), y, rows))
         });
         for found in found.collect::<Vec<_>>() {
             self.blotches += found;

@@ -23,7 +23,8 @@ use super::values::{bounds, extension, number};
 ///
 /// If two results would get the same name, as those of a.png and a.jpg, or if a result would
 /// replace an INPUT, nothing is done. Nor is it if a decoded picture would replace a file in a folder
-/// of an INPUT, which may be an original, unless the --manifest says that an earlier run wrote it. A picture that cannot be read is reported and skipped.
+/// of an INPUT, which may be an original, unless the --manifest says that an earlier run wrote it. A
+/// picture that cannot be read is reported and skipped.
 ///
 /// Every result gets its name when it is complete, and other existing files are replaced. After an
 /// interruption of any kind, even a crash, the same command with --resume does the rest, and removes
