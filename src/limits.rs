@@ -63,7 +63,12 @@ impl Limits {
     pub(crate) fn check_size(&self, width: u32, height: u32) -> Result<(), DecodeError> {
         check(LimitKind::Width, u64::from(width), u64::from(self.max_width))?;
         check(LimitKind::Height, u64::from(height), u64::from(self.max_height))?;
-        check(LimitKind::Pixels, u64::from(width) * u64::from(height), self.max_pixels)
+        self.check_pixels(u64::from(width) * u64::from(height))
+    }
+
+    /// Checks a number of pixels.
+    pub(crate) fn check_pixels(&self, pixels: u64) -> Result<(), DecodeError> {
+        check(LimitKind::Pixels, pixels, self.max_pixels)
     }
 
     /// Checks a number of Gaussians.

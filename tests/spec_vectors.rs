@@ -246,13 +246,18 @@ fn valid_vectors() -> Vec<Vector> {
             "gray and straight alpha",
             random_file(61, header(GRAY_ALPHA, 17, 9), 15),
         )
-        .also(&[Rendering::Color(ColorModel::Rgba)]),
+        .also(&[Rendering::Color(ColorModel::Rgba), Rendering::Size(5, 40)]),
         Vector::valid("rgb8", "RGB, 8 bits", random_file(62, header(RGB, 40, 24), 30)).also(&[
             Rendering::Size(20, 12),
             Rendering::Size(13, 50),
             Rendering::Color(ColorModel::Rgba),
         ]),
-        Vector::valid("rgba8", "RGB and straight alpha", random_file(63, header(RGBA, 19, 23), 20)),
+        Vector::valid("rgba8", "RGB and straight alpha", random_file(63, header(RGBA, 19, 23), 20))
+            .also(&[
+                Rendering::Size(18, 11),
+                Rendering::Size(2, 3),
+                Rendering::SizeAndRegion((7, 9), (2, 3, 4, 5)),
+            ]),
         Vector::valid(
             "gray16",
             "gray, 16 bits",
@@ -263,7 +268,8 @@ fn valid_vectors() -> Vec<Vector> {
             "rgba16",
             "RGBA, 16 bits",
             random_file(65, Ghdr { depth: 16, ..header(RGBA, 16, 16) }, 20),
-        ),
+        )
+        .also(&[Rendering::Size(6, 1)]),
         Vector::valid(
             "paper",
             "the paper's choices: exp(-q/2) cut off at weight 1/255, covariance parameterization with variances \

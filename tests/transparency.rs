@@ -153,15 +153,19 @@ fn scaled_cut_outs_have_no_fringes() {
         let encoder = Encoder::new().with_effort(2).with_target(Target::Quality(90.0));
         let file = encoder.encode(&sprite.source()).expect("it encodes").bytes;
         for background in ["black", "white"] {
-            let expected = scaled(&sprite, 4, background);
-            let found = over(&decoded(&file, 32, ColorModel::Rgba), 32, background);
             let opaque = over(&sprite.samples, sprite.size, background);
             let opaque = Source::new_u8(128, 128, ColorModel::Rgb, &opaque).expect("sizes agree");
             let opaque = encoder.encode(&opaque).expect("it encodes").bytes;
-            let of_opaque = root_mean_square(&expected, &decoded(&opaque, 32, ColorModel::Rgb));
-            let error = root_mean_square(&expected, &found);
-            println!("{hidden:?} {background}: {error} {of_opaque}");
-            assert!(error < 1.1 * of_opaque + 0.5, "{hidden:?} {background}: {error}, {of_opaque}");
+            for factor in [2, 4, 8] {
+                let side = 128 / factor;
+                let expected = scaled(&sprite, factor, background);
+                let found = over(&decoded(&file, side, ColorModel::Rgba), side, background);
+                let opaque = decoded(&opaque, side, ColorModel::Rgb);
+                let of_opaque = root_mean_square(&expected, &opaque);
+                let error = root_mean_square(&expected, &found);
+                println!("{hidden:?} {background} 1/{factor}: {error} {of_opaque}");
+                assert!(error < 1.1 * of_opaque + 0.5, "{hidden:?} {background} 1/{factor}");
+            }
         }
     }
 }

@@ -96,22 +96,22 @@ impl GpuPicture {
     }
 
     /// The contents of the uniform `View` of the shader.
-    pub(crate) fn uniform(&self, frame: &Frame) -> Result<[u8; 64], RenderError> {
+    pub(crate) fn uniform(&self, frame: &Frame) -> Result<[u8; 96], RenderError> {
         let Header { kernel, color, base_color, .. } = self.header;
         let code = match kernel {
             Kernel::Exponential { .. } => 0_u32,
             Kernel::Quartic => 1,
             _ => return Err(RenderError::Kernel),
         };
-        let region = frame.region;
+        let (grid, region) = (frame.grid, frame.region);
         let base = base_color.map(|value| (f32::from(value) / 65535.0).to_bits());
         let words = [
             frame.scale[0].to_bits(),
             frame.scale[1].to_bits(),
-            (region.x as f32).to_bits(),
-            (region.y as f32).to_bits(),
-            region.width,
-            region.height,
+            (grid.x as f32).to_bits(),
+            (grid.y as f32).to_bits(),
+            grid.width,
+            grid.height,
             frame.gaussians,
             frame.bin_tiles(),
             base[0],
@@ -122,8 +122,16 @@ impl GpuPicture {
             code,
             kernel.cutoff().to_bits(),
             0,
+            frame.ratio[0].to_bits(),
+            frame.ratio[1].to_bits(),
+            frame.offset[0].to_bits(),
+            frame.offset[1].to_bits(),
+            region.width,
+            region.height,
+            0,
+            0,
         ];
-        let mut bytes = [0; 64];
+        let mut bytes = [0; 96];
         for (bytes, word) in bytes.chunks_exact_mut(4).zip(words) {
             bytes.copy_from_slice(&word.to_ne_bytes());
         }

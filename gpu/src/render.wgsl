@@ -5,28 +5,30 @@
 // For each picture that is drawn:
 //   1. clear the buffer `bins` to zero,
 //   2. dispatch `prepare` with ceil(gaussians / 256) workgroups,
-//   3. dispatch `render` with ceil(size.x / 16) x ceil(size.y / 16) workgroups.
+//   3. dispatch `render` with ceil(pixels.x / 16) x ceil(pixels.y / 16) workgroups.
 // All three go into one command encoder, and the two dispatches may share a compute pass. Nothing is
 // sorted: `prepare` marks each Gaussian in the bins that it may touch, one bit for each, and `render`
 // goes through these bits in the order of the file.
 //
 // Bindings, all in group 0, with the buffers' sizes in bytes for N Gaussians:
 //
-//   0  view       uniform, 64        what to draw; see `View`
+//   0  view       uniform, 96        what to draw; see `View`
 //   1  gaussians  storage, 36 N      see below
 //   2  splats     storage, 48 N      filled by `prepare`
 //   3  bins       storage, 4 ceil(N / 32) x number of bins; at most 1024 ceil(N / 32)
-//   4  output     storage texture, rgba8unorm, of at least `size` pixels
+//   4  output     storage texture, rgba8unorm, of at least `pixels`
 //
 // `prepare` uses 0 to 3, `render` 0, 2, 3 and 4. Both accept a bind group with all five.
 
 struct View {
-    // Pixels of the output for one stored pixel, along x and y. (offset 0)
+    // Pixels of the grid for one stored pixel, along x and y. The grid is what is evaluated: the
+    // output, or where that is smaller than the picture, what it is the average of (spec, section
+    // 9.2). (offset 0)
     scale: vec2<f32>,
-    // Column and row of the texture's first pixel in the output. They may be fractions, so that a
-    // picture can be moved smoothly. (offset 8)
+    // Column and row of the first pixel of the grid that is evaluated. They may be fractions, so that
+    // a picture can be moved smoothly. (offset 8)
     origin: vec2<f32>,
-    // Width and height in pixels of what is drawn; the texture has at least this size. (offset 16)
+    // Width and height in pixels of what is evaluated of the grid. (offset 16)
     size: vec2<u32>,
     // How many Gaussians to draw: the first ones of the file. (offset 24)
     gaussians: u32,
@@ -40,11 +42,19 @@ struct View {
     channels: u32,
     // 0 exponential, 1 quartic. (offset 52)
     kernel: u32,
-    // The cut-off of the kernel, which is 4 for the quartic one. (offset 56; size 64)
+    // The cut-off of the kernel, which is 4 for the quartic one. (offset 56)
     cutoff: f32,
+    // Pixels of the grid for one of the output, along x and y: 1 unless the output is smaller than the
+    // picture. (offset 64)
+    ratio: vec2<f32>,
+    // Where the texture's first pixel begins, in pixels of the grid from `origin`. (offset 72)
+    offset: vec2<f32>,
+    // Width and height in pixels of what is drawn; the texture has at least this size. (offset 80;
+    // size 96)
+    pixels: vec2<u32>,
 }
 
-// A Gaussian in output pixels (spec, section 9.2).
+// A Gaussian in pixels of the grid (spec, section 9.2).
 struct Splat {
     // x, y: the centre. i11, w: see `point`.
     place: vec4<f32>,
@@ -72,6 +82,8 @@ const BATCH: u32 = 256u;
 const BATCH_WORDS: u32 = 8u;
 const COMPONENTS: u32 = 9u;
 const QUARTIC: u32 = 1u;
+// What the weight of a colour exceeds its alpha by (spec, section 9.5).
+const LEAST_WEIGHT: f32 = 0.0000152587890625;
 
 fn tiles() -> vec2<u32> {
     return (view.size + TILE - 1u) / TILE;
@@ -200,7 +212,7 @@ fn prepare(@builtin(global_invocation_id) invocation: vec3<u32>) {
     }
 }
 
-// ---- render: splats to pixels, a tile for each workgroup ----
+// ---- render: splats to pixels, a tile of the output for each workgroup ----
 
 // Of each invocation, the number of bits in its word; and sums of sixteen of them.
 var<workgroup> counts: array<u32, 256>;
@@ -213,6 +225,8 @@ var<workgroup> touching: array<atomic<u32>, 8>;
 var<workgroup> places: array<vec4<f32>, 256>;
 var<workgroup> i22s: array<f32, 256>;
 var<workgroup> colors: array<vec4<f32>, 256>;
+// The pixels of a tile of the grid, where the output is their average.
+var<workgroup> values: array<vec4<f32>, 256>;
 
 // The point (u, v) of the kernel for a distance from the centre (spec, section 9.3).
 fn point(place: vec4<f32>, i22: f32, d: vec2<f32>) -> vec2<f32> {
@@ -274,15 +288,10 @@ fn sum_before(invocation: u32, count: u32) -> u32 {
     return before;
 }
 
-@compute @workgroup_size(16, 16)
-fn render(
-    @builtin(workgroup_id) tile: vec3<u32>,
-    @builtin(local_invocation_id) within: vec3<u32>,
-    @builtin(local_invocation_index) invocation: u32,
-) {
-    let pixel = tile.xy * TILE + within.xy;
-    let corner = view.origin + vec2<f32>(tile.xy * TILE) + 0.5;
-    let center = view.origin + vec2<f32>(pixel) + 0.5;
+// The sum at a pixel of a tile of the grid. All invocations of the workgroup call it together.
+fn sum_at(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> vec4<f32> {
+    let corner = view.origin + vec2<f32>(tile * TILE) + 0.5;
+    let center = corner + vec2<f32>(within);
     let bin = (tile.y / view.bin_tiles) * bin_columns() + tile.x / view.bin_tiles;
     let words = bin_words();
     var sum = to_rgba(view.base, 1.0);
@@ -343,9 +352,68 @@ fn render(
             workgroupBarrier();
         }
     }
-    if (all(pixel < view.size)) {
+    return sum;
+}
+
+// What a pixel of the output gets of the pixels of a tile of the grid, each as much as they overlap.
+fn part_of(tile: vec2<u32>, pixel: vec2<u32>) -> vec4<f32> {
+    let low = view.offset + vec2<f32>(pixel) * view.ratio;
+    let high = low + view.ratio;
+    let corner = tile * TILE;
+    let first = max(vec2<u32>(low), corner);
+    let end = min(vec2<u32>(ceil(high)), min(corner + TILE, view.size));
+    var sum = vec4(0.0);
+    for (var y = first.y; y < end.y; y++) {
+        var row = vec4(0.0);
+        for (var x = first.x; x < end.x; x++) {
+            let overlap = min(high.x, f32(x + 1u)) - max(low.x, f32(x));
+            row += max(overlap, 0.0) * values[(y - corner.y) * TILE + (x - corner.x)];
+        }
+        let overlap = min(high.y, f32(y + 1u)) - max(low.y, f32(y));
+        sum += max(overlap, 0.0) * row;
+    }
+    return sum;
+}
+
+// The average of the grid over a pixel of the output, in which colours count times their alpha (spec,
+// section 9.5). All invocations of the workgroup, which has this tile of the output, call it together.
+fn average(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> vec4<f32> {
+    let pixels = min((tile + 1u) * TILE, view.pixels);
+    let low = view.offset + vec2<f32>(tile * TILE) * view.ratio;
+    let high = view.offset + vec2<f32>(pixels) * view.ratio;
+    let first = vec2<u32>(low) / TILE;
+    let end = min((vec2<u32>(ceil(high)) + TILE - 1u) / TILE, tiles());
+    var sum = vec4(0.0);
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            let value = clamp(sum_at(vec2(x, y), within, invocation), vec4(0.0), vec4(1.0));
+            values[invocation] = vec4(value.rgb * (value.a + LEAST_WEIGHT), value.a);
+            workgroupBarrier();
+            sum += part_of(vec2(x, y), tile * TILE + within);
+            // What follows writes to the same memory.
+            workgroupBarrier();
+        }
+    }
+    let mean = sum / (view.ratio.x * view.ratio.y);
+    return vec4(mean.rgb / (mean.a + LEAST_WEIGHT), mean.a);
+}
+
+@compute @workgroup_size(16, 16)
+fn render(
+    @builtin(workgroup_id) tile: vec3<u32>,
+    @builtin(local_invocation_id) within: vec3<u32>,
+    @builtin(local_invocation_index) invocation: u32,
+) {
+    var color: vec4<f32>;
+    if (all(view.ratio == vec2(1.0))) {
+        color = sum_at(tile.xy, within.xy, invocation);
+    } else {
+        color = average(tile.xy, within.xy, invocation);
+    }
+    let pixel = tile.xy * TILE + within.xy;
+    if (all(pixel < view.pixels)) {
         // Rounded here, since textures may round halves otherwise.
-        let samples = floor(clamp(sum, vec4(0.0), vec4(1.0)) * 255.0 + 0.5);
+        let samples = floor(clamp(color, vec4(0.0), vec4(1.0)) * 255.0 + 0.5);
         textureStore(output, pixel, samples / 255.0);
     }
 }

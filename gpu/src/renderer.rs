@@ -187,7 +187,7 @@ impl GpuRenderer {
             pass.set_pipeline(&self.pipelines.prepare);
             pass.dispatch_workgroups(frame.gaussians.div_ceil(PREPARE), 1, 1);
             pass.set_pipeline(&self.pipelines.render);
-            let [columns, rows] = frame.tiles();
+            let [columns, rows] = frame.workgroups();
             pass.dispatch_workgroups(columns, rows, 1);
         }
         encoder.finish()

@@ -54,9 +54,53 @@ impl View {
         if !inside(region.x, region.width, width) || !inside(region.y, region.height, height) {
             return Err(RequestError::Region { region, width, height });
         }
-        let scale = [width as f32 / header.width as f32, height as f32 / header.height as f32];
         let gaussians = self.prefix.map_or(gaussians, |count| count.min(gaussians));
-        Ok(Frame { scale, region, gaussians })
+        let columns = Axis::new(header.width, width, (region.x, region.width));
+        let rows = Axis::new(header.height, height, (region.y, region.height));
+        let grid =
+            Region { x: columns.first, y: rows.first, width: columns.length, height: rows.length };
+        Ok(Frame {
+            scale: [columns.scale, rows.scale],
+            grid,
+            region,
+            ratio: [columns.ratio, rows.ratio],
+            offset: [columns.offset, rows.offset],
+            gaussians,
+        })
+    }
+}
+
+/// Most pixels of the grid for one output pixel along an axis.
+const MOST_PER_PIXEL: u64 = 8;
+
+/// One axis of a frame: see [`Frame`].
+struct Axis {
+    scale: f32,
+    first: u32,
+    length: u32,
+    ratio: f32,
+    offset: f32,
+}
+
+impl Axis {
+    /// The axis with the sides of the stored picture and of the output, and the first pixel and the
+    /// number of pixels of the region in the output (spec, sections 9.2 and 9.5).
+    fn new(stored: u32, output: u32, (start, length): (u32, u32)) -> Self {
+        let mut divisor = 1;
+        while MOST_PER_PIXEL * u64::from(output) * divisor < stored.into() {
+            divisor *= 2;
+        }
+        let grid = u64::from(stored).div_ceil(divisor).max(output.into());
+        let (from, to) = (u64::from(start) * grid, u64::from(start + length) * grid);
+        let side = u64::from(output);
+        let first = from / side;
+        Self {
+            scale: grid as f32 / stored as f32,
+            first: first as u32,
+            length: (to.div_ceil(side) - first) as u32,
+            ratio: (grid as f64 / side as f64) as f32,
+            offset: ((from % side) as f64 / side as f64) as f32,
+        }
     }
 }
 
@@ -68,17 +112,29 @@ pub(crate) const MAX_BINS: u32 = 16;
 /// A view of a picture whose request was checked.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
-    /// Pixels of the output for one stored pixel, along x and y.
+    /// Pixels of the grid for one stored pixel, along x and y. The grid is what is evaluated: the
+    /// output, or what a smaller output is the average of.
     pub(crate) scale: [f32; 2],
+    /// What is evaluated, in pixels of the grid.
+    pub(crate) grid: Region,
     /// What is drawn, in pixels of the output.
     pub(crate) region: Region,
+    /// Pixels of the grid for one of the output.
+    pub(crate) ratio: [f32; 2],
+    /// Where `region` begins, in pixels of the grid from the corner of `grid`.
+    pub(crate) offset: [f32; 2],
     /// How many Gaussians are drawn.
     pub(crate) gaussians: u32,
 }
 
 impl Frame {
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles of the grid.
     pub(crate) fn tiles(&self) -> [u32; 2] {
+        [self.grid.width, self.grid.height].map(|side| side.div_ceil(TILE))
+    }
+
+    /// Columns and rows of workgroups: tiles of the output.
+    pub(crate) fn workgroups(&self) -> [u32; 2] {
         [self.region.width, self.region.height].map(|side| side.div_ceil(TILE))
     }
 

@@ -7,13 +7,13 @@ use crate::view::{Frame, TILE};
 /// Evaluations of the kernel that take as long as the test whether a splat touches a tile.
 const TEST: u64 = 4;
 
-/// Evaluations for each pixel that are always allowed: twice those of the decoder, as tiles are four
+/// Evaluations for each pixel of the grid that are always allowed: twice those of the decoder, as tiles are four
 /// times as large.
 const PER_PIXEL: u64 = 128;
 
 /// The most kernel evaluations of a rendering with a limit of those beyond [`PER_PIXEL`].
 pub(crate) fn allowed(frame: &Frame, max_work: u64) -> u64 {
-    let pixels = u64::from(frame.region.width) * u64::from(frame.region.height);
+    let pixels = u64::from(frame.grid.width) * u64::from(frame.grid.height);
     pixels.saturating_mul(PER_PIXEL).saturating_add(max_work)
 }
 
@@ -31,8 +31,8 @@ fn of_gaussian(gaussian: &Gaussian, frame: &Frame, kernel: Kernel) -> u64 {
     let radius = kernel.cutoff().sqrt();
     let height = l21.hypot(l22);
     let [x, y] = gaussian.center;
-    let columns = Span::new(x * sx, radius * l11, frame.region.x, frame.region.width);
-    let rows = Span::new(y * sy, radius * height, frame.region.y, frame.region.height);
+    let columns = Span::new(x * sx, radius * l11, frame.grid.x, frame.grid.width);
+    let rows = Span::new(y * sy, radius * height, frame.grid.y, frame.grid.height);
     let (Some(columns), Some(rows)) = (columns, rows) else { return 0 };
     // In a row of tiles, an ellipse is as wide as its chord, and moves by its slope. Both ends may
     // lie within a tile.
@@ -76,7 +76,9 @@ mod tests {
     use super::*;
 
     fn frame(width: u32, height: u32) -> Frame {
-        Frame { scale: [1.0; 2], region: Region { x: 0, y: 0, width, height }, gaussians: 1 }
+        let region = Region { x: 0, y: 0, width, height };
+        let [scale, ratio, offset] = [[1.0; 2], [1.0; 2], [0.0; 2]];
+        Frame { scale, grid: region, region, ratio, offset, gaussians: 1 }
     }
 
     fn gaussian(center: [f32; 2], cholesky: [f32; 3]) -> Gaussian {

@@ -88,10 +88,10 @@ fn too_much_work_is_refused() {
     let error = renderer.render(&picture, &View::new()).expect_err("2e10 evaluations");
     assert!(matches!(error, RenderError::Work { wanted, allowed } if wanted > allowed), "{error}");
     // A small output is little work.
-    renderer.render(&picture, &View::new().with_size(16, 16)).expect("5e6 evaluations");
+    renderer.render(&picture, &View::new().with_size(16, 16)).expect("3e8 evaluations");
     let strict = renderer.with_max_work(1000);
-    let error = strict.render(&picture, &View::new().with_size(16, 16)).expect_err("5e6");
-    assert!(matches!(error, RenderError::Work { allowed: 33_768, .. }), "{error}");
+    let error = strict.render(&picture, &View::new().with_size(16, 16)).expect_err("3e8");
+    assert!(matches!(error, RenderError::Work { allowed: 2_098_152, .. }), "{error}");
 }
 
 #[test]

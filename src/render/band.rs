@@ -116,11 +116,6 @@ impl Bands {
         self.grid.columns
     }
 
-    /// The number of bands.
-    pub(crate) fn count(&self) -> usize {
-        self.grid.rows.div_ceil(BAND_ROWS)
-    }
-
     /// The number of rows of tiles in a band: the last band may have fewer than the others.
     pub(crate) fn rows(&self, band: usize) -> usize {
         BAND_ROWS.min(self.grid.rows - band * BAND_ROWS)

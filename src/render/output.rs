@@ -239,3 +239,34 @@ pub(super) fn write_planes(
         }
     }
 }
+
+/// Converts a row of means, channels x width, to interleaved samples.
+pub(super) fn write_means<T: Sample>(means: &[f32], sources: &[Option<usize>], out: &mut [T]) {
+    let width = out.len() / sources.len();
+    for (channel, source) in sources.iter().enumerate() {
+        let samples = out.iter_mut().skip(channel).step_by(sources.len());
+        match source {
+            Some(plane) => samples
+                .zip(&means[plane * width..])
+                .for_each(|(sample, &mean)| *sample = T::from_unit(mean)),
+            None => samples.for_each(|sample| *sample = T::OPAQUE),
+        }
+    }
+}
+
+/// Copies a row of means, channels x width, to row `y` of planes.
+pub(super) fn write_mean_planes(
+    means: &[f32],
+    y: usize,
+    sources: &[Option<usize>],
+    strips: &mut [&mut [f32]],
+    width: usize,
+) {
+    for (source, strip) in sources.iter().zip(strips) {
+        let line = &mut strip[y * width..][..width];
+        match source {
+            Some(plane) => line.copy_from_slice(&means[plane * width..][..width]),
+            None => line.fill(1.0),
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! What to render: output size, region, colour model, number of Gaussians (spec, sections 9.1 and
 //! 9.2).
 
+use super::axis::Axis;
 use crate::color::ColorModel;
 use crate::container::Header;
 use crate::error::{DecodeError, MAX_OUTPUT_SIDE, RequestError};
@@ -43,11 +44,12 @@ impl RenderOptions {
         Self::default()
     }
 
-    /// Renders the whole picture with `width` x `height` pixels, each 1 to 2^23. The Gaussians are
-    /// evaluated at the centres of these pixels; nothing is resampled. Along an axis that is made
-    /// smaller, each Gaussian is first widened by the variance of the larger pixels, against
-    /// aliasing (spec, section 9.2). For a detail of a very large output, add
-    /// [`RenderOptions::with_region`].
+    /// Renders the whole picture with `width` x `height` pixels, each 1 to 2^23. A larger output is
+    /// evaluated at the centres of its pixels; nothing is resampled. A smaller one is the average by
+    /// area of the picture at its stored size, in which colours count times their alpha; below an
+    /// eighth, of the picture at a half of its stored size, a quarter, and so on, with Gaussians
+    /// widened by the variance of the larger pixels (spec, section 9.2). For a detail of a very
+    /// large output, add [`RenderOptions::with_region`].
     pub fn with_size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self
@@ -134,20 +136,26 @@ impl RenderOptions {
             return Err(RequestError::Region { region, width, height }.into());
         }
         limits.check_size(region.width, region.height)?;
-        Ok(View::new((header.width, header.height), (width, height), region, header.kernel))
+        let view = View::new((header.width, header.height), (width, height), region, header.kernel);
+        limits.check_pixels(view.region.pixels())?;
+        Ok(view)
     }
 }
 
 /// Where Gaussians are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
-    /// Output pixels per stored pixel, along x and y.
+    /// Pixels of the grid per stored pixel, along x and y.
     pub(crate) scale: [f32; 2],
-    /// (fx, fy): what minification adds to the covariance along x and y, in square output pixels
-    /// (spec, section 9.2).
+    /// (fx, fy): what minification adds to the covariance along x and y, in square pixels
+    /// of the grid (spec, section 9.2).
     pub(crate) filter: [f32; 2],
-    /// The region that is rendered, in output pixels.
+    /// The part of the grid that is rendered.
     pub(crate) region: Region,
+    /// The part of the output that is rendered.
+    pub(crate) output: Region,
+    /// The whole output along x and y.
+    pub(super) axes: [Axis; 2],
 }
 
 impl View {
@@ -158,11 +166,27 @@ impl View {
         region: Region,
         kernel: Kernel,
     ) -> Self {
-        let scale = [output.0 as f32 / stored.0 as f32, output.1 as f32 / stored.1 as f32];
-        // The variance of an output pixel is 1/12. That of a stored pixel is in the Gaussians
+        let axes = [Axis::new(stored.0, output.0), Axis::new(stored.1, output.1)];
+        let scale =
+            [axes[0].grid() as f32 / stored.0 as f32, axes[1].grid() as f32 / stored.1 as f32];
+        // The variance of a pixel of the grid is 1/12. That of a stored pixel is in the Gaussians
         // already.
         let divisor = 12.0 * kernel.variance();
         let filter = scale.map(|s| if s < 1.0 { (1.0 - s * s) / divisor } else { 0.0 });
-        Self { scale, filter, region }
+        let columns = axes[0].span(region.x..region.x + region.width);
+        let rows = axes[1].span(region.y..region.y + region.height);
+        let of_grid = Region {
+            x: columns.start,
+            y: rows.start,
+            width: columns.end - columns.start,
+            height: rows.end - rows.start,
+        };
+        Self { scale, filter, region: of_grid, output: region, axes }
+    }
+
+    /// Whether the output is smaller than the stored picture along an axis, and averaged from the
+    /// grid.
+    pub(super) fn is_reduced(&self) -> bool {
+        self.axes.iter().any(|axis| axis.is_reduced())
     }
 }

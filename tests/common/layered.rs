@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use image_gip::Region;
 
 use super::entropy::{Code, Grid};
+use super::oracle::{grid, parts};
 use super::{File, Ghdr, RGB, Random, chunk, of_chunks};
 
 pub(crate) const SIZE: (u32, u32) = (300, 200);
@@ -62,12 +63,20 @@ pub(crate) fn decoded(mut decodes: impl FnMut(&[u8]) -> bool) -> Vec<usize> {
     (0..LAYERS).filter(|&layer| !decodes(&damaged(&[layer]))).collect()
 }
 
-/// The layers that may show in a region of an output of this size (section 5.6): eight pixels beside
-/// their bounds, and further where the output is small.
+/// The layers that may show in a region of an output of this size (section 5.6): eight pixels of the
+/// grid beside their bounds, and further where the grid is coarse.
 pub(crate) fn showing(size: (u32, u32), region: Region) -> Vec<usize> {
     let entries = chunks()[BEFORE - 1][8..][..4 * LAYERS].to_vec();
-    let axes =
-        [(size.0, SIZE.0, region.x, region.width), (size.1, SIZE.1, region.y, region.height)];
+    let axis = |side, stored, start, length| {
+        let of_grid = grid(stored, side);
+        let (first, _) = parts(start, of_grid, side)[0];
+        let &(last, _) = parts(start + length - 1, of_grid, side).last().expect("a pixel");
+        (of_grid, stored, first, last + 1 - first)
+    };
+    let axes = [
+        axis(size.0, SIZE.0, region.x, region.width),
+        axis(size.1, SIZE.1, region.y, region.height),
+    ];
     let shows = |layer: &usize| {
         axes.into_iter().enumerate().all(|(axis, (side, stored, start, length))| {
             let [first, last] = [0, 2].map(|end| f64::from(entries[4 * layer + axis + end]));
@@ -92,7 +101,7 @@ pub(crate) fn regions() -> [((u32, u32), Region, usize); 8] {
         (SIZE, region(0, 120, 300, 1), 10),
         ((3000, 2000), region(1200, 900, 100, 100), 4),
         // Of a small picture, and of one that is large along one axis and small along the other.
-        ((75, 50), region(60, 40, 5, 5), 6),
+        ((75, 50), region(60, 40, 5, 5), 3),
         ((1500, 100), region(1400, 0, 100, 100), 4),
         (SIZE, region(0, 0, 300, 200), LAYERS),
     ]

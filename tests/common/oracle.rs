@@ -80,8 +80,81 @@ fn is_drawable(center: [f32; 2], [l11, l21, l22]: [f32; 3], color: &[f32]) -> bo
         && color.iter().all(|c| (-65536.0..=65536.0).contains(c))
 }
 
-/// Sections 9.1 to 9.4: one plane per channel.
+/// Section 9.2: the side of the grid.
+pub(crate) fn grid(stored: u32, output: u32) -> u32 {
+    if output >= stored {
+        return output;
+    }
+    let halvings = (0..).find(|halvings| (u64::from(output) << (3 + halvings)) >= stored.into());
+    stored.div_ceil(1 << halvings.expect("it is below 2^20"))
+}
+
+/// Section 9.5: the pixels of the grid that are in one of the output, and by how much.
+pub(crate) fn parts(pixel: u32, grid: u32, output: u32) -> Vec<(u32, f32)> {
+    let (start, end) = (u64::from(pixel) * u64::from(grid), u64::from(pixel + 1) * u64::from(grid));
+    let side = u64::from(output);
+    let touched = start / side..end.div_ceil(side);
+    touched
+        .map(|at| (at as u32, (end.min((at + 1) * side) - start.max(at * side)) as f32))
+        .collect()
+}
+
+/// Sections 9.1 to 9.5: one plane per channel.
 pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
+    let stored = (file.header.width, file.header.height);
+    let size = (grid(stored.0, request.size.0), grid(stored.1, request.size.1));
+    if size == request.size {
+        return sums(file, request);
+    }
+    let (left, top, width, height) = request.region;
+    let columns: Vec<_> = (left..left + width).map(|x| parts(x, size.0, request.size.0)).collect();
+    let rows: Vec<_> = (top..top + height).map(|y| parts(y, size.1, request.size.1)).collect();
+    let first = |parts: &[Vec<(u32, f32)>]| parts[0][0].0;
+    let count = |parts: &[Vec<(u32, f32)>]| {
+        parts.last().and_then(|parts| parts.last()).expect("a pixel").0 + 1 - first(parts)
+    };
+    let region = (first(&columns), first(&rows), count(&columns), count(&rows));
+    let mut planes = sums(file, &Request { size, region, prefix: request.prefix });
+    for sum in planes.iter_mut().flatten() {
+        *sum = sum.clamp(0.0, 1.0);
+    }
+    let channels = planes.len();
+    let has_alpha = channels % 2 == 0;
+    let least = 1.0 / 65536.0;
+    if has_alpha {
+        let (alpha, colors) = planes.split_last_mut().expect("an even number of channels");
+        for (color, alpha) in colors.iter_mut().flat_map(|plane| plane.iter_mut().zip(&*alpha)) {
+            *color *= alpha + least;
+        }
+    }
+    let mut means: Vec<Vec<f32>> = vec![Vec::new(); channels];
+    for rows in &rows {
+        for columns in &columns {
+            for (plane, means) in planes.iter().zip(&mut means) {
+                let mut mean = 0.0;
+                for &(column, of_column) in columns {
+                    let mut sum = 0.0;
+                    for &(row, of_row) in rows {
+                        let at = (row - region.1) * region.2 + (column - region.0);
+                        sum += of_row * plane[at as usize];
+                    }
+                    mean += of_column * (sum / size.1 as f32);
+                }
+                means.push(mean / size.0 as f32);
+            }
+        }
+    }
+    if has_alpha {
+        let (alpha, colors) = means.split_last_mut().expect("an even number of channels");
+        for (color, alpha) in colors.iter_mut().flat_map(|plane| plane.iter_mut().zip(&*alpha)) {
+            *color /= alpha + least;
+        }
+    }
+    means
+}
+
+/// Sections 9.2 to 9.4, where the size of the request is that of the grid.
+fn sums(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let header = &file.header;
     let scale =
         [request.size.0 as f32 / header.width as f32, request.size.1 as f32 / header.height as f32];

@@ -56,10 +56,10 @@ export class GpuPainter {
     return this.#renderer.setPicture(header, numbers);
   }
 
-  canPaint({ frame: { window } }) {
+  canPaint({ frame: { window, level } }) {
     const { maxTextureDimension2D } = this.device.limits;
     const fits = Math.max(window.width, window.height) <= maxTextureDimension2D;
-    return fits && this.#renderer.canRender(window.width * window.height);
+    return fits && this.#renderer.canRender(level, window.width * window.height);
   }
 
   /** Paints a frame to the canvas, or to another texture of its format and the window's size. */

@@ -11,11 +11,25 @@ const MOST_BINS = 16;
 const PREPARE = 256;
 const KERNELS = { exponential: 0, quartic: 1 };
 
-/** The tiles and bins of a rendering, as the shader divides it. */
-function divide({ width, height }) {
+/** Most pixels of the grid for one of the output along an axis. */
+const MOST_PER_PIXEL = 8;
+
+/** One axis of the grid that an output is evaluated on, and what of it a part covers (spec, section 9.2). */
+function axis(stored, output, start, length) {
+  let divisor = 1;
+  while (MOST_PER_PIXEL * output * divisor < stored) divisor *= 2;
+  const grid = Math.max(output, Math.ceil(stored / divisor));
+  const ratio = grid / output;
+  const first = Math.floor((start * grid) / output);
+  const end = Math.ceil(((start + length) * grid) / output);
+  return { scale: grid / stored, ratio, first, length: end - first, offset: start * ratio - first };
+}
+
+/** The tiles and bins of what is evaluated of the grid, as the shader divides it. */
+function divide(width, height) {
   const [columns, rows] = [Math.ceil(width / TILE), Math.ceil(height / TILE)];
   const binTiles = Math.ceil(Math.max(columns, rows) / MOST_BINS);
-  return { columns, rows, binTiles, bins: Math.ceil(columns / binTiles) * Math.ceil(rows / binTiles) };
+  return { binTiles, bins: Math.ceil(columns / binTiles) * Math.ceil(rows / binTiles) };
 }
 
 export class GpuRenderer {
@@ -52,7 +66,7 @@ export class GpuRenderer {
     this.#layout = layout;
     this.#prepare = prepare;
     this.#render = render;
-    this.#view = device.createBuffer({ size: 64, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
+    this.#view = device.createBuffer({ size: 96, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   }
 
   /** Takes a picture: its header and nine numbers for each Gaussian, both turned. Returns whether it can. */
@@ -79,9 +93,12 @@ export class GpuRenderer {
     this.#picture = null;
   }
 
-  /** Whether there is a picture, and so many pixels of it are little enough work. */
-  canRender(pixels) {
-    return this.#picture !== null && this.#picture.overlap * pixels <= MOST_WORK;
+  /** Whether there is a picture, and so many pixels of a level of it are little enough work. */
+  canRender(level, pixels) {
+    if (this.#picture === null) return false;
+    const { header, overlap } = this.#picture;
+    const [x, y] = ['width', 'height'].map((side) => axis(header[side], level[side], 0, level[side]).ratio);
+    return overlap * pixels * x * y <= MOST_WORK;
   }
 
   /** What `record` needs to render the picture to a texture. */
@@ -97,8 +114,11 @@ export class GpuRenderer {
    * to the corner of the texture of `bindings`.
    */
   record(encoder, { level, region, gaussians }, bindings) {
-    const { columns, rows, binTiles, bins } = divide(region);
-    this.#writeView({ level, region, gaussians, binTiles });
+    const { header } = this.#picture;
+    const x = axis(header.width, level.width, region.x, region.width);
+    const y = axis(header.height, level.height, region.y, region.height);
+    const { binTiles, bins } = divide(x.length, y.length);
+    this.#writeView({ x, y, region, gaussians, binTiles });
     const used = 4 * Math.ceil(gaussians / 32) * bins;
     if (used > 0) encoder.clearBuffer(this.#picture.bins, 0, used);
     const pass = encoder.beginComputePass();
@@ -106,23 +126,25 @@ export class GpuRenderer {
     pass.setPipeline(this.#prepare);
     pass.dispatchWorkgroups(Math.ceil(gaussians / PREPARE));
     pass.setPipeline(this.#render);
-    pass.dispatchWorkgroups(columns, rows);
+    pass.dispatchWorkgroups(Math.ceil(region.width / TILE), Math.ceil(region.height / TILE));
     pass.end();
   }
 
   /** Fills the uniform `View` of the shader. */
-  #writeView({ level, region, gaussians, binTiles }) {
+  #writeView({ x, y, region, gaussians, binTiles }) {
     const { header } = this.#picture;
-    const view = new DataView(new ArrayBuffer(64));
+    const view = new DataView(new ArrayBuffer(96));
     const floats = (offset, values) =>
       values.forEach((value, index) => view.setFloat32(offset + 4 * index, value, true));
     const integers = (offset, values) =>
       values.forEach((value, index) => view.setUint32(offset + 4 * index, value, true));
-    floats(0, [level.width / header.width, level.height / header.height, region.x, region.y]);
-    integers(16, [region.width, region.height, gaussians, binTiles]);
+    floats(0, [x.scale, y.scale, x.first, y.first]);
+    integers(16, [x.length, y.length, gaussians, binTiles]);
     floats(32, header.baseColor.map((value) => value / 65535));
     integers(48, [header.channels, KERNELS[header.kernel]]);
     floats(56, [header.cutoff]);
+    floats(64, [x.ratio, y.ratio, x.offset, y.offset]);
+    integers(80, [region.width, region.height]);
     this.#device.queue.writeBuffer(this.#view, 0, view.buffer);
   }
 }

@@ -179,7 +179,7 @@ def test_limits(file: bytes) -> None:
         image_gip.decode(file, size=(70_000, 10))
     assert raised.value.allowed == Limits().max_width
     with pytest.raises(image_gip.LimitError, match="kernel evaluations"):
-        image_gip.decode(file, size=(1, 1), limits=Limits(max_work=10))
+        image_gip.decode(file, region=(40, 30, 1, 1), limits=Limits(max_work=10))
     with pytest.raises(image_gip.LimitError, match="bytes of memory"):
         image_gip.gaussians(file, limits=Limits(max_memory=10))
     decoded = image_gip.decode(file, size=(70_000, 10), limits=Limits.none())
