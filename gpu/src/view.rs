@@ -87,7 +87,7 @@ impl Axis {
     /// number of pixels of the region in the output (spec, sections 9.2 and 9.5).
     fn new(stored: u32, output: u32, (start, length): (u32, u32)) -> Self {
         let mut divisor = 1;
-        while MOST_PER_PIXEL * u64::from(output) * divisor < stored.into() {
+        while MOST_PER_PIXEL * (u64::from(output) + 1) * divisor < stored.into() {
             divisor *= 2;
         }
         let grid = u64::from(stored).div_ceil(divisor).max(output.into());

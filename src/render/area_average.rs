@@ -20,6 +20,10 @@ pub(crate) struct AreaAverage {
     sums: Vec<f32>,
     /// A row of the output: channels x width.
     means: Vec<f32>,
+    /// For each pixel of a row of the output, the columns of `sums` that it covers.
+    spans: Vec<Range<usize>>,
+    /// What is the same of each pixel of the output and of each column of its span.
+    overlaps: Vec<f32>,
 }
 
 /// How a picture is averaged: its axes, the part that is rendered, and its channels.
@@ -41,8 +45,11 @@ impl Averaging {
     /// The memory of an [`AreaAverage`] in bytes.
     pub(crate) fn memory(&self) -> u64 {
         let width = self.grid_columns().len() as u64;
-        let samples = width * (TILE_HEIGHT as u64 + 1) + u64::from(self.columns.1);
-        samples * (self.channels * size_of::<f32>()) as u64
+        let pixels = u64::from(self.columns.1);
+        let samples = (width * (TILE_HEIGHT as u64 + 1) + pixels) * self.channels as u64;
+        // A column of the grid may be in two pixels of the output.
+        let overlaps = width + pixels;
+        (samples + overlaps) * size_of::<f32>() as u64 + pixels * size_of::<Range<usize>>() as u64
     }
 }
 
@@ -54,6 +61,14 @@ impl AreaAverage {
         self.sums.clear();
         self.sums.resize(averaging.channels * width, 0.0);
         self.means.resize(averaging.channels * averaging.columns.1 as usize, 0.0);
+        self.spans.clear();
+        self.overlaps.clear();
+        let (axis, first) = (averaging.axes[0], averaging.grid_columns().start);
+        for pixel in averaging.columns.0..averaging.columns.0 + averaging.columns.1 {
+            let span = axis.span(pixel..pixel + 1);
+            self.spans.push((span.start - first) as usize..(span.end - first) as usize);
+            self.overlaps.extend(span.map(|column| axis.overlap(pixel, column)));
+        }
     }
 
     /// Takes a pair of tiles whose first column is `x`: clamps the sums, and multiplies colours by
@@ -105,17 +120,17 @@ impl AreaAverage {
     /// row.
     fn finish(&mut self, averaging: &Averaging) {
         let [columns, rows] = averaging.axes;
-        let first = averaging.grid_columns().start;
         let (width, of_grid) = (averaging.columns.1 as usize, averaging.grid_columns().len());
         self.sums.iter_mut().for_each(|sum| *sum /= rows.grid() as f32);
-        for (pixel, x) in (averaging.columns.0..).zip(0..width) {
-            for channel in 0..averaging.channels {
-                let sums = &self.sums[channel * of_grid..];
-                let span = columns.span(pixel..pixel + 1);
-                let sum = span.fold(0.0, |sum, column| {
-                    sum + columns.overlap(pixel, column) * sums[(column - first) as usize]
-                });
-                self.means[channel * width + x] = sum / columns.grid() as f32;
+        for (means, sums) in self.means.chunks_exact_mut(width).zip(self.sums.chunks_exact(of_grid))
+        {
+            let mut overlaps = &self.overlaps[..];
+            for (mean, span) in means.iter_mut().zip(&self.spans) {
+                let (of_pixel, others) = overlaps.split_at(span.len());
+                let products = of_pixel.iter().zip(&sums[span.clone()]);
+                let sum = products.fold(0.0, |sum, (overlap, value)| sum + overlap * value);
+                *mean = sum / columns.grid() as f32;
+                overlaps = others;
             }
         }
         if averaging.has_alpha {

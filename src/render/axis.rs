@@ -21,7 +21,8 @@ impl Axis {
     pub(crate) fn new(stored: u32, output: u32) -> Self {
         let (stored, output) = (u64::from(stored), u64::from(output));
         let mut divisor = 1;
-        while MOST_PER_PIXEL * output * divisor < stored {
+        // An eighth of a side may have been rounded down.
+        while MOST_PER_PIXEL * (output + 1) * divisor < stored {
             divisor *= 2;
         }
         Self { output, grid: stored.div_ceil(divisor).max(output) }

@@ -85,7 +85,8 @@ pub(crate) fn grid(stored: u32, output: u32) -> u32 {
     if output >= stored {
         return output;
     }
-    let halvings = (0..).find(|halvings| (u64::from(output) << (3 + halvings)) >= stored.into());
+    let halvings =
+        (0..).find(|halvings| ((u64::from(output) + 1) << (3 + halvings)) >= stored.into());
     stored.div_ceil(1 << halvings.expect("it is below 2^20"))
 }
 

@@ -17,7 +17,7 @@ const MOST_PER_PIXEL = 8;
 /** One axis of the grid that an output is evaluated on, and what of it a part covers (spec, section 9.2). */
 function axis(stored, output, start, length) {
   let divisor = 1;
-  while (MOST_PER_PIXEL * output * divisor < stored) divisor *= 2;
+  while (MOST_PER_PIXEL * (output + 1) * divisor < stored) divisor *= 2;
   const grid = Math.max(output, Math.ceil(stored / divisor));
   const ratio = grid / output;
   const first = Math.floor((start * grid) / output);
