@@ -120,7 +120,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
         *sum = sum.clamp(0.0, 1.0);
     }
     let channels = planes.len();
-    let has_alpha = channels % 2 == 0;
+    let has_alpha = channels.is_multiple_of(2);
     let least = 1.0 / 65536.0;
     if has_alpha {
         let (alpha, colors) = planes.split_last_mut().expect("an even number of channels");
