@@ -91,11 +91,11 @@ impl<'a> PreparedRender<'a> {
         self.sort(&mut strips);
         threads::for_each(threads, strips, |memory: &mut Memory, (strip, out)| {
             match &self.averaging {
-                None => self.band(&mut memory.band, strip, |planes, x, y| {
+                None => self.band(&mut memory.band, strip, &mut |planes, x, y| {
                     let mut destination = Destination { x, rows: &mut out[y * stride..], stride };
                     output::write_interleaved(self.backend, planes, self.sources, &mut destination);
                 }),
-                Some(averaging) => self.averaged(memory, averaging, strip, |y, means| {
+                Some(averaging) => self.averaged(memory, averaging, strip, &mut |y, means| {
                     output::write_means(means, self.sources, &mut out[y * stride..][..stride]);
                 }),
             }
@@ -120,10 +120,10 @@ impl<'a> PreparedRender<'a> {
         self.sort(&mut parts);
         threads::for_each(threads, parts, |memory: &mut Memory, (strip, mut part)| {
             match &self.averaging {
-                None => self.band(&mut memory.band, strip, |planes, x, y| {
+                None => self.band(&mut memory.band, strip, &mut |planes, x, y| {
                     output::write_planes(planes, (x, y), self.sources, &mut part, width);
                 }),
-                Some(averaging) => self.averaged(memory, averaging, strip, |y, means| {
+                Some(averaging) => self.averaged(memory, averaging, strip, &mut |y, means| {
                     output::write_mean_planes(means, y, self.sources, &mut part, width);
                 }),
             }
@@ -145,7 +145,7 @@ impl<'a> PreparedRender<'a> {
         memory: &mut Memory,
         averaging: &Averaging,
         strip: usize,
-        mut write: impl FnMut(usize, &[f32]),
+        write: &mut dyn FnMut(usize, &[f32]),
     ) {
         let View { region: grid, output, axes, .. } = self.input.view;
         let first = output.y + (strip * self.strip_height()) as u32;
@@ -163,7 +163,7 @@ impl<'a> PreparedRender<'a> {
                 if inside.is_empty() {
                     continue;
                 }
-                self.row(of_band, band, tiles, |planes, x| average.take(averaging, planes, x));
+                self.row(of_band, band, tiles, &mut |planes, x| average.take(averaging, planes, x));
                 for line in inside {
                     let of_grid = grid.y + line as u32;
                     // A row of the grid may be in two rows of the output.
@@ -185,11 +185,11 @@ impl<'a> PreparedRender<'a> {
         &self,
         memory: &mut Band,
         band: usize,
-        mut write: impl FnMut(&[PairPlane], usize, usize),
+        write: &mut dyn FnMut(&[PairPlane], usize, usize),
     ) {
         memory.prepare(&self.bands, band, &self.input, self.backend);
         for row in 0..self.bands.rows(band) {
-            self.row(memory, band, row, |planes, x| write(planes, x, row * TILE_HEIGHT));
+            self.row(memory, band, row, &mut |planes, x| write(planes, x, row * TILE_HEIGHT));
         }
     }
 
@@ -200,7 +200,7 @@ impl<'a> PreparedRender<'a> {
         memory: &mut Band,
         band: usize,
         row: usize,
-        write: impl FnMut(&[PairPlane], usize),
+        write: &mut dyn FnMut(&[PairPlane], usize),
     ) {
         match self.channels {
             1 => self.row_of::<1>(memory, band, row, write),
@@ -216,7 +216,7 @@ impl<'a> PreparedRender<'a> {
         memory: &mut Band,
         band: usize,
         row: usize,
-        mut write: impl FnMut(&[PairPlane], usize),
+        write: &mut dyn FnMut(&[PairPlane], usize),
     ) {
         let base: [f32; CHANNELS] = core::array::from_fn(|channel| self.base[channel]);
         let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];

@@ -153,10 +153,11 @@ test('limits', () => {
   assert.throws(limited({ memory: 1000 }), LimitError);
   const small = (work) => opened(bytes, { limits: { work } }).render({ width: 1, height: 1 });
   // Counting ends with the first Gaussian that is too many.
-  const most = { limit: 'work', allowed: 12 * 8 * 64 + 1000 };
+  const most = { limit: 'work', allowed: 12 * 16 * 64 + 1000 };
   assert.throws(() => small(1000), most);
   assert.throws(() => small(1000), LimitError);
-  small(200 * 64 * 2);
+  // 200 Gaussians in 2 x 2 tiles.
+  small(200 * 4 * 64);
   assert.throws(limited({ outputPixels: 100 }), { limit: 'outputPixels', wanted: 6144, allowed: 100 });
   // Which one it was can be raised by its name.
   for (const [limit, size] of [['height', { width: 2, height: 65_537 }], ['width', { width: 65_537, height: 2 }]]) {
