@@ -24,6 +24,9 @@ export class GipImageElement extends HTMLElement {
   src: string;
   alt: string;
   loading: 'eager' | 'lazy';
+  crossOrigin: string | null;
+  referrerPolicy: string;
+  fetchPriority: string;
   /** The width of the content box in CSS pixels; setting it sets the attribute. */
   width: number;
   /** The height of the content box in CSS pixels; setting it sets the attribute. */
@@ -36,7 +39,11 @@ export class GipImageElement extends HTMLElement {
   readonly currentSrc: string;
   /** Whether the picture is shown, is broken, or there is none. */
   readonly complete: boolean;
-  /** Waits for the picture, as `load` and `error` tell of it. */
+  /**
+   * Waits until `load` would fire. It also loads a picture that is not in the page, at its natural size, or
+   * is lazy. Rejects with an `EncodingError` if there is no `src`, if it changes, if the element is taken
+   * out of the page meanwhile, and if the picture is broken: then the `cause` is the `error` of that event.
+   */
   decode(): Promise<void>;
 }
 

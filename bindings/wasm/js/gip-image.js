@@ -1,6 +1,6 @@
 // The element `<gip-image>`, which lays out like `<img>` and loads what its size needs.
 
-import { ImageAttributes } from './image-attributes.js';
+import { ImageAttributes, keyword } from './image-attributes.js';
 import { plan } from './layout.js';
 import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
@@ -13,10 +13,17 @@ export * from './index.js';
 /** While a picture arrives it is rendered anew with so many times the Gaussians. */
 const growth = 1.25;
 
+/** What `decode` rejects with, as that of `<img>` does. */
+const encodingError = (message, cause) =>
+  Object.assign(new DOMException(message, 'EncodingError'), { cause });
+
+/** The attributes that change how a file is fetched, so that it is loaded anew. */
+const reloads = ['crossorigin', 'referrerpolicy'];
+
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class GipImageElement extends ImageAttributes {
-  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'crossorigin'];
+  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', ...reloads];
 
   /** What a file may cost at most. A page may have set it before this script has come. */
   limits = this.limits;
@@ -41,8 +48,11 @@ export class GipImageElement extends ImageAttributes {
   /** The content box in CSS pixels, and in pixels of the screen. */
   #css = { width: 0, height: 0 };
   #device = { width: 0, height: 0 };
-  /** The size in pixels for which the loader was asked last. */
+  /** The size in pixels that the loader was asked for last, and the promise of its answer. */
   #asked = null;
+  #answer = null;
+  /** Those who wait for the picture: `resolve` and `reject` of their promises. */
+  #waiting = [];
   /** Whether something is being rendered. */
   #busy = false;
 
@@ -76,15 +86,20 @@ export class GipImageElement extends ImageAttributes {
     return this.#state === 'complete' || this.#state === 'broken' || !this.hasAttribute('src');
   }
 
-  /** Waits for the picture, as `load` and `error` tell of it. */
+  /** Waits for the picture. It is loaded for that even if it is not in the page, or lazy. */
   decode() {
-    if (this.#state === 'complete') return Promise.resolve();
     return new Promise((resolve, reject) => {
-      const options = { once: true };
-      if (this.#state === 'broken') reject(new DOMException('the picture is broken', 'EncodingError'));
-      this.addEventListener('load', () => resolve(), options);
-      this.addEventListener('error', ({ error }) => reject(error), options);
+      if (this.#state === 'complete') return resolve();
+      if (this.#state === 'broken') return reject(encodingError('the picture is broken'));
+      if (!this.hasAttribute('src')) return reject(encodingError('there is no attribute src'));
+      this.#waiting.push({ resolve, reject });
+      this.#refresh();
     });
+  }
+
+  /** Answers those who wait for the picture. */
+  #answerAll(error) {
+    for (const { resolve, reject } of this.#waiting.splice(0)) error ? reject(error) : resolve();
   }
 
   // Reactions.
@@ -119,7 +134,8 @@ export class GipImageElement extends ImageAttributes {
   }
 
   attributeChangedCallback(name, before, after) {
-    if (name === 'src' || (name === 'crossorigin' && before !== after)) this.#reset();
+    const changes = name === 'src' || (reloads.includes(name) && keyword(name, before) !== keyword(name, after));
+    if (changes) this.#reset();
     if (name === 'alt') this.#describe();
     this.#layOut();
     this.#refresh();
@@ -148,6 +164,7 @@ export class GipImageElement extends ImageAttributes {
 
   /** Forgets the picture. */
   #reset() {
+    this.#answerAll(encodingError('the picture was changed or removed'));
     this.#loader?.close();
     this.#loader = null;
     this.#header = this.#natural = null;
@@ -174,8 +191,9 @@ export class GipImageElement extends ImageAttributes {
   }
 
   #begin() {
-    if (!this.isConnected || !this.hasAttribute('src')) return;
-    if (this.loading === 'lazy' && !this.#near) return;
+    if (!this.hasAttribute('src')) return;
+    const due = this.isConnected && (this.loading === 'eager' || this.#near);
+    if (!due && this.#waiting.length === 0) return;
     this.#state = 'loading';
     let url;
     try {
@@ -191,9 +209,9 @@ export class GipImageElement extends ImageAttributes {
     const loader = new Loader(
       url,
       {
-        credentials: this.getAttribute('crossorigin') === 'use-credentials' ? 'include' : 'same-origin',
-        referrerPolicy: this.getAttribute('referrerpolicy') ?? '',
-        priority: this.getAttribute('fetchpriority') ?? 'auto',
+        credentials: this.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
+        referrerPolicy: this.referrerPolicy,
+        priority: this.fetchPriority,
       },
       this.limits,
       () => this.#arrived(loader),
@@ -202,7 +220,7 @@ export class GipImageElement extends ImageAttributes {
       },
     );
     this.#loader = loader;
-    loader.want(0);
+    loader.start();
   }
 
   /** Something has arrived. */
@@ -223,17 +241,21 @@ export class GipImageElement extends ImageAttributes {
   }
 
   /** Asks for the Gaussians that the size needs. */
-  async #want() {
+  #want() {
     const loader = this.#loader;
-    const { width, height } = this.#plan() ?? { width: 1, height: 1 };
-    if (equal(this.#asked, [width, height])) return;
-    this.#asked = [width, height];
-    try {
-      const gaussians = await loader.gaussiansFor(width, height);
-      if (this.#loader === loader) loader.want(gaussians);
-    } catch (error) {
-      if (this.#loader === loader) this.#fail(error);
+    const least = { width: 1, height: 1 };
+    // What is to be ready before it is in the page has no size yet but its own.
+    const { width, height } = this.#plan() ?? (this.isConnected ? least : inDevicePixels(this.#size));
+    if (!equal(this.#asked, [width, height])) {
+      this.#asked = [width, height];
+      this.#answer = loader.want(width, height).then(
+        () => void this.#paint(),
+        (error) => {
+          if (this.#loader === loader) this.#fail(error);
+        },
+      );
     }
+    return this.#answer;
   }
 
   #fail(error) {
@@ -244,6 +266,7 @@ export class GipImageElement extends ImageAttributes {
     this.#painting.clear();
     this.shadowRoot.replaceChildren(this.#alternative);
     this.#layOut();
+    this.#answerAll(encodingError(error.message, error));
     this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
   }
 
@@ -296,9 +319,10 @@ export class GipImageElement extends ImageAttributes {
     } finally {
       this.#busy = false;
     }
-    const settled = this.#near !== undefined && this.#header && !this.#loader?.lacking;
-    if (this.#state === 'loading' && settled) {
+    const placed = this.#near !== undefined || !this.isConnected;
+    if (this.#state === 'loading' && this.#header && placed && !this.#loader.lacking) {
       this.#state = 'complete';
+      this.#answerAll();
       this.dispatchEvent(new Event('load'));
     }
   }

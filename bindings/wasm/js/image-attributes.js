@@ -2,13 +2,37 @@
 
 import { contentSize } from './styles.js';
 
+/** The keywords of enumerated attributes. The first is what any other value means. */
+const keywords = {
+  loading: ['eager', 'lazy'],
+  crossorigin: ['anonymous', 'use-credentials'],
+  fetchpriority: ['auto', 'high', 'low'],
+  referrerpolicy: [
+    '',
+    'no-referrer',
+    'no-referrer-when-downgrade',
+    'same-origin',
+    'origin',
+    'strict-origin',
+    'origin-when-cross-origin',
+    'strict-origin-when-cross-origin',
+    'unsafe-url',
+  ],
+};
+
+/** What the value of an enumerated attribute means. */
+export function keyword(name, value) {
+  const lower = value?.toLowerCase();
+  return keywords[name].includes(lower) ? lower : keywords[name][0];
+}
+
 // Where there are no elements, as in Node, the module can be imported all the same.
 const Base = globalThis.HTMLElement ?? class {};
 
 export class ImageAttributes extends Base {
   get src() {
     const src = this.getAttribute('src');
-    return src ? new URL(src, document.baseURI).href : '';
+    return src ? new URL(src, this.baseURI).href : '';
   }
 
   set src(value) {
@@ -24,11 +48,37 @@ export class ImageAttributes extends Base {
   }
 
   get loading() {
-    return this.getAttribute('loading')?.toLowerCase() === 'lazy' ? 'lazy' : 'eager';
+    return keyword('loading', this.getAttribute('loading'));
   }
 
   set loading(value) {
     this.setAttribute('loading', value);
+  }
+
+  get crossOrigin() {
+    const value = this.getAttribute('crossorigin');
+    return value === null ? null : keyword('crossorigin', value);
+  }
+
+  set crossOrigin(value) {
+    if (value === null) this.removeAttribute('crossorigin');
+    else this.setAttribute('crossorigin', value);
+  }
+
+  get fetchPriority() {
+    return keyword('fetchpriority', this.getAttribute('fetchpriority'));
+  }
+
+  set fetchPriority(value) {
+    this.setAttribute('fetchpriority', value);
+  }
+
+  get referrerPolicy() {
+    return keyword('referrerpolicy', this.getAttribute('referrerpolicy'));
+  }
+
+  set referrerPolicy(value) {
+    this.setAttribute('referrerpolicy', value);
   }
 
   get width() {

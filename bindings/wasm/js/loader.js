@@ -14,7 +14,9 @@ export class Loader {
   #limits;
   #decoder;
   #abort = new AbortController();
+  /** How many Gaussians are wanted, which is not known while the decoder is being asked. */
   #wanted = 0;
+  #asking = 0;
   #fed = false;
   #running = false;
   #failed = false;
@@ -22,8 +24,8 @@ export class Loader {
   #onerror;
 
   /**
-   * `init` is that of `fetch`, `limits` those of the decoder. `onprogress` is called after every piece, and waited for: in it, `want`
-   * can say how far to go on. `onerror` is called with the error that ends it.
+   * `init` is that of `fetch`, `limits` those of the decoder. `onprogress` is called after every piece,
+   * and waited for: in it, `want` can say how far to go on. `onerror` is called with the error that ends it.
    */
   constructor(url, init, limits, onprogress, onerror) {
     this.#download = new Download(url, init);
@@ -40,17 +42,25 @@ export class Loader {
 
   /** Whether more is to arrive. */
   get lacking() {
-    return !this.complete && (this.orientation === null || this.arrived < this.#wanted);
+    if (this.complete) return false;
+    return this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted;
   }
 
-  /** Goes on, or stops, when this many Gaussians have arrived, and at least header and orientation. */
-  want(gaussians) {
-    this.#wanted = gaussians;
-    if (this.lacking && !this.#running && !this.#failed) void this.#run();
+  /** Begins, or goes on: until header and orientation are there, and what `want` asked for. */
+  start() {
+    const ended = this.#failed || this.#abort.signal.aborted;
+    if (this.lacking && !this.#running && !ended) void this.#run();
   }
 
-  gaussiansFor(width, height) {
-    return this.#decoder.gaussiansFor(width, height);
+  /** Goes on, or stops, when the Gaussians have arrived that an output of this size needs. */
+  async want(width, height) {
+    this.#asking += 1;
+    try {
+      this.#wanted = await this.#decoder.gaussiansFor(width, height);
+    } finally {
+      this.#asking -= 1;
+    }
+    this.start();
   }
 
   metadata() {
