@@ -8,6 +8,15 @@ export const isGip = (bytes) => SIGNATURE.every((byte, index) => bytes[index] ==
 /** A file of the disk: { name, stream }. */
 export const fromFile = (file) => ({ name: file.name, stream: file.stream() });
 
+/** The name that a part of an address stands for: itself, if it is not encoded. */
+function decoded(part) {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part;
+  }
+}
+
 /** A file of the web. */
 export async function fromUrl(address, signal) {
   const url = new URL(address, location.href);
@@ -18,7 +27,7 @@ export async function fromUrl(address, signal) {
     throw signal.aborted ? error : new Error(`${url} cannot be fetched: ${error.message}`);
   });
   if (!response.ok) throw new Error(`${url} cannot be fetched: the server answers ${response.status}`);
-  const name = decodeURIComponent(url.pathname.split('/').pop()) || url.host;
+  const name = decoded(url.pathname.split('/').pop()) || url.host;
   return { name, stream: response.body };
 }
 

@@ -19,6 +19,9 @@ if (!missing) {
     viewer = await start({
       routes: {
         '/missing.gip': (_, response) => response.writeHead(404).end(),
+        '/100%.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
+        '/%FF%20%C3%A4.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
+        '/%C3%A4%20b%25.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
         '/rgb.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
       },
     });
@@ -271,6 +274,17 @@ onPage('damaged and other files give a message', { path: '/' }, async (page) => 
   assert.ok(await message.isHidden());
   await assertShows(page, await viewOf(page, SAMPLE), half);
 });
+
+for (const [name, shown] of [
+  ['100%.gip', '100%.gip'],
+  ['%FF%20%C3%A4.gip', '%FF%20%C3%A4.gip'],
+  ['%C3%A4%20b%25.gip', 'ä b%.gip'],
+]) {
+  onPage(`a name that is ${name} in its URL`, { path: `/?src=${encodeURIComponent(name)}` }, async (page) => {
+    await settled(page);
+    assert.equal(await page.title(), `${shown} - gip viewer`);
+  });
+}
 
 onPage('a URL that is not there gives a message', { path: '/?src=missing.gip' }, async (page) => {
   await page.waitForFunction(() => document.querySelector('#message p').textContent.includes('404'));

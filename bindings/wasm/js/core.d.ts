@@ -16,7 +16,7 @@ export function load(
 /** The bytes that all decoders of this thread take. They are used again, but never given back. */
 export function memorySize(): number;
 
-/** Decodes bytes as they arrive, and renders what has arrived. `load` must have finished. */
+/** Decodes bytes as they arrive, and renders what has arrived. `load` must have finished, or its constructor throws. */
 export class Decoder {
   constructor(options?: { limits?: Limits; statistics?: boolean });
 
@@ -55,6 +55,6 @@ export class Decoder {
   /** Renders a PNG file of 8 bits per sample with the picture's ICC profile, by default upright. */
   png(options?: SampleOptions): Promise<Uint8Array>;
 
-  /** Frees the memory. Nothing else may be called after this. */
+  /** Frees the memory. What is called after this throws a `GipError`. */
   close(): void;
 }

@@ -1,11 +1,14 @@
 // The decoder on this thread: no worker, and nothing to wait for once it is loaded.
 
 import init, { Decoder as Native } from './image_gip.js';
-import { defaultLimits } from './limits.js';
+import { GipError } from './errors.js';
+import { allLimits } from './limits.js';
 import { turnedSize, turnGaussians, Upright } from './orientation.js';
 
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
+/** What is asked for before the header has arrived is refused, whatever it is. */
+const noHeader = { width: 1, height: 1, color: 'rgba', depth: 8 };
 /** The largest width and height of an output. */
 const mostSide = 2 ** 23;
 
@@ -61,55 +64,61 @@ export class Decoder extends Upright {
   #header = null;
   #orientation = null;
 
-  constructor({ limits = {}, statistics = false } = {}) {
+  constructor({ limits, statistics = false } = {}) {
     super();
-    const numbers = Object.entries(defaultLimits).map(([name, value]) => limits[name] ?? value);
+    const numbers = Object.values(allLimits(limits));
+    if (!memory) throw new GipError('the decoder is not loaded yet: wait for load() first');
     this.#native = new Native(statistics, ...numbers);
+  }
+
+  get #open() {
+    if (!this.#native) throw new GipError('the decoder is closed');
+    return this.#native;
   }
 
   /** Takes the next bytes of the file. Bytes after its end are ignored. */
   feed(bytes) {
     if (!(bytes instanceof Uint8Array)) throw new TypeError('the bytes must be a Uint8Array');
-    this.#native.feed(bytes);
+    this.#open.feed(bytes);
     return this.progress;
   }
 
   /** Says that no more bytes come: throws an `UnexpectedEndError` if the file is not complete. */
   finish() {
-    this.#native.finish();
+    this.#open.finish();
   }
 
   get header() {
-    this.#header ??= this.#native.header() ?? null;
+    this.#header ??= this.#open.header() ?? null;
     return this.#header;
   }
 
   /** The value in the Exif, 1 to 8; `null` until it is known. */
   get orientation() {
-    this.#orientation ??= this.#native.orientation() ?? null;
+    this.#orientation ??= this.#open.orientation() ?? null;
     return this.#orientation;
   }
 
   get metadata() {
-    return this.#native.metadata();
+    return this.#open.metadata();
   }
 
   /** Header, orientation, number of Gaussians that have arrived, and whether the file is complete. */
   get progress() {
-    const native = this.#native;
+    const native = this.#open;
     const [gaussians, complete] = [native.arrived(), native.complete()];
     return { header: this.header, orientation: this.orientation, gaussians, complete };
   }
 
   /** How many Gaussians are enough for an output of this size in pixels. */
   gaussiansFor(width, height) {
-    return this.#native.gaussiansFor(integer(width, 'width', 1), integer(height, 'height', 1));
+    return this.#open.gaussiansFor(integer(width, 'width', 1), integer(height, 'height', 1));
   }
 
   /** How many Gaussians the first `bytes` of the file have, as far as the file has arrived. */
   gaussiansIn(bytes) {
     let count = 0;
-    for (const { gaussians, start, end } of this.#native.statistics().layers) {
+    for (const { gaussians, start, end } of this.#open.statistics().layers) {
       if (bytes >= end) count += gaussians;
       else if (this.header.coding === 'packed' && bytes > start) {
         // Twelve bytes before them, four after them, and all have the same number of bits.
@@ -122,36 +131,38 @@ export class Decoder extends Upright {
   /** Nine numbers for each Gaussian; see the declarations. */
   gaussians({ start = 0, end = all, orientation = 'none' } = {}) {
     const turned = isTurned(orientation);
-    const numbers = this.#native.gaussians(integer(start, 'start', 0), integer(end, 'end', 0));
+    const numbers = this.#open.gaussians(integer(start, 'start', 0), integer(end, 'end', 0));
     return turned && this.orientation > 1 ? turnGaussians(numbers, this.header, this.orientation) : numbers;
   }
 
   /** Chunks, layers, bits per attribute. */
   statistics() {
-    return this.#native.statistics();
+    return this.#open.statistics();
   }
 
   /** Renders 8-bit RGBA, upright by default: what an `ImageData` is made of. */
   render(options = {}) {
     const request = this.#request('from-image', { ...options, color: 'rgba' });
-    const data = this.#native.render8(request);
+    const data = this.#open.render8(request);
     return { width: request[4], height: request[5], data };
   }
 
   /** Renders the samples as they are specified: by default as stored, in the file's colour model and depth. */
   samples(options = {}) {
     const request = this.#request('none', options);
-    const color = options.color ?? this.header.color;
-    const depth = options.depth ?? this.header.depth;
+    const header = this.header ?? noHeader;
+    const { color = header.color, depth = header.depth } = options;
     if (depth !== 8 && depth !== 16) throw new RangeError(`depth is ${depth}; it must be 8 or 16`);
-    const data = depth === 8 ? this.#native.render8(request) : this.#native.render16(request);
+    const data = depth === 8 ? this.#open.render8(request) : this.#open.render16(request);
     return { width: request[4], height: request[5], color, channels: channelsOf[color], depth, data };
   }
 
   /** Renders a PNG file, upright by default, with the picture's ICC profile, which a browser then converts. */
   async png({ orientation = 'from-image', ...options } = {}) {
+    const samples = this.samples({ ...options, orientation, depth: 8 });
+    const { iccProfile } = this.metadata;
     const { encodePng } = await import('./png.js');
-    return encodePng(this.samples({ ...options, orientation, depth: 8 }), this.metadata.iccProfile);
+    return encodePng(samples, iccProfile);
   }
 
   /** Frees the memory. Nothing else may be called after this. */
@@ -162,12 +173,11 @@ export class Decoder extends Upright {
 
   /** The numbers for a rendering, with the orientation that it has by default. */
   #request(byDefault, { width, height, region, gaussians = all, color, orientation = byDefault }) {
-    if (color !== undefined && !(color in channelsOf)) {
+    if (color !== undefined && !Object.hasOwn(channelsOf, color)) {
       throw new RangeError(`color is ${color}; it must be one of ${Object.keys(channelsOf)}`);
     }
     const turned = isTurned(orientation);
-    // Before the header, the decoder refuses whatever it is asked for.
-    const picture = turnedSize(this.header ?? { width: 1, height: 1 }, turned ? this.orientation : 1);
+    const picture = turnedSize(this.header ?? noHeader, turned ? this.orientation : 1);
     const size = outputSize(picture, { width, height });
     const part = region ?? { x: 0, y: 0, width: size[0], height: size[1] };
     return Uint32Array.of(

@@ -6,7 +6,7 @@ import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
 import { naturalSize } from './orientation.js';
 import { Painting } from './painting.js';
-import { commonSheet, contentSize, layOut, ownSheet } from './styles.js';
+import { contentSize, layOut, newSheet } from './styles.js';
 
 export * from './index.js';
 
@@ -28,7 +28,7 @@ export class GipImageElement extends ImageAttributes {
   /** What a file may cost at most. A page may have set it before this script has come. */
   limits = this.limits;
   #internals;
-  #style = ownSheet();
+  #style = null;
   #painting = new Painting();
   #alternative = document.createElement('span');
 
@@ -39,8 +39,8 @@ export class GipImageElement extends ImageAttributes {
   #header = null;
   /** The size of the upright picture. */
   #natural = null;
-  /** Whether it is shown upright; as stored only where the page's styles want that. */
-  #orientation = 'from-image';
+  /** `from-image`, or `none` where the page's styles want it as stored; `null` as long as it is not known. */
+  #orientation = null;
   /** The ICC profile; `undefined` as long as it is not known. */
   #profile = undefined;
   /** Whether the element is on the screen, or close to it; `undefined` as long as that is not known. */
@@ -60,11 +60,11 @@ export class GipImageElement extends ImageAttributes {
     super();
     this.#internals = this.attachInternals();
     const root = this.attachShadow({ mode: 'open' });
-    root.adoptedStyleSheets = [commonSheet(), this.#style];
+    root.addEventListener('transitionrun', () => this.#refresh());
     this.#alternative.part = 'alt';
     root.append(this.#painting.frame);
     this.#describe();
-    this.#layOut();
+    this.adoptedCallback();
   }
 
   // What `<img>` tells of its picture.
@@ -133,6 +133,12 @@ export class GipImageElement extends ImageAttributes {
     });
   }
 
+  adoptedCallback() {
+    this.#style = newSheet(this.ownerDocument);
+    this.shadowRoot.adoptedStyleSheets = this.#style ? [this.#style] : [];
+    this.#layOut();
+  }
+
   attributeChangedCallback(name, before, after) {
     const changes = name === 'src' || (reloads.includes(name) && keyword(name, before) !== keyword(name, after));
     if (changes) this.#reset();
@@ -154,6 +160,7 @@ export class GipImageElement extends ImageAttributes {
   }
 
   #layOut() {
+    if (!this.#style) return;
     layOut(this.#style, {
       width: this.getAttribute('width'),
       height: this.getAttribute('height'),
@@ -167,11 +174,20 @@ export class GipImageElement extends ImageAttributes {
     this.#answerAll(encodingError('the picture was changed or removed'));
     this.#loader?.close();
     this.#loader = null;
-    this.#header = this.#natural = null;
+    this.#header = this.#natural = this.#orientation = null;
     this.#profile = undefined;
     this.#state = 'waiting';
     this.#painting.clear();
     this.shadowRoot.replaceChildren(this.#painting.frame);
+  }
+
+  /** Follows the orientation that the page's styles want. */
+  #orient() {
+    const orientation = getComputedStyle(this).imageOrientation === 'none' ? 'none' : 'from-image';
+    if (orientation === this.#orientation) return;
+    this.#orientation = orientation;
+    this.#layOut();
+    this.#measure();
   }
 
   #measure() {
@@ -185,6 +201,7 @@ export class GipImageElement extends ImageAttributes {
   #refresh() {
     if (this.#state === 'waiting') this.#begin();
     if (!this.#header || !this.#loader) return;
+    this.#orient();
     this.#place();
     void this.#want();
     void this.#paint();
@@ -195,10 +212,18 @@ export class GipImageElement extends ImageAttributes {
     const due = this.isConnected && (this.loading === 'eager' || this.#near);
     if (!due && this.#waiting.length === 0) return;
     this.#state = 'loading';
-    let url;
+    let loader;
     try {
-      url = this.src;
-      if (!url) throw new TypeError('the attribute src is empty');
+      if (!this.src) throw new TypeError('the attribute src is empty');
+      const init = {
+        credentials: this.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
+        referrerPolicy: this.referrerPolicy,
+        priority: this.fetchPriority,
+      };
+      const failed = (error) => {
+        if (this.#loader === loader) this.#fail(error);
+      };
+      loader = new Loader(this.src, init, this.limits, () => this.#arrived(loader), failed);
     } catch (error) {
       // Listeners that are added after the attribute are to hear of it.
       queueMicrotask(() => {
@@ -206,19 +231,6 @@ export class GipImageElement extends ImageAttributes {
       });
       return;
     }
-    const loader = new Loader(
-      url,
-      {
-        credentials: this.crossOrigin === 'use-credentials' ? 'include' : 'same-origin',
-        referrerPolicy: this.referrerPolicy,
-        priority: this.fetchPriority,
-      },
-      this.limits,
-      () => this.#arrived(loader),
-      (error) => {
-        if (this.#loader === loader) this.#fail(error);
-      },
-    );
     this.#loader = loader;
     loader.start();
   }
@@ -229,10 +241,9 @@ export class GipImageElement extends ImageAttributes {
     if (loader.header !== this.#header) {
       this.#header = loader.header;
       this.#natural = naturalSize(loader.header, loader.orientation);
-      this.#orientation = getComputedStyle(this).imageOrientation === 'none' ? 'none' : 'from-image';
+      this.#orientation = null;
       this.#asked = null;
-      this.#layOut();
-      this.#measure();
+      this.#orient();
     }
     await this.#want();
     if (this.#loader !== loader) return;
@@ -279,7 +290,9 @@ export class GipImageElement extends ImageAttributes {
       width: Math.round(this.#device.width * scale),
       height: Math.round(this.#device.height * scale),
     };
-    return plan({ css: this.#css, device, natural: this.#size, fit: objectFit, position: objectPosition });
+    const box = { css: this.#css, device, natural: this.#size };
+    const made = plan({ ...box, fit: objectFit, position: objectPosition });
+    return made && { ...made, orientation: this.#orientation };
   }
 
   /** Puts what has been drawn where it belongs now, until it is rendered anew. */
@@ -327,12 +340,12 @@ export class GipImageElement extends ImageAttributes {
     }
   }
 
-  async #render(loader, { width, height, region }) {
+  async #render(loader, { width, height, region, orientation }) {
     if (this.#profile === undefined) {
       const { iccProfile } = await loader.metadata();
       if (this.#loader === loader) this.#profile = iccProfile;
     }
-    const options = { width, height, region, orientation: this.#orientation };
+    const options = { width, height, region, orientation };
     if (!this.#profile) return loader.render(options);
     // The browser knows how to convert colours.
     return createImageBitmap(await loader.png(options));

@@ -42,7 +42,10 @@ export function decode(
 /** Reads a whole file, to render it as often as needed. Rejects as `decode`. */
 export function open(source: Source, options?: OpenOptions): Promise<Picture>;
 
-/** What has arrived of a file. Methods may be called at any time, and are answered in order. */
+/**
+ * What has arrived of a file. Methods may be called at any time: each is carried out after those that were
+ * called before it, and before the closing if `close` follows.
+ */
 interface Renderable {
   /** Whether the whole file has arrived. */
   readonly complete: boolean;
@@ -72,7 +75,7 @@ interface Renderable {
   /** Renders a PNG file of 8 bits per sample with the picture's ICC profile, by default upright. */
   png(options?: SampleOptions & { signal?: AbortSignal }): Promise<Blob>;
 
-  /** Frees the memory. Nothing else may be called after this. */
+  /** Frees the memory. What is called after this rejects with a `GipError`. */
   close(): void;
 }
 
@@ -90,8 +93,8 @@ export class StreamDecoder {
   readonly header: Header | null;
 
   /**
-   * Takes the next bytes of the file, in pieces of any size. After a rejection nothing more can be
-   * fed, but what arrived before can be rendered.
+   * Takes the next bytes of the file, in pieces of any size. They are copied at the call. After a
+   * rejection nothing more can be fed, but what arrived before can be rendered.
    */
   feed(bytes: Uint8Array): Promise<Progress>;
   /** Rejects with an `UnexpectedEndError` if the file is not complete. */

@@ -1,5 +1,6 @@
 // The package's interface for scripts. It works in a worker of its own, and never blocks the page.
 
+import { allLimits } from './limits.js';
 import { Upright } from './orientation.js';
 import { RemoteDecoder } from './remote.js';
 import { read } from './source.js';
@@ -33,7 +34,7 @@ export class StreamDecoder extends Upright {
 
   constructor({ limits, statistics } = {}) {
     super();
-    this.#remote = new RemoteDecoder({ limits, statistics });
+    this.#remote = new RemoteDecoder({ limits: allLimits(limits), statistics });
   }
 
   get header() {
@@ -53,7 +54,10 @@ export class StreamDecoder extends Upright {
   }
 
   async feed(bytes) {
-    this.#progress = await this.#remote.call('feed', bytes);
+    if (bytes?.[Symbol.toStringTag] !== 'Uint8Array') throw new TypeError('the bytes must be a Uint8Array');
+    // The caller may write to its own meanwhile.
+    const copy = new Uint8Array(bytes);
+    this.#progress = await this.#remote.call('feed', copy, [copy.buffer]);
     return this.#progress;
   }
 

@@ -8,3 +8,15 @@ export const defaultLimits = Object.freeze({
   memory: 2 ** 29,
   work: 2 ** 32,
 });
+
+/** All limits: those of a caller, and the default for the others. */
+export function allLimits(limits) {
+  const all = { ...defaultLimits };
+  for (const name of Object.keys(all)) {
+    const value = (all[name] = limits?.[name] ?? all[name]);
+    if (typeof value !== 'number' || !(value >= 0)) {
+      throw new RangeError(`limits.${name} is ${String(value)}; it must be a number from 0 to Infinity`);
+    }
+  }
+  return all;
+}

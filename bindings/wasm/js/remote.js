@@ -24,11 +24,11 @@ class WorkerThread {
     worker.onerror = () => this.#end();
   }
 
-  async call(id, method, argument) {
+  async call(id, method, argument, transfer) {
     if (this.#ended) throw new GipError('the worker has ended');
     const call = (this.#last += 1);
     return new Promise((resolve, reject) => {
-      this.#worker.postMessage({ call, id, method, argument });
+      this.#worker.postMessage({ call, id, method, argument }, transfer);
       this.#calls.set(call, { resolve, reject });
     });
   }
@@ -158,10 +158,10 @@ export class RemoteDecoder {
     forgotten.register(this, this.#close, this);
   }
 
-  async call(method, argument) {
-    const thread = await this.#thread;
+  async call(method, argument, transfer) {
     if (this.#closed) throw new GipError('the decoder is closed');
-    return thread.call(this.#id, method, argument);
+    const thread = await this.#thread;
+    return thread.call(this.#id, method, argument, transfer);
   }
 
   close() {

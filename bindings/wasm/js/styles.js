@@ -1,27 +1,32 @@
 // The style sheets inside `<gip-image>`. The page's own styles come before them.
 
-/** A style sheet: unlike a `<style>`, no content security policy refuses it. */
-function sheet(text) {
-  const made = new CSSStyleSheet();
-  made.replaceSync(text);
-  return made;
+/**
+ * What all elements have. The frame has the page's values of the properties that the drawing follows, which
+ * mean nothing to a frame, so that a transition tells when the page changes one.
+ */
+const common = `
+  :host { display: inline-block; }
+  :host([hidden]) { display: none; }
+  .frame {
+    position: absolute;
+    overflow: hidden;
+    object-fit: inherit;
+    object-position: inherit;
+    image-orientation: inherit;
+    transition: 1ms;
+    transition-property: object-fit, object-position, image-orientation;
+    transition-behavior: allow-discrete;
+  }
+  canvas { position: absolute; display: block; }
+`;
+
+/**
+ * The style sheet of an element in this document, which no other document takes; `null` if the document is
+ * in no window. Unlike a `<style>`, no content security policy refuses it.
+ */
+export function newSheet({ defaultView }) {
+  return defaultView && new defaultView.CSSStyleSheet();
 }
-
-let common = null;
-
-/** What all elements have. */
-export function commonSheet() {
-  common ??= sheet(`
-    :host { display: inline-block; }
-    :host([hidden]) { display: none; }
-    .frame { position: absolute; overflow: hidden; }
-    canvas { position: absolute; display: block; }
-  `);
-  return common;
-}
-
-/** The style sheet of one element. */
-export const ownSheet = () => sheet('');
 
 /** A length as the attributes `width` and `height` of `<img>` have it, as CSS; `null` for none. */
 function length(attribute) {
@@ -53,7 +58,7 @@ export function layOut(own, { width, height, natural, broken }) {
       rules.push(`aspect-ratio: auto ${w.value} / ${h.value}`);
     }
   }
-  own.replaceSync(`:host { ${rules.join('; ')} }`);
+  own.replaceSync(`${common} :host { ${rules.join('; ')} }`);
 }
 
 /** The size of an element's content box in CSS pixels. */

@@ -113,6 +113,59 @@ test('errors have a class, a kind and a chunk', async () => {
   });
 });
 
+test('misuse is refused in plain words', async () => {
+  const results = await inPage(async (gip, bytes) => {
+    const outcome = async (run) => {
+      try {
+        await run();
+        return 'no error';
+      } catch (error) {
+        return `${error.name}: ${error.message}`;
+      }
+    };
+    const empty = new gip.StreamDecoder();
+    const closed = new gip.StreamDecoder();
+    closed.close();
+    const limits = [NaN, -1, '5', 5n, {}, Symbol('s')];
+    return {
+      early: await Promise.all(['render', 'samples', 'png'].map((method) => outcome(() => empty[method]()))),
+      closed: await Promise.all(['feed', 'finish', 'png'].map((method) => outcome(() => closed[method](new Uint8Array())))),
+      limits: await Promise.all(
+        limits.map((height) => outcome(() => gip.decode(new Uint8Array(bytes), { limits: { height } }))),
+      ),
+      infinite: await outcome(() => gip.decode(new Uint8Array(bytes), { limits: { work: Infinity, width: undefined } })),
+      none: await outcome(() => gip.decode(new Uint8Array(bytes), { limits: null })),
+    };
+  }, [...picture]);
+  const [end] = results.early;
+  assert.match(end, /^UnexpectedEndError: /);
+  const limit = (value) => `RangeError: limits.height is ${value}; it must be a number from 0 to Infinity`;
+  assert.deepEqual(results, {
+    early: [end, end, end],
+    closed: Array(3).fill('GipError: the decoder is closed'),
+    limits: ['NaN', '-1', '5', '5', '[object Object]', 'Symbol(s)'].map(limit),
+    infinite: 'no error',
+    none: 'no error',
+  });
+});
+
+test('what is called before close() is answered, and bytes are taken at the call', async () => {
+  const results = await inPage(async ({ StreamDecoder }, bytes) => {
+    const decoder = new StreamDecoder();
+    const buffer = new Uint8Array(bytes.length + 10);
+    buffer.set(bytes, 5);
+    const fed = decoder.feed(buffer.subarray(5, 5 + bytes.length));
+    buffer.fill(0);
+    const calls = [decoder.finish(), decoder.png(), decoder.render(), decoder.samples(), decoder.gaussians()];
+    decoder.close();
+    const late = decoder.render().catch(({ message }) => message);
+    const [, png, image, samples, numbers] = await Promise.all(calls);
+    return [(await fed).complete, png.type, image.width, samples.width, numbers.length, await late, buffer.length];
+  }, [...picture]);
+  const wanted = [true, 'image/png', 96, 96, 200 * 9, 'the decoder is closed', picture.length + 10];
+  assert.deepEqual(results, wanted);
+});
+
 test('an abort ends the download and the wait', async () => {
   const { route, log } = slow(picture, { piece: 500, gate: () => new Promise(() => {}) });
   harness.routes['/never.gip'] = route;

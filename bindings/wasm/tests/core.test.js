@@ -13,7 +13,10 @@ import { crc32, parseIndex, resultOf, unlimited } from './vectors.js';
 const vectors = new URL('../../../spec/vectors/', import.meta.url);
 const read = (file) => new Uint8Array(readFileSync(new URL(file, vectors)));
 
-before(() => load(readFileSync(new URL('../dist/image_gip_bg.wasm', import.meta.url))));
+before(async () => {
+  assert.throws(() => new Decoder(), { name: 'GipError', message: /wait for load\(\) first/ });
+  await load(readFileSync(new URL('../dist/image_gip_bg.wasm', import.meta.url)));
+});
 
 test('every line of the test vectors', async () => {
   const lines = parseIndex(readFileSync(new URL('index.tsv', vectors), 'utf8'));
@@ -139,10 +142,38 @@ test('requests that cannot be met', () => {
     assert.throws(() => decoder.render(options), kind, JSON.stringify(options));
   }
   assert.throws(() => decoder.samples({ color: 'gray' }), RangeError);
-  assert.throws(() => decoder.samples({ color: 'cmyk' }), RangeError);
+  for (const color of ['cmyk', 'toString', 'constructor', '__proto__']) {
+    const error = { name: 'RangeError', message: `color is ${color}; it must be one of gray,gray-alpha,rgb,rgba` };
+    assert.throws(() => decoder.samples({ color }), error);
+  }
   assert.throws(() => decoder.samples({ depth: 12 }), RangeError);
   assert.equal(decoder.render().data.length, 96 * 64 * 4, 'it can still render');
   decoder.close();
+});
+
+test('before the header, and after close', async () => {
+  const decoder = new Decoder();
+  const end = { name: 'UnexpectedEndError' };
+  assert.throws(() => decoder.render(), end);
+  assert.throws(() => decoder.samples(), end);
+  assert.throws(() => decoder.samples({ color: 'rgb', depth: 16, orientation: 'from-image' }), end);
+  await assert.rejects(decoder.png(), end);
+  assert.equal(decoder.gaussians({ orientation: 'from-image' }).length, 0);
+  decoder.close();
+  decoder.close();
+  const closed = { name: 'GipError', message: 'the decoder is closed' };
+  for (const call of [
+    () => decoder.feed(new Uint8Array()),
+    () => decoder.finish(),
+    () => decoder.progress,
+    () => decoder.metadata,
+    () => decoder.render(),
+    () => decoder.samples(),
+    () => decoder.gaussiansIn(5),
+  ]) {
+    assert.throws(call, closed);
+  }
+  await assert.rejects(decoder.png(), closed);
 });
 
 test('limits', () => {
@@ -159,6 +190,11 @@ test('limits', () => {
   // 200 Gaussians in 2 x 2 tiles.
   small(200 * 4 * 64);
   assert.throws(limited({ outputPixels: 100 }), { limit: 'outputPixels', wanted: 6144, allowed: 100 });
+  for (const value of [Number.NaN, -1, '100', 5n]) {
+    const message = `limits.memory is ${value}; it must be a number from 0 to Infinity`;
+    assert.throws(limited({ memory: value }), { name: 'RangeError', message });
+  }
+  limited({ memory: Infinity, work: undefined })();
   // Which one it was can be raised by its name.
   for (const [limit, size] of [['height', { width: 2, height: 65_537 }], ['width', { width: 65_537, height: 2 }]]) {
     const long = makePicture({ ...size, layers: [3] });
