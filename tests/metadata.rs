@@ -136,6 +136,23 @@ fn all_keeps_all_and_none_keeps_nothing() {
     assert_eq!(MetadataPolicy::default(), MetadataPolicy::All);
 }
 
+#[test]
+fn an_orientation_is_missed_unless_the_picture_is_upright() {
+    for code in 0..=9 {
+        let exif = write(&[short(Tag::Orientation, code)], None, code % 2 == 0);
+        for policy in [MetadataPolicy::All, MetadataPolicy::Safe] {
+            assert!(of_exif(exif.clone()).retain(policy).is_empty(), "{code}");
+        }
+        let lost = of_exif(exif.clone()).retain(MetadataPolicy::None);
+        let expected: &[_] =
+            if (2..=8).contains(&code) { &[MetadataLoss::Orientation] } else { &[] };
+        assert_eq!(lost, expected, "{code}");
+        let mut turned = of_exif(exif);
+        turned.reset_orientation();
+        assert!(turned.retain(MetadataPolicy::None).is_empty(), "{code}");
+    }
+}
+
 /// Exif in big-endian order with the entries of two directories, the second of which the first refers to:
 /// tag, type, number of values, and the value or its offset. The values come after them, at an offset of
 /// 200. Neither directory ends with the offset of another one.

@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::{exif, icc, xmp};
 use crate::container::Metadata;
+use crate::orientation::Orientation;
 
 /// Keywords of texts, as PNG registers them, whose texts an author wrote to be read by all.
 const SAFE_KEYWORDS: [&str; 6] =
@@ -36,6 +37,8 @@ pub enum MetadataPolicy {
 pub enum MetadataLoss {
     /// A colour profile that is not sRGB's: the same samples now stand for other colours.
     ColorProfile,
+    /// An orientation other than upright: whoever shows the picture leaves it as it is stored.
+    Orientation,
     /// Exif that is damaged: what could be read of it is kept, as the policy says.
     DamagedExif,
     /// XMP that is damaged, and therefore was dropped as a whole.
@@ -47,7 +50,8 @@ pub enum MetadataLoss {
 impl Metadata {
     /// Keeps what the policy says, and drops the rest. Returns what was dropped that may be missed.
     ///
-    /// [`MetadataPolicy::None`] drops the orientation, too: turn the picture first.
+    /// [`MetadataPolicy::None`] drops the orientation, too: turn the picture first, and
+    /// [reset](Metadata::reset_orientation) the orientation.
     ///
     /// ```
     /// use image_gip::{Metadata, MetadataPolicy, Text};
@@ -81,6 +85,9 @@ impl Metadata {
             }
             MetadataPolicy::None => {
                 let dropped = core::mem::take(self);
+                if dropped.orientation() != Orientation::NoTransforms {
+                    losses.push(MetadataLoss::Orientation);
+                }
                 if dropped.icc_profile.is_some_and(|profile| !icc::is_srgb(&profile)) {
                     losses.push(MetadataLoss::ColorProfile);
                 }
@@ -95,6 +102,9 @@ impl fmt::Display for MetadataLoss {
         f.write_str(match self {
             Self::ColorProfile => {
                 "the colour profile was dropped, so the colours are taken for sRGB"
+            }
+            Self::Orientation => {
+                "the orientation was dropped, so the picture is shown as it is stored"
             }
             Self::DamagedExif => {
                 "the Exif is damaged, and what could not be read of it was dropped"
