@@ -1,4 +1,6 @@
-//! The picture to encode, from an array.
+//! The picture to encode, from an array; and what is asked of any array.
+
+use core::fmt::Display;
 
 use image_gip::{ColorModel, Source, SourceError};
 use numpy::{
@@ -7,7 +9,8 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::output::Shape;
+use crate::errors::vec_for;
+use crate::numbers::shown;
 
 /// Floats that are converted from one look for signals to the next.
 const PART: usize = 1 << 20;
@@ -49,11 +52,7 @@ impl<'py> Picture<'py> {
                 )));
             }
         };
-        if !untyped.is_c_contiguous() {
-            return Err(PyValueError::new_err(
-                "the array is not C-contiguous; use numpy.ascontiguousarray",
-            ));
-        }
+        check_memory("the array", untyped)?;
         let in_use = |_| PyValueError::new_err("the array is being written by another call");
         let pixels = if let Ok(array) = array.cast::<PyArrayDyn<u8>>() {
             Pixels::U8(array.try_readonly().map_err(in_use)?)
@@ -86,9 +85,28 @@ impl<'py> Picture<'py> {
     }
 }
 
+/// Refuses an array whose memory is not that of its samples alone, one after the other.
+pub(crate) fn check_memory(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<()> {
+    let py = array.py();
+    if !array.get_type().is(py.get_type::<PyUntypedArray>())
+        && array.is_instance(&py.import("numpy.ma")?.getattr("MaskedArray")?)?
+    {
+        let message = format!("{name} is masked; use its data, or what its method filled returns");
+        return Err(PyTypeError::new_err(message));
+    }
+    let wrong = if !array.is_c_contiguous() {
+        "C-contiguous: rows from the top, without gaps (see numpy.ascontiguousarray)"
+    } else if !array.is_aligned() {
+        "aligned (see numpy.require)"
+    } else {
+        return Ok(());
+    };
+    Err(PyValueError::new_err(format!("{name} is not {wrong}")))
+}
+
 /// 16-bit samples from floats, of which 1.0 is a full one. Signals are attended to meanwhile.
 fn from_floats(py: Python<'_>, values: &[f32], shape: &[usize]) -> PyResult<Vec<u16>> {
-    let mut samples = Vec::with_capacity(values.len());
+    let mut samples = vec_for(values.len())?;
     for end in (0..values.len()).step_by(PART).map(|start| values.len().min(start + PART)) {
         py.check_signals()?;
         let part = &values[samples.len()..end];
@@ -108,9 +126,20 @@ fn out_of_range(value: f32, index: usize, shape: &[usize]) -> PyErr {
     for (place, length) in place.iter_mut().zip(shape).rev() {
         (*place, rest) = (rest % length, rest / length);
     }
-    let place = Shape(&place);
+    let (place, value) = (Shape(&place), shown(value));
     PyValueError::new_err(format!(
         "the float at {place} is {value}; floats must be 0.0 to 1.0: use numpy.clip, or uint8 or \
          uint16 for whole numbers"
     ))
+}
+
+/// A shape as Python writes it.
+pub(crate) struct Shape<'a>(pub(crate) &'a [usize]);
+
+impl Display for Shape<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let sides: Vec<_> = self.0.iter().map(usize::to_string).collect();
+        let comma = if sides.len() == 1 { "," } else { "" };
+        write!(f, "({}{comma})", sides.join(", "))
+    }
 }

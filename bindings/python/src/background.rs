@@ -3,6 +3,8 @@
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::numbers::{Real, shown};
+
 /// The colour behind a picture, as the caller gives it: one sample, or one per channel.
 #[derive(Debug)]
 pub(crate) struct Background(Vec<f64>);
@@ -11,10 +13,12 @@ impl Background {
     /// Checks that an object is a number or several.
     pub(crate) fn new(object: &Bound<'_, PyAny>) -> PyResult<Self> {
         let numbers = match object.extract() {
-            Ok(number) => Some(vec![number]),
+            Ok(Real(number)) => Some(vec![number]),
             Err(_) => object
                 .try_iter()
-                .and_then(|items| items.map(|item| item?.extract()).collect::<PyResult<_>>())
+                .and_then(|items| {
+                    items.map(|item| item?.extract().map(|Real(number)| number)).collect()
+                })
                 .ok(),
         };
         numbers.map(Self).ok_or_else(|| {
@@ -26,7 +30,7 @@ impl Background {
     pub(crate) fn samples<T: Sample>(&self, channels: usize) -> PyResult<Vec<T>> {
         let samples = self.0.iter().map(|&number| {
             T::from_number(number).ok_or_else(|| {
-                let full = T::FULL;
+                let (number, full) = (shown(number), T::FULL);
                 PyValueError::new_err(format!("background {number}; it must be 0 to {full}"))
             })
         });
@@ -112,6 +116,8 @@ pub(crate) struct Channels<'a> {
 #[derive(Debug)]
 pub(crate) struct Pixels<'a, T> {
     out: &'a mut [T],
+    /// Where the picture is rendered first, if what is rendered is not what the caller gets.
+    scratch: Option<&'a mut [T]>,
     rendered: usize,
     /// What pixels with alpha are composed over.
     background: Option<Vec<T>>,
@@ -119,26 +125,65 @@ pub(crate) struct Pixels<'a, T> {
 
 impl Channels<'_> {
     /// The samples `out`. A background that is wrong is refused, whether it shows or not.
-    pub(crate) fn pixels<'a, T: Sample>(&self, out: &'a mut [T]) -> PyResult<Pixels<'a, T>> {
+    pub(crate) fn pixels<'a, T: Sample>(
+        &self,
+        out: &'a mut [T],
+        scratch: Option<&'a mut [T]>,
+    ) -> PyResult<Pixels<'a, T>> {
         let given = self.background.map(|given| given.samples(self.returned)).transpose()?;
         let background = || given.unwrap_or_else(|| vec![T::FULL; self.returned]);
         let background = self.drops_alpha.then(background);
-        Ok(Pixels { out, rendered: self.rendered, background })
+        Ok(Pixels { out, scratch, rendered: self.rendered, background })
     }
 }
 
 impl<T: Sample> Pixels<'_, T> {
-    /// Has the samples rendered, given the number of their channels.
-    pub(crate) fn fill<E>(
-        self,
-        render: impl FnOnce(&mut [T], usize) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let Self { out, rendered, background } = self;
-        let Some(background) = background else { return render(out, rendered) };
-        let mut pixels = vec![T::default(); out.len() / background.len() * rendered];
-        render(&mut pixels, rendered)?;
-        compose(&pixels, rendered, &background, out);
+    /// Has the samples rendered interleaved.
+    pub(crate) fn fill<E>(self, render: impl FnOnce(&mut [T]) -> Result<(), E>) -> Result<(), E> {
+        let Self { out, scratch, rendered, background } = self;
+        let (Some(pixels), Some(background)) = (scratch, background) else { return render(out) };
+        render(pixels)?;
+        compose(pixels, rendered, &background, out);
         Ok(())
+    }
+
+    /// Has the samples rendered as planes, and interleaves them.
+    pub(crate) fn fill_from_planes<E>(
+        self,
+        render: impl FnOnce(&mut [T]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Self { out, scratch, rendered, background } = self;
+        let Some(planes) = scratch else { return render(out) };
+        render(planes)?;
+        let planes: Vec<_> = planes.chunks_exact(planes.len() / rendered).collect();
+        match background {
+            None => {
+                for (channel, plane) in planes.iter().enumerate() {
+                    fill_channel(out, (channel, rendered), plane.iter().copied());
+                }
+            }
+            Some(background) => {
+                let (alpha, colors) = planes.split_last().expect("at least alpha is rendered");
+                for (channel, &behind) in background.iter().enumerate() {
+                    let color = colors[channel.min(colors.len() - 1)];
+                    let pixels = color.iter().zip(*alpha);
+                    let composed = pixels.map(|(color, &opacity)| color.over(opacity, behind));
+                    fill_channel(out, (channel, background.len()), composed);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Fills one channel of so many in interleaved samples.
+fn fill_channel<T>(
+    out: &mut [T],
+    (channel, channels): (usize, usize),
+    samples: impl Iterator<Item = T>,
+) {
+    for (out, sample) in out.iter_mut().skip(channel).step_by(channels).zip(samples) {
+        *out = sample;
     }
 }
 

@@ -1,11 +1,12 @@
 //! `decode`, `gaussians` and `info`.
 
-use image_gip::{Decoder, StreamDecoder};
+use image_gip::{Decoder, MetadataLoss, StreamDecoder};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::errors::decode_error;
+use crate::errors::{decode_error, warn};
 use crate::input::{Bytes, FileObject};
+use crate::numbers::{Integer, Real};
 use crate::objects::{self, Limits};
 use crate::output::Output;
 use crate::request::Request;
@@ -33,7 +34,8 @@ use crate::{metadata, threads};
 ///     dtype: numpy.uint8 (0 to 255), numpy.uint16 (0 to 65535) or numpy.float32 (1.0 is a full sample;
 ///         neither clamped nor rounded, unless composed). Default: that of `out`, else uint8 or uint16, whichever the
 ///         encoded picture had.
-///     out: The array to decode into: C-contiguous, writeable, of the shape of the result.
+///     out: The array to decode into: C-contiguous, aligned, writeable, not masked, of the shape of the
+///         result.
 ///     threads: The number of threads, 1 to 1024. With 1, the work is done on the caller's thread. The
 ///         samples are the same.
 ///     limits: What the file may cost at most. Default: Limits().
@@ -47,6 +49,8 @@ use crate::{metadata, threads};
 ///     GipError: The file was refused; its subclasses say why.
 ///     ValueError: An argument is out of range, or `out` does not fit.
 ///     TypeError: An argument has the wrong type.
+///     MemoryError: There is no memory for the result, or for as much again, which is needed to compose,
+///         and for float32 of several channels.
 ///     OSError: The file cannot be read.
 #[pyfunction]
 #[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, threads=1, limits=None))]
@@ -54,14 +58,14 @@ use crate::{metadata, threads};
 pub(crate) fn decode<'py>(
     py: Python<'py>,
     src: &Bound<'py, PyAny>,
-    size: Option<(i64, i64)>,
-    scale: Option<f64>,
-    region: Option<(i64, i64, i64, i64)>,
+    size: Option<(Integer<'py>, Integer<'py>)>,
+    scale: Option<Real>,
+    region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
     mode: Option<&str>,
     background: Option<&Bound<'py, PyAny>>,
     dtype: Option<&Bound<'py, PyAny>>,
     out: Option<&Bound<'py, PyAny>>,
-    threads: i64,
+    #[pyo3(from_py_with = threads::checked)] threads: usize,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let request =
@@ -144,7 +148,8 @@ pub(crate) fn gaussians<'py>(
 /// Args:
 ///     src: The file, as for `decode`.
 ///     metadata: What the result has of the metadata: "all"; "safe", without what tells more than its
-///         author may know, as for `encode`; or "none".
+///         author may know, as for `encode`; or "none". `Info.orientation` is that of the file in any
+///         case, as it says how to show the picture.
 ///     limits: What the file may cost at most. Default: Limits().
 ///
 /// Returns:
@@ -163,7 +168,12 @@ pub(crate) fn info<'py>(
 ) -> PyResult<Option<Bound<'py, PyAny>>> {
     let stream = read_whole(py, src, limits)?;
     let mut kept = stream.metadata().clone();
-    metadata::retain(py, &mut kept, metadata)?;
+    for loss in metadata::retain(&mut kept, metadata)? {
+        // It is still told.
+        if loss != MetadataLoss::Orientation {
+            warn(py, "MetadataWarning", &loss.to_string())?;
+        }
+    }
     objects::info(py, &stream, &kept)
 }
 

@@ -14,6 +14,7 @@ use pyo3::types::PyBytes;
 
 use crate::array::Picture;
 use crate::errors::{encode_error, warn};
+use crate::numbers::{Integer, Real};
 use crate::objects::Limits;
 use crate::{metadata, threads};
 
@@ -33,10 +34,10 @@ const NEWS: f64 = 0.002;
 /// ShortfallWarning.
 ///
 /// Args:
-///     array: height x width or height x width x channels samples, C-contiguous: uint8, uint16, or
-///         float32 from 0.0 to 1.0, which is stored with 16 bits. The channels are gray; gray, alpha; red,
+///     array: height x width or height x width x channels samples, C-contiguous and aligned: uint8, uint16, or
+///         float32 from 0.0 to 1.0, which is stored with 16 bits; not masked. The channels are gray; gray, alpha; red,
 ///         green, blue; or red, green, blue, alpha. Colours are sRGB unless `icc` says otherwise; alpha
-///         is straight. The array is not copied, and must not change during the call.
+///         is straight. The array is not copied, but for float32, and must not change during the call.
 ///     bpp: A file of at most so many bits per pixel, 1e-6 to 1e6.
 ///     bytes: A file of at most so many bytes, 1 to 2**30.
 ///     quality: A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 50 is
@@ -61,7 +62,9 @@ const NEWS: f64 = 0.002;
 ///     metadata: What of these four is stored: "all"; "safe", which keeps the profile, orientation,
 ///         copyright, artist, description and dates, and drops position, maker notes, thumbnails,
 ///         serial numbers, names of owners, comments and all else; or "none". There is a
-///         MetadataWarning for a profile other than that of sRGB, and for damaged data.
+///         MetadataWarning for a profile other than that of sRGB and for an orientation other than
+///         upright that are dropped, and for damaged data. The samples are stored as they are: turn
+///         them before, if nothing shall tell how they are turned.
 ///     limits: Those of the decoder that is to read the file: what it would refuse is not encoded.
 ///         Default: Limits(), with which `decode` reads every file that is encoded.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
@@ -72,27 +75,28 @@ const NEWS: f64 = 0.002;
 ///
 /// Raises:
 ///     TypeError: The array is no array of a type above, or more than one target is given.
-///     ValueError: The array has another shape, strides, or floats that are out of range or NaN; an
+///     ValueError: The array has another shape, strides or alignment, or floats that are out of range or NaN; an
 ///         option is out of range.
 ///     LimitError: A decoder with these limits would refuse the file: for the size of the picture, its
 ///         metadata or `gaussians`, before any work is done; for the work of decoding, at the end.
 ///     CancelledError: `progress` returned False.
+///     MemoryError: There is no memory to convert float32.
 #[pyfunction]
 #[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, keep_invisible=false, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
     array: &Bound<'py, PyAny>,
-    bpp: Option<f64>,
-    bytes: Option<i64>,
-    quality: Option<f64>,
-    psnr: Option<f64>,
-    gaussians: Option<i64>,
-    effort: i64,
+    bpp: Option<Real>,
+    bytes: Option<Integer<'py>>,
+    quality: Option<Real>,
+    psnr: Option<Real>,
+    gaussians: Option<Integer<'py>>,
+    #[pyo3(from_py_with = checked_effort)] effort: u8,
     tune: &str,
     precision: &str,
-    threads: i64,
-    seed: u64,
+    #[pyo3(from_py_with = threads::checked)] threads: usize,
+    #[pyo3(from_py_with = checked_seed)] seed: u64,
     keep_invisible: bool,
     icc: Option<&Bound<'py, PyAny>>,
     exif: Option<&Bound<'py, PyAny>>,
@@ -102,12 +106,11 @@ pub(crate) fn encode<'py>(
     limits: Option<Limits>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
-    let threads = threads::checked(threads)?;
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
-    let effort = u8::try_from(effort)
-        .map_err(|_| PyValueError::new_err(format!("effort {effort}; it must be 1 to 7")))?;
     let mut stored = metadata::of(icc, exif, xmp, texts)?;
-    metadata::retain(py, &mut stored, metadata)?;
+    for loss in metadata::retain(&mut stored, metadata)? {
+        warn(py, "MetadataWarning", &loss.to_string())?;
+    }
     let encoder = Encoder::new()
         .with_target(target)
         .with_tune(tuning(tune)?)
@@ -133,22 +136,30 @@ pub(crate) fn encode<'py>(
     Ok(PyBytes::new(py, &encoded.bytes))
 }
 
-/// The one target that is given.
+fn checked_effort(effort: &Bound<'_, PyAny>) -> PyResult<u8> {
+    effort.extract::<Integer<'_>>()?.within("effort", 1..=7)
+}
+
+fn checked_seed(seed: &Bound<'_, PyAny>) -> PyResult<u64> {
+    seed.extract::<Integer<'_>>()?.within("seed", 0..=u64::MAX)
+}
+
+/// The one target that is given. The encoder refuses fractions that are out of range.
 fn target(
-    bpp: Option<f64>,
-    bytes: Option<i64>,
-    quality: Option<f64>,
-    psnr: Option<f64>,
-    gaussians: Option<i64>,
+    bpp: Option<Real>,
+    bytes: Option<Integer<'_>>,
+    quality: Option<Real>,
+    psnr: Option<Real>,
+    gaussians: Option<Integer<'_>>,
 ) -> PyResult<Target> {
-    // The encoder refuses what is out of range.
-    let at_most = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
+    let bytes = bytes.map(|bytes| bytes.within("bytes", 1..=1 << 30)).transpose()?;
+    let gaussians = gaussians.map(|count| count.within("gaussians", 1..=1 << 22)).transpose()?;
     let targets = [
-        bpp.map(Target::BitsPerPixel),
-        natural("bytes", bytes)?.map(Target::Bytes),
-        quality.map(Target::Quality),
-        psnr.map(Target::Psnr),
-        natural("gaussians", gaussians)?.map(|count| Target::Gaussians(at_most(count))),
+        bpp.map(|Real(bpp)| Target::BitsPerPixel(bpp)),
+        bytes.map(Target::Bytes),
+        quality.map(|Real(quality)| Target::Quality(quality)),
+        psnr.map(|Real(psnr)| Target::Psnr(psnr)),
+        gaussians.map(Target::Gaussians),
     ];
     let mut given = targets.into_iter().flatten();
     let target = given.next().unwrap_or_default();
@@ -158,15 +169,6 @@ fn target(
         ));
     }
     Ok(target)
-}
-
-/// A number that is not negative.
-fn natural(name: &str, value: Option<i64>) -> PyResult<Option<u64>> {
-    let checked = |value| {
-        u64::try_from(value)
-            .map_err(|_| PyValueError::new_err(format!("{name} {value}; it must be at least 1")))
-    };
-    value.map(checked).transpose()
 }
 
 fn precision(name: &str) -> PyResult<Precision> {

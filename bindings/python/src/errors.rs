@@ -1,8 +1,11 @@
 //! The crate's errors as the exceptions of `image_gip._errors`.
 
-use image_gip::{ChunkType, DecodeError, EncodeError, LimitKind, OptionError};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use image_gip::{ChunkType, DecodeError, EncodeError, LimitKind, OptionError, RequestError};
+use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+
+use crate::numbers::shown;
+use crate::request::mode_name;
 
 /// An exception of the class with this name.
 fn exception<'py>(py: Python<'py>, class: &str, message: String) -> PyResult<Bound<'py, PyAny>> {
@@ -29,6 +32,12 @@ pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
         DecodeError::UnexpectedEnd { chunk } => of_chunk("UnexpectedEndError", chunk),
         DecodeError::Limit { kind, wanted, allowed } => {
             limit_error(py, &message, kind, wanted, allowed)
+        }
+        DecodeError::Request(RequestError::ColorModel { from, to }) => {
+            let (from, to) = (mode_name(from), mode_name(to));
+            return PyValueError::new_err(format!(
+                "mode {to:?} of a picture with mode {from:?}; colours do not become gray"
+            ));
         }
         DecodeError::Request(request) => return PyValueError::new_err(request.to_string()),
         DecodeError::Io(error) => return error.into(),
@@ -69,6 +78,10 @@ pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
             raised(limit_error(py, &error.to_string(), *kind, *wanted, *allowed))
         }
         EncodeError::Option(OptionError::Threads(_)) => PyRuntimeError::new_err(error.to_string()),
+        EncodeError::Option(OptionError::Target { name, value, least, most }) => {
+            let value = shown(*value);
+            PyValueError::new_err(format!("{name} {value}; it must be {least} to {most}"))
+        }
         EncodeError::Option(error) => PyValueError::new_err(error.to_string()),
         _ => raised(exception(py, "CancelledError", error.to_string())),
     }
@@ -76,7 +89,17 @@ pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
 
 /// Warns the caller, with a class of `image_gip._errors`.
 pub(crate) fn warn(py: Python<'_>, class: &str, what: &str) -> PyResult<()> {
-    let class = py.import("image_gip._errors")?.getattr(class)?;
-    py.import("warnings")?.call_method1("warn", (what, class, 1))?;
+    let errors = py.import("image_gip._errors")?;
+    errors.call_method1("warn", (what, errors.getattr(class)?))?;
     Ok(())
+}
+
+/// A vector with room for so many elements.
+pub(crate) fn vec_for<T>(length: usize) -> PyResult<Vec<T>> {
+    let mut elements = Vec::new();
+    elements.try_reserve_exact(length).map_err(|_| {
+        let bytes = length.saturating_mul(size_of::<T>());
+        PyMemoryError::new_err(format!("{bytes} bytes could not be allocated"))
+    })?;
+    Ok(elements)
 }

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use numpy::PyReadonlyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyMemoryView, PyString};
+use pyo3::types::{PyMemoryView, PyString};
 
 /// The bytes of a buffer, which are borrowed and not copied.
 pub(crate) struct Bytes<'py>(PyReadonlyArray1<'py, u8>);
@@ -37,7 +37,12 @@ impl<'py> Bytes<'py> {
         } else {
             return Err(unreadable("src", src)?);
         };
-        Self::of_buffer(&read)?.ok_or_else(|| {
+        Self::of_read(&read)
+    }
+
+    /// What the method `read` of a file object has returned.
+    fn of_read(read: &Bound<'py, PyAny>) -> PyResult<Self> {
+        Self::of_buffer(read)?.ok_or_else(|| {
             PyTypeError::new_err(
                 "read() of the file object must return bytes: open it in binary mode",
             )
@@ -74,7 +79,8 @@ impl Read for FileObject {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         Python::attach(|py| {
             let read = self.0.bind(py).call_method1("read", (buffer.len(),))?;
-            let read = read.cast::<PyBytes>().map_err(PyErr::from)?.as_bytes();
+            let read = Bytes::of_read(&read)?;
+            let read = read.as_slice()?;
             let Some(start) = buffer.get_mut(..read.len()) else {
                 return Err(io::Error::other("read() returned more than was asked for"));
             };

@@ -10,6 +10,7 @@ mod encode;
 mod errors;
 mod input;
 mod metadata;
+mod numbers;
 mod objects;
 mod output;
 mod request;

@@ -1,15 +1,14 @@
 //! Metadata to store with a picture, and what of it is kept.
 
-use image_gip::{Metadata, MetadataPolicy, Text};
+use image_gip::{Metadata, MetadataLoss, MetadataPolicy, Text};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 
-use crate::errors::warn;
 use crate::input;
 
-/// Keeps what the policy of this name says. There is a warning for what may be missed.
-pub(crate) fn retain(py: Python<'_>, metadata: &mut Metadata, policy: &str) -> PyResult<()> {
+/// Keeps what the policy of this name says. Returns what was dropped that may be missed.
+pub(crate) fn retain(metadata: &mut Metadata, policy: &str) -> PyResult<Vec<MetadataLoss>> {
     let policy = match policy {
         "all" => MetadataPolicy::All,
         "safe" => MetadataPolicy::Safe,
@@ -20,8 +19,7 @@ pub(crate) fn retain(py: Python<'_>, metadata: &mut Metadata, policy: &str) -> P
             )));
         }
     };
-    let losses = metadata.retain(policy);
-    losses.iter().try_for_each(|loss| warn(py, "MetadataWarning", &loss.to_string()))
+    Ok(metadata.retain(policy))
 }
 
 /// The metadata that the caller gives. The encoder checks what can be stored.

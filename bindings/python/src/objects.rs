@@ -4,35 +4,43 @@ use image_gip::{
     Coding, Gaussian, Kernel, Limits as DecoderLimits, Metadata, Parameterization, StreamDecoder,
 };
 use numpy::PyArray1;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
+use crate::errors::vec_for;
 use crate::request;
 
 /// `image_gip.Limits`.
-#[derive(Debug, FromPyObject)]
-pub(crate) struct Limits {
-    max_width: u32,
-    max_height: u32,
-    max_pixels: u64,
-    max_gaussians: u32,
-    max_memory: u64,
-    max_work: u64,
+#[derive(Debug)]
+pub(crate) struct Limits(DecoderLimits);
+
+impl FromPyObject<'_, '_> for Limits {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, '_, PyAny>) -> PyResult<Self> {
+        let class = object.py().import("image_gip._types")?.getattr("Limits")?;
+        if !object.is_instance(&class)? {
+            let found = object.get_type().name()?;
+            let message = format!("limits must be an image_gip.Limits, not {found}");
+            return Err(PyTypeError::new_err(message));
+        }
+        // The class has checked the ranges.
+        let mut limits = DecoderLimits::default();
+        limits.max_width = object.getattr("max_width")?.extract()?;
+        limits.max_height = object.getattr("max_height")?.extract()?;
+        limits.max_pixels = object.getattr("max_pixels")?.extract()?;
+        limits.max_gaussians = object.getattr("max_gaussians")?.extract()?;
+        limits.max_memory = object.getattr("max_memory")?.extract()?;
+        limits.max_work = object.getattr("max_work")?.extract()?;
+        Ok(Self(limits))
+    }
 }
 
 impl Limits {
     /// The limits of a decoder.
     pub(crate) fn of(limits: Option<Self>) -> DecoderLimits {
-        let mut of_decoder = DecoderLimits::default();
-        if let Some(limits) = limits {
-            of_decoder.max_width = limits.max_width;
-            of_decoder.max_height = limits.max_height;
-            of_decoder.max_pixels = limits.max_pixels;
-            of_decoder.max_gaussians = limits.max_gaussians;
-            of_decoder.max_memory = limits.max_memory;
-            of_decoder.max_work = limits.max_work;
-        }
-        of_decoder
+        limits.map(|Self(limits)| limits).unwrap_or_default()
     }
 }
 
@@ -108,7 +116,7 @@ pub(crate) fn gaussians<'py>(
         (("center", "f4", (2,)), ("covariance", "f4", (2, 2)), ("color", "f4", (channels,)));
     let fields =
         vec![fields.0.into_pyobject(py)?, fields.1.into_pyobject(py)?, fields.2.into_pyobject(py)?];
-    let mut values = Vec::with_capacity(gaussians.len() * (6 + channels));
+    let mut values = vec_for(gaussians.len() * (6 + channels))?;
     for gaussian in gaussians {
         let [xx, xy, yy] = gaussian.covariance();
         values.extend(gaussian.center);

@@ -10,20 +10,29 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::background::{Channels, Pixels};
+use crate::array::{self, Shape};
+use crate::background::{Channels, Pixels, Sample};
 use crate::errors::decode_error;
 use crate::request::{Rendering, Request};
 
-/// An array that is borrowed for writing.
-enum Array<'py> {
-    U8(PyReadwriteArrayDyn<'py, u8>),
-    U16(PyReadwriteArrayDyn<'py, u16>),
-    F32(PyReadwriteArrayDyn<'py, f32>),
+/// Arrays of one type that are borrowed for writing.
+struct Arrays<'py, T: Element> {
+    /// The result.
+    out: PyReadwriteArrayDyn<'py, T>,
+    /// Where the picture is rendered first, if what is rendered is not the result.
+    scratch: Option<PyReadwriteArrayDyn<'py, T>>,
+}
+
+/// The arrays of any of the types.
+enum Typed<'py> {
+    U8(Arrays<'py, u8>),
+    U16(Arrays<'py, u16>),
+    F32(Arrays<'py, f32>),
 }
 
 /// The array for a rendering.
 pub(crate) struct Output<'a, 'py> {
-    array: Array<'py>,
+    arrays: Typed<'py>,
     channels: Channels<'a>,
 }
 
@@ -56,57 +65,80 @@ impl<'a, 'py> Output<'a, 'py> {
             (None, None) if header.depth == SampleDepth::Sixteen => dtype::<u16>(py),
             (None, None) => dtype::<u8>(py),
         };
-        let array = if kind.is_equiv_to(&dtype::<u8>(py)) {
-            Array::U8(array(py, shape, request.out)?)
+        let samples = (height as usize * width as usize).saturating_mul(channels.rendered);
+        let composed = channels.drops_alpha.then_some(samples);
+        let arrays = if kind.is_equiv_to(&dtype::<u8>(py)) {
+            Typed::U8(Arrays::new(py, shape, request.out, composed)?)
         } else if kind.is_equiv_to(&dtype::<u16>(py)) {
-            Array::U16(array(py, shape, request.out)?)
+            Typed::U16(Arrays::new(py, shape, request.out, composed)?)
         } else if kind.is_equiv_to(&dtype::<f32>(py)) {
-            Array::F32(array(py, shape, request.out)?)
+            // They are rendered as planes.
+            let planes = (channels.rendered > 1).then_some(samples);
+            Typed::F32(Arrays::new(py, shape, request.out, planes)?)
         } else {
             let message = format!("dtype {kind}; it must be uint8, uint16 or float32");
             return Err(PyTypeError::new_err(message));
         };
-        Ok(Self { array, channels })
+        Ok(Self { arrays, channels })
     }
 
     /// Whether the array shares memory with these bytes.
     pub(crate) fn overlaps(&self, bytes: &[u8]) -> bool {
-        let (start, length) = match &self.array {
-            Array::U8(array) => (array.data().addr(), array.len()),
-            Array::U16(array) => (array.data().addr(), 2 * array.len()),
-            Array::F32(array) => (array.data().addr(), 4 * array.len()),
+        let (start, length) = match &self.arrays {
+            Typed::U8(Arrays { out, .. }) => (out.data().addr(), out.len()),
+            Typed::U16(Arrays { out, .. }) => (out.data().addr(), 2 * out.len()),
+            Typed::F32(Arrays { out, .. }) => (out.data().addr(), 4 * out.len()),
         };
         let first = bytes.as_ptr().addr();
         start < first + bytes.len() && first < start + length
     }
 
     pub(crate) fn samples(&mut self) -> PyResult<Samples<'_>> {
-        let Self { array, channels } = self;
-        Ok(match array {
-            Array::U8(array) => Samples::U8(channels.pixels(array.as_slice_mut()?)?),
-            Array::U16(array) => Samples::U16(channels.pixels(array.as_slice_mut()?)?),
-            Array::F32(array) => Samples::F32(channels.pixels(array.as_slice_mut()?)?),
+        let Self { arrays, channels } = self;
+        Ok(match arrays {
+            Typed::U8(arrays) => Samples::U8(arrays.pixels(channels)?),
+            Typed::U16(arrays) => Samples::U16(arrays.pixels(channels)?),
+            Typed::F32(arrays) => Samples::F32(arrays.pixels(channels)?),
         })
     }
 
     /// The array, which is no longer borrowed.
     pub(crate) fn into_array(self) -> Bound<'py, PyAny> {
-        match self.array {
-            Array::U8(array) => array.as_any().clone(),
-            Array::U16(array) => array.as_any().clone(),
-            Array::F32(array) => array.as_any().clone(),
+        match self.arrays {
+            Typed::U8(Arrays { out, .. }) => out.as_any().clone(),
+            Typed::U16(Arrays { out, .. }) => out.as_any().clone(),
+            Typed::F32(Arrays { out, .. }) => out.as_any().clone(),
         }
     }
 }
+
+impl<'py, T: Element + Sample> Arrays<'py, T> {
+    /// `out` if that has the type and the shape, or a new array; and another one if its length is given.
+    /// NumPy raises MemoryError where there is too little memory.
+    fn new(
+        py: Python<'py>,
+        shape: Vec<usize>,
+        out: Option<&Bound<'py, PyAny>>,
+        scratch: Option<usize>,
+    ) -> PyResult<Self> {
+        let out = out.map_or_else(|| new(py, &shape), |out| borrowed(out, &shape))?;
+        let scratch = scratch.map(|length| new(py, &[length])).transpose()?;
+        Ok(Self { out, scratch })
+    }
+
+    fn pixels(&mut self, channels: &Channels<'_>) -> PyResult<Pixels<'_, T>> {
+        let scratch = self.scratch.as_mut().map(|array| array.as_slice_mut()).transpose()?;
+        channels.pixels(self.out.as_slice_mut()?, scratch)
+    }
+}
+
 impl Samples<'_> {
     /// Decodes the file of a decoder with the options that it has.
     pub(crate) fn decode(self, decoder: &mut Decoder<&[u8]>) -> Result<(), DecodeError> {
         match self {
-            Samples::U8(pixels) => pixels.fill(|out, _| decoder.decode_into(out)),
-            Samples::U16(pixels) => pixels.fill(|out, _| decoder.decode_into_u16(out)),
-            Samples::F32(pixels) => pixels.fill(|out, channels| {
-                interleaved(out, channels, |planes| decoder.decode_into_planes(planes))
-            }),
+            Samples::U8(pixels) => pixels.fill(|out| decoder.decode_into(out)),
+            Samples::U16(pixels) => pixels.fill(|out| decoder.decode_into_u16(out)),
+            Samples::F32(pixels) => pixels.fill_from_planes(|out| decoder.decode_into_planes(out)),
         }
     }
 
@@ -117,79 +149,42 @@ impl Samples<'_> {
         options: &RenderOptions,
     ) -> Result<(), DecodeError> {
         match self {
-            Samples::U8(pixels) => pixels.fill(|out, _| picture.render_u8(options, out)),
-            Samples::U16(pixels) => pixels.fill(|out, _| picture.render_u16(options, out)),
-            Samples::F32(pixels) => pixels.fill(|out, channels| {
-                interleaved(out, channels, |planes| picture.render_planes(options, planes))
-            }),
+            Samples::U8(pixels) => pixels.fill(|out| picture.render_u8(options, out)),
+            Samples::U16(pixels) => pixels.fill(|out| picture.render_u16(options, out)),
+            Samples::F32(pixels) => {
+                pixels.fill_from_planes(|out| picture.render_planes(options, out))
+            }
         }
     }
-}
-
-/// Renders planes, and interleaves them.
-fn interleaved(
-    out: &mut [f32],
-    channels: usize,
-    render: impl FnOnce(&mut [f32]) -> Result<(), DecodeError>,
-) -> Result<(), DecodeError> {
-    if channels == 1 {
-        return render(out);
-    }
-    let mut planes = vec![0.0; out.len()];
-    render(&mut planes)?;
-    let pixels = out.len() / channels;
-    for (channel, plane) in planes.chunks_exact(pixels).enumerate() {
-        for (sample, &value) in out.iter_mut().skip(channel).step_by(channels).zip(plane) {
-            *sample = value;
-        }
-    }
-    Ok(())
 }
 
 fn as_array<'a, 'py>(out: &'a Bound<'py, PyAny>) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
     out.cast().map_err(|_| PyTypeError::new_err("out must be a NumPy array"))
 }
 
-/// A new array, or `out` if that has the type and the shape.
-fn array<'py, T: Element>(
-    py: Python<'py>,
-    shape: Vec<usize>,
-    out: Option<&Bound<'py, PyAny>>,
+/// A new array.
+fn new<'py, T: Element>(py: Python<'py>, shape: &[usize]) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
+    py.import("numpy")?.call_method1("empty", (shape, dtype::<T>(py)))?.extract()
+}
+
+/// The array of the caller, if that has the type and the shape.
+fn borrowed<'py, T: Element>(
+    out: &Bound<'py, PyAny>,
+    shape: &[usize],
 ) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
-    let kind = dtype::<T>(py);
-    let Some(out) = out else {
-        // NumPy raises MemoryError where there is too little memory.
-        let new = py.import("numpy")?.call_method1("empty", (shape, kind))?;
-        return new.extract();
-    };
     let found = as_array(out)?;
     let refused = |what: &str, found: &dyn Display, wanted: &dyn Display| {
         Err(PyValueError::new_err(format!("out has {what} {found}; it must have {wanted}")))
     };
     let Ok(typed) = out.cast::<PyArrayDyn<T>>() else {
-        return refused("dtype", &found.dtype(), &kind);
+        return refused("dtype", &found.dtype(), &dtype::<T>(out.py()));
     };
     if found.shape() != shape {
-        return refused("shape", &Shape(found.shape()), &Shape(&shape));
+        return refused("shape", &Shape(found.shape()), &Shape(shape));
     }
-    if !found.is_c_contiguous() {
-        return Err(PyValueError::new_err(
-            "out must be C-contiguous: rows from the top, without gaps",
-        ));
-    }
+    array::check_memory("out", found)?;
     typed.try_readwrite().map_err(|error| match error {
         BorrowError::NotWriteable => PyValueError::new_err("out is read-only"),
         _ => PyValueError::new_err("out is in use by another call"),
     })
-}
-
-/// A shape as Python writes it.
-pub(crate) struct Shape<'a>(pub(crate) &'a [usize]);
-
-impl Display for Shape<'_> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let sides: Vec<_> = self.0.iter().map(usize::to_string).collect();
-        let comma = if sides.len() == 1 { "," } else { "" };
-        write!(f, "({}{comma})", sides.join(", "))
-    }
 }

@@ -5,7 +5,10 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::background::{Background, Channels};
-use crate::threads;
+use crate::numbers::{Integer, Real, shown};
+
+/// Most pixels on a side of the output.
+const MAX_SIDE: u32 = 1 << 23;
 
 /// Names of the colour models, as Pillow has them.
 const MODES: [(&str, ColorModel); 4] = [
@@ -23,16 +26,16 @@ pub(crate) fn mode_name(color: ColorModel) -> &'static str {
 /// What to render, as the caller asks for it: the keywords that `decode` and `StreamDecoder.image` share.
 #[derive(Debug)]
 pub(crate) struct Request<'a, 'py> {
-    pub(crate) size: Option<(i64, i64)>,
-    pub(crate) scale: Option<f64>,
-    pub(crate) region: Option<(i64, i64, i64, i64)>,
+    pub(crate) size: Option<(Integer<'py>, Integer<'py>)>,
+    pub(crate) scale: Option<Real>,
+    pub(crate) region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
     pub(crate) mode: Option<&'a str>,
     pub(crate) background: Option<&'a Bound<'py, PyAny>>,
     pub(crate) dtype: Option<&'a Bound<'py, PyAny>>,
     pub(crate) out: Option<&'a Bound<'py, PyAny>>,
     /// Render only the first Gaussians of the file.
-    pub(crate) prefix: Option<i64>,
-    pub(crate) threads: i64,
+    pub(crate) prefix: Option<Integer<'py>>,
+    pub(crate) threads: usize,
 }
 
 /// A request that was checked.
@@ -49,20 +52,24 @@ impl Request<'_, '_> {
     /// Refuses numbers and names that are out of range.
     pub(crate) fn check(&self) -> PyResult<Rendering> {
         let mut options = RenderOptions::new();
-        if let Some((width, height)) = self.size {
+        let side = |name: &str, side: &Integer<'_>| side.within(name, 1..=MAX_SIDE);
+        if let Some((width, height)) = &self.size {
             if self.scale.is_some() {
                 return Err(PyTypeError::new_err("size and scale exclude each other"));
             }
-            options = options.with_size(number("size", width)?, number("size", height)?);
+            options = options.with_size(side("size", width)?, side("size", height)?);
         }
-        if let Some(scale) = self.scale
+        let scale = self.scale.map(|Real(scale)| scale);
+        if let Some(scale) = scale
             && !(scale.is_finite() && scale > 0.0)
         {
+            let scale = shown(scale);
             return Err(PyValueError::new_err(format!("scale {scale}; it must be over 0")));
         }
-        if let Some((x, y, width, height)) = self.region {
-            let number = |value| number("region", value);
-            let (x, y, width, height) = (number(x)?, number(y)?, number(width)?, number(height)?);
+        if let Some((x, y, width, height)) = &self.region {
+            let place = |place: &Integer<'_>| place.within("region", 0..=MAX_SIDE - 1);
+            let (x, y) = (place(x)?, place(y)?);
+            let (width, height) = (side("region", width)?, side("region", height)?);
             options = options.with_region(Region { x, y, width, height });
         }
         let mode = self.mode.map(color_model).transpose()?;
@@ -75,11 +82,10 @@ impl Request<'_, '_> {
                 mode_name(mode)
             )));
         }
-        if let Some(prefix) = self.prefix {
-            options = options.with_prefix(number("prefix", prefix)?);
+        if let Some(prefix) = &self.prefix {
+            options = options.with_prefix(prefix.within("prefix", 0..=u32::MAX)?);
         }
-        let threads = threads::checked(self.threads)?;
-        Ok(Rendering { scale: self.scale, mode, background, options, threads })
+        Ok(Rendering { scale, mode, background, options, threads: self.threads })
     }
 }
 
@@ -127,11 +133,5 @@ fn color_model(mode: &str) -> PyResult<ColorModel> {
         PyValueError::new_err(format!(
             "mode {mode:?}; it must be \"L\", \"LA\", \"RGB\" or \"RGBA\""
         ))
-    })
-}
-
-fn number(name: &str, value: i64) -> PyResult<u32> {
-    u32::try_from(value).map_err(|_| {
-        PyValueError::new_err(format!("{name}: {value}; it must be 0 to {}", u32::MAX))
     })
 }

@@ -9,6 +9,7 @@ use pyo3::sync::MutexExt;
 
 use crate::errors::decode_error;
 use crate::input;
+use crate::numbers::{Integer, Real};
 use crate::objects::{self, Limits};
 use crate::output::Output;
 use crate::request::Request;
@@ -97,15 +98,15 @@ impl StreamDecoder {
     fn image<'py>(
         &self,
         py: Python<'py>,
-        size: Option<(i64, i64)>,
-        scale: Option<f64>,
-        region: Option<(i64, i64, i64, i64)>,
+        size: Option<(Integer<'py>, Integer<'py>)>,
+        scale: Option<Real>,
+        region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
         mode: Option<&str>,
         background: Option<&Bound<'py, PyAny>>,
         dtype: Option<&Bound<'py, PyAny>>,
         out: Option<&Bound<'py, PyAny>>,
-        prefix: Option<i64>,
-        threads: i64,
+        prefix: Option<Integer<'py>>,
+        #[pyo3(from_py_with = threads::checked)] threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let request =
             Request { size, scale, region, mode, background, dtype, out, prefix, threads };
@@ -146,8 +147,15 @@ impl StreamDecoder {
     /// least a sixth of all, and at most all. The first Gaussians of a file are the strongest.
     ///
     /// Raises:
-    ///     ValueError: The header has not arrived yet.
-    fn gaussians_for(&self, py: Python<'_>, width: u32, height: u32) -> PyResult<u32> {
+    ///     ValueError: The header has not arrived yet, or a side is out of range.
+    fn gaussians_for(
+        &self,
+        py: Python<'_>,
+        width: Integer<'_>,
+        height: Integer<'_>,
+    ) -> PyResult<u32> {
+        let width = width.within("width", 0..=u32::MAX)?;
+        let height = height.within("height", 0..=u32::MAX)?;
         let stream = self.lock_attached(py);
         Ok(stream.header().ok_or_else(no_header)?.gaussians_for(width, height))
     }

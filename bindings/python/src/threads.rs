@@ -4,21 +4,18 @@
 use std::thread;
 
 use image_gip::Threads;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Most threads of a call.
-const MAX_THREADS: i64 = 1024;
+use crate::numbers::Integer;
 
-/// Checks the argument `threads`.
-pub(crate) fn checked(threads: i64) -> PyResult<usize> {
-    match threads {
-        1..=MAX_THREADS => Ok(threads as usize),
-        _ => {
-            Err(PyValueError::new_err(format!("threads {threads}; it must be 1 to {MAX_THREADS}")))
-        }
-    }
+/// Most threads of a call.
+const MAX_THREADS: usize = 1024;
+
+/// The argument `threads`.
+pub(crate) fn checked(threads: &Bound<'_, PyAny>) -> PyResult<usize> {
+    threads.extract::<Integer<'_>>()?.within("threads", 1..=MAX_THREADS)
 }
 
 /// Calls `work` with a pool of so many threads, which have ended when this returns.

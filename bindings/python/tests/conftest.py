@@ -38,6 +38,14 @@ def saved(image: Image.Image, **options: Any) -> io.BytesIO:
     return file
 
 
+def unaligned(samples: NDArray[Any]) -> NDArray[Any]:
+    """A copy of an array, at an odd address."""
+    memory = np.zeros(samples.nbytes + samples.itemsize, np.uint8)
+    copy = memory[1 : 1 + samples.nbytes].view(samples.dtype).reshape(samples.shape)
+    copy[:] = samples
+    return copy
+
+
 @pytest.fixture(scope="session")
 def photo() -> Picture:
     """64 x 96 x 3 samples."""

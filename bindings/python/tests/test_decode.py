@@ -3,12 +3,13 @@
 import io
 import mmap
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import VECTORS, Picture
+from conftest import VECTORS, Picture, unaligned
 
 import image_gip
 from image_gip import Limits
@@ -89,16 +90,24 @@ def test_size_scale_and_region(file: bytes) -> None:
 
 def test_requests_that_are_out_of_range(file: bytes) -> None:
     refused: list[tuple[dict[str, Any], str]] = [
-        ({"size": (0, 5)}, "each side must be 1 to 8388608"),
-        ({"size": (-1, 5)}, "size: -1; it must be 0 to"),
-        ({"size": (9_000_000, 5)}, "each side must be 1 to 8388608"),
+        ({"size": (0, 5)}, "size 0; it must be 1 to 8388608"),
+        ({"size": (5, -1)}, "size -1; it must be 1 to 8388608"),
+        ({"size": (9_000_000, 5)}, "size 9000000; it must be 1 to 8388608"),
+        ({"size": (2**70, 5)}, f"size {2**70}; it must be 1 to 8388608"),
         ({"scale": 0.0}, "scale 0; it must be over 0"),
+        ({"scale": -1e-30}, "scale -1e-30; it must be over 0"),
+        ({"scale": 10**400}, "scale inf; it must be over 0"),
+        ({"scale": 1e9}, "each side must be 1 to 8388608"),
         ({"scale": float("nan")}, "scale NaN; it must be over 0"),
         ({"region": (90, 0, 10, 10)}, "not inside the 96x64 output"),
-        ({"region": (0, 0, 0, 10)}, "is empty or not inside"),
-        ({"mode": "L"}, "Rgb cannot be written as Gray"),
+        ({"region": (0, 0, 0, 10)}, "region 0; it must be 1 to 8388608"),
+        ({"region": (-1, 0, 10, 10)}, "region -1; it must be 0 to 8388607"),
+        ({"region": (0, 2**70, 10, 10)}, f"region {2**70}; it must be 0 to 8388607"),
+        ({"mode": "L"}, 'mode "L" of a picture with mode "RGB"; colours do not become gray'),
+        ({"mode": "LA"}, 'mode "LA" of a picture with mode "RGB"'),
         ({"mode": "CMYK"}, 'mode "CMYK"; it must be "L", "LA", "RGB" or "RGBA"'),
         ({"threads": 0}, "threads 0; it must be 1 to 1024"),
+        ({"threads": 2**70}, f"threads {2**70}; it must be 1 to 1024"),
     ]
     for keywords, message in refused:
         with pytest.raises(ValueError, match=message):
@@ -149,6 +158,7 @@ def test_out_that_does_not_fit(file: bytes) -> None:
         (np.asfortranarray(samples), "C-contiguous"),
         (samples[..., ::-1], "C-contiguous"),
         (read_only, "read-only"),
+        (unaligned(np.zeros((64, 96, 3), np.uint16)), "out is not aligned"),
     ]
     for out, message in refused:
         with pytest.raises(ValueError, match=message):
@@ -158,6 +168,8 @@ def test_out_that_does_not_fit(file: bytes) -> None:
         image_gip.decode(file, out=samples, dtype=np.uint16)
     with pytest.raises(TypeError, match="float64; it must be uint8, uint16 or float32"):
         image_gip.decode(file, out=np.zeros((64, 96, 3)))
+    with pytest.raises(TypeError, match="out is masked"):
+        image_gip.decode(file, out=np.ma.zeros((64, 96, 3), np.uint8))
     with pytest.raises(TypeError, match="out must be a NumPy array"):
         image_gip.decode(file, out=bytearray(64 * 96 * 3))  # type: ignore[arg-type]
     # A file in the memory of its own picture.
@@ -184,6 +196,35 @@ def test_limits(file: bytes) -> None:
         image_gip.gaussians(file, limits=Limits(max_memory=10))
     decoded = image_gip.decode(file, size=(70_000, 10), limits=Limits.none())
     assert decoded.shape == (10, 70_000, 3)
+
+
+@pytest.mark.parametrize("limits", [5, {}, (1, 2), "none", Limits])
+def test_limits_of_another_type(file: bytes, limits: Any) -> None:
+    calls: list[Callable[..., object]] = [
+        lambda: image_gip.decode(file, limits=limits),
+        lambda: image_gip.info(file, limits=limits),
+        lambda: image_gip.gaussians(file, limits=limits),
+        lambda: image_gip.StreamDecoder(limits=limits),
+        lambda: image_gip.encode(np.zeros((8, 8), np.uint8), limits=limits),
+    ]
+    for call in calls:
+        with pytest.raises(TypeError, match=r"limits must be an image_gip\.Limits, not "):
+            call()
+
+
+def test_limits_that_are_out_of_range(file: bytes) -> None:
+    for name in ("max_width", "max_height", "max_gaussians"):
+        for value in (-1, 2**32, 2**70):
+            with pytest.raises(ValueError, match=f"{name} {value}; it must be 0 to {2**32 - 1}"):
+                Limits(**{name: value})
+    for name in ("max_pixels", "max_memory", "max_work"):
+        for value in (-1, 2**64):
+            with pytest.raises(ValueError, match=f"{name} {value}; it must be 0 to {2**64 - 1}"):
+                Limits(**{name: value})
+    for wrong in (1.5, "5", None):
+        with pytest.raises(TypeError, match="max_work must be an integer, not "):
+            Limits(max_work=wrong)  # type: ignore[arg-type]
+    assert image_gip.decode(file, limits=Limits(max_width=np.int64(96))).shape == (64, 96, 3)  # type: ignore[arg-type]
 
 
 def test_info(photo: Picture) -> None:

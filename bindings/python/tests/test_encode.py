@@ -1,5 +1,6 @@
 """`encode`: the tool's bytes, arrays that are refused, and how an encoding ends early."""
 
+import io
 import os
 import signal
 import subprocess
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import Picture, draw
+from conftest import Picture, draw, unaligned
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -93,7 +94,7 @@ def test_arrays_that_are_refused() -> None:
         (picture.astype(np.float64), TypeError, "dtype float64; it must be uint8, uint16 or float"),
         (picture.astype(">u2"), TypeError, "dtype >u2; .* in the machine's byte order"),
         (picture.astype(bool), TypeError, "dtype bool"),
-        (picture[:, ::2], ValueError, "not C-contiguous; use numpy.ascontiguousarray"),
+        (picture[:, ::2], ValueError, "not C-contiguous: .*numpy.ascontiguousarray"),
         (picture[..., ::-1], ValueError, "not C-contiguous"),
         (np.asfortranarray(picture), ValueError, "not C-contiguous"),
         (picture[0, 0], ValueError, r"shape \(3,\); it must be height x width, or"),
@@ -101,6 +102,10 @@ def test_arrays_that_are_refused() -> None:
         (np.zeros((0, 4), np.uint8), ValueError, "4x0 pixels; each side must be 1 to 1048576"),
         (not_a_number, ValueError, r"the float at \(4, 7, 2\) is NaN; floats must be 0.0 to 1.0"),
         (out_of_range, ValueError, r"the float at \(9, 1\) is 255; .* use numpy.clip"),
+        (-out_of_range * 1e-32, ValueError, r"the float at \(9, 1\) is -2.55e-30; floats must"),
+        (unaligned(picture.astype(np.uint16)), ValueError, "not aligned .see numpy.require"),
+        (unaligned(not_a_number), ValueError, "not aligned"),
+        (np.ma.masked_array(picture, picture > 99), TypeError, "the array is masked"),
     ]
     for array, kind, message in refused:
         with pytest.raises(kind, match=message):
@@ -113,10 +118,17 @@ def test_options_that_are_refused(photo: Picture) -> None:
         ({"effort": 0}, ValueError, "effort 0; it must be 1 to 7"),
         ({"effort": 1000}, ValueError, "effort 1000; it must be 1 to 7"),
         ({"bpp": 0.0}, ValueError, "bits per pixel 0; it must be"),
-        ({"bytes": -5}, ValueError, "bytes -5; it must be at least 1"),
-        ({"bytes": 0}, ValueError, "size in bytes 0; it must be 1 to"),
+        ({"effort": 2**70}, ValueError, f"effort {2**70}; it must be 1 to 7"),
+        ({"effort": 1.5}, TypeError, "'float' object cannot be .*\n.* 'effort'"),
+        ({"seed": -1}, ValueError, f"seed -1; it must be 0 to {2**64 - 1}"),
+        ({"seed": 2**64}, ValueError, f"seed {2**64}; it must be 0 to"),
+        ({"psnr": 1e300}, ValueError, "1e300; it must be 1 to 120"),
+        ({"quality": -(10**400)}, ValueError, "quality -inf; it must be 0 to 100"),
+        ({"bytes": -5}, ValueError, "bytes -5; it must be 1 to 1073741824"),
+        ({"bytes": 0}, ValueError, "bytes 0; it must be 1 to 1073741824"),
+        ({"bytes": 2**63}, ValueError, f"bytes {2**63}; it must be 1 to 1073741824"),
         ({"bytes": 20}, ValueError, "this picture takes at least"),
-        ({"gaussians": 1 << 40}, ValueError, "it must be 1 to 4194304"),
+        ({"gaussians": 1 << 40}, ValueError, f"gaussians {1 << 40}; it must be 1 to 4194304"),
         ({"quality": float("nan")}, ValueError, "quality NaN; it must be 0 to 100"),
         ({"tune": "ssim"}, ValueError, 'tune "ssim"; it must be "visual" or "psnr"'),
         (
@@ -177,8 +189,13 @@ def test_what_a_decoder_would_refuse_is_not_encoded(photo: Picture) -> None:
 
 
 def test_a_target_out_of_reach(photo: Picture) -> None:
+    corner = photo[:16, :16].copy()
     with pytest.warns(image_gip.ShortfallWarning, match="dB is what this effort") as caught:
-        file = image_gip.encode(photo[:16, :16].copy(), psnr=120, effort=1)
+        file = image_gip.encode(corner, psnr=120, effort=1)
+    assert [warning.filename for warning in caught] == [__file__]
+    # At the line of the caller, not where the plug-in calls the encoder.
+    with pytest.warns(image_gip.ShortfallWarning, match="dB is what this effort") as caught:
+        Image.fromarray(corner).save(io.BytesIO(), "GIP", psnr=120, effort=1)
     assert [warning.filename for warning in caught] == [__file__]
     assert image_gip.decode(file).shape == (16, 16, 3)
 

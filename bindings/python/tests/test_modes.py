@@ -188,12 +188,17 @@ def test_profiles_of_other_colours() -> None:
     srgb = profile("sRGB")
     for image, data in [(gray, srgb), (color, inks())]:
         image.info["icc_profile"] = data
-        with pytest.warns(UserWarning, match=r"does not fit mode .*, and is not stored") as raised:
+        with pytest.warns(
+            image_gip.MetadataWarning, match=r"does not fit mode .*, and is not stored"
+        ) as raised:
             assert stored(image).icc is None
         assert raised[0].filename.endswith("conftest.py")
+        with pytest.warns(image_gip.MetadataWarning, match="does not fit mode"):
+            assert stored(image, icc_profile=memoryview(data)).icc is None
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert stored(color, icc_profile=srgb).icc == srgb
+        assert stored(color, icc_profile=bytearray(srgb)).icc == srgb
         assert stored(color, icc_profile=None).icc is None
         # It is no profile, and kept as it is.
         assert stored(gray, icc_profile=b"profile").icc == b"profile"

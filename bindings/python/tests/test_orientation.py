@@ -1,6 +1,7 @@
 """Pictures come as they are stored, and tell how to turn them for display."""
 
 import io
+import warnings
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image, ImageOps
 
 import image_gip
 from image_gip import StreamDecoder
+from image_gip._types import MetadataPolicy
 
 ORIENTATION = 0x0112
 XMP = b'<x:xmpmeta xmlns:x="adobe:ns:meta/"><rdf:Description tiff:Orientation="%d"/></x:xmpmeta>'
@@ -92,3 +94,32 @@ def test_orientations_that_are_none(value: int) -> None:
     assert image_gip.info(file).orientation == 1
     with Image.open(io.BytesIO(file)) as opened:
         assert ImageOps.exif_transpose(opened).size == (48, 32)
+
+
+@pytest.mark.parametrize("way", ["encode", "save"])
+@pytest.mark.parametrize("policy", ["all", "safe", "none"])
+@pytest.mark.parametrize("orientation", range(10))
+def test_an_orientation_is_not_dropped_in_silence(
+    orientation: int, policy: MetadataPolicy, way: str
+) -> None:
+    samples = draw(48, 32, 3)
+    data = exif(orientation)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if way == "encode":
+            file = image_gip.encode(
+                samples, gaussians=9, effort=1, exif=data.tobytes(), metadata=policy
+            )
+        else:
+            saved_to = io.BytesIO()
+            image = Image.fromarray(samples)
+            image.save(saved_to, "GIP", gaussians=9, effort=1, exif=data, metadata=policy)
+            file = saved_to.getvalue()
+    stored = orientation if orientation in range(1, 9) and policy != "none" else 1
+    assert image_gip.info(file).orientation == stored
+    is_lost = policy == "none" and orientation in range(2, 9)
+    messages = [str(warning.message) for warning in caught]
+    lost = "the orientation was dropped, so the picture is shown as it is stored"
+    assert messages == ([lost] if is_lost else [])
+    for warning in caught:
+        assert (warning.category, warning.filename) == (image_gip.MetadataWarning, __file__)

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from PIL import Image, ImageFile, UnidentifiedImageError
 
 import image_gip
 import image_gip.pillow
+from image_gip import _native
 
 
 class Counted(io.BytesIO):
@@ -75,6 +77,25 @@ def test_opening_reads_the_header_only(file: bytes) -> None:
         assert source.furthest < 200
         opened.load()
         assert source.furthest == len(file)
+
+
+def test_file_objects_that_give_other_buffers(file: bytes) -> None:
+    class Buffers(io.BytesIO):
+        def read(self, size: int | None = -1, /) -> Any:
+            return kind(super().read(size))
+
+    expected = image_gip.decode(file)
+    for kind in (bytearray, memoryview):
+        # Pillow's own formats compare the start of a file as bytes.
+        formats = ["GIP"] if kind is memoryview else None
+        with Image.open(Buffers(file), formats=formats) as opened:
+            np.testing.assert_array_equal(np.asarray(opened), expected)
+        with Image.open(Buffers(file), formats=formats) as opened:
+            opened.thumbnail((12, 12))
+            assert opened.size == (12, 8)
+        np.testing.assert_array_equal(image_gip.decode(Buffers(file)), expected)
+    with pytest.raises(TypeError, match="binary mode"):
+        _native.read_header(io.StringIO("text"))  # type: ignore[arg-type]
 
 
 def test_drafts(file: bytes) -> None:

@@ -223,3 +223,44 @@ def thumbnail(file: bytes) -> None:
 )
 def test_nothing_else_leaks(work: Callable[[bytes], object], file: bytes) -> None:
     assert_no_leak(lambda: work(file), 300)
+
+
+SHORT_OF_MEMORY = """
+import resource, sys
+import numpy as np
+import image_gip
+
+cut_out, work = sys.argv[1], sys.argv[2]
+colors = np.zeros((3000, 4000, 3), np.float32)  # no memory is touched
+with open("/proc/self/statm") as statm:
+    used = int(statm.read().split()[0]) * resource.getpagesize()
+stream = image_gip.StreamDecoder().feed(open(cut_out, "rb").read())
+# The result fits, and not what is needed beside it.
+room = {"encode": 50, "floats": 240, "over": 150, "stream": 150}[work] << 20
+resource.setrlimit(resource.RLIMIT_AS, (used + room, used + room))
+try:
+    if work == "encode":
+        image_gip.encode(colors, effort=1)
+    elif work == "floats":
+        image_gip.decode(cut_out, size=(4000, 2500), dtype="f4")
+    elif work == "over":
+        image_gip.decode(cut_out, size=(6000, 5000), mode="RGB")
+    else:
+        stream.image(size=(6000, 5000), mode="RGB")
+except MemoryError:
+    sys.exit(7)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="it reads /proc")
+@pytest.mark.parametrize("work", ["encode", "floats", "over", "stream"])
+def test_without_memory_there_is_a_memory_error(work: str) -> None:
+    path = VECTORS / "entropy-rgba8.gip"
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    process = subprocess.run(
+        [sys.executable, "-c", SHORT_OF_MEMORY, path, work],
+        env=environment,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
+    assert process.returncode == 7, process.stderr

@@ -63,6 +63,12 @@ def test_previews(file: bytes) -> None:
     stream = StreamDecoder().feed(file)
     everything = stream.arrived
     assert stream.gaussians_for(1, 1) < everything == stream.gaussians_for(2000, 2000)
+    with pytest.raises(ValueError, match="height -4; it must be 0 to 4294967295"):
+        stream.gaussians_for(1, -4)
+    with pytest.raises(ValueError, match=f"width {2**40}; it must be 0 to 4294967295"):
+        stream.gaussians_for(2**40, 4)
+    with pytest.raises(ValueError, match="prefix -1; it must be 0 to 4294967295"):
+        stream.image(prefix=-1)
     few = stream.image(prefix=stream.gaussians_for(12, 8), size=(12, 8))
     assert np.abs(few - stream.image(size=(12, 8)).astype(int)).mean() < 30
 

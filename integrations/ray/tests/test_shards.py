@@ -6,6 +6,7 @@ import io
 import json
 import os
 import tarfile
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from conftest import OPTIONS, contents, draw, make_pictures, run_serially
-from PIL import Image
+from PIL import Image, ImageOps
 
 import image_gip
 from image_gip._dataset import containers, folder, shards
@@ -267,6 +268,38 @@ def test_metadata(policy: str, tags: int, tmp_path: Path) -> None:
     ((_, file),) = containers.pictures(out / "shard-000000.parquet")
     with Image.open(io.BytesIO(file)) as image:
         assert len(image.getexif()) == tags
+
+
+@pytest.mark.parametrize("policy", ["all", "safe", "none"])
+def test_pictures_stay_upright_without_metadata(policy: str, tmp_path: Path) -> None:
+    for orientation in range(1, 9):
+        exif = Image.Exif()
+        exif[0x0112] = orientation
+        for suffix in ("jpg", "png", "webp", "tif"):
+            draw(1).save(tmp_path / f"{orientation}_{suffix}.{suffix}", exif=exif)
+    # Exif that cannot be read, and some of which only the orientation can.
+    draw(1).save(tmp_path / "damaged.jpg", exif=b"Exif\0\0II*\0")
+    cut = b"MM\0*\0\0\0\x08\0\x02\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\x82\x98\0\x02\0\0\0\x99"
+    draw(1).save(tmp_path / "cut.jpg", exif=b"Exif\0\0" + cut)
+    # Pillow turns no file of which it cannot read the Exif at all.
+    readable = "cut.jpg" if policy != "none" else "[cd]*.jpg"
+    photos = sorted([*tmp_path.glob("[1-8]_*"), *tmp_path.glob(readable)])
+    options = {"psnr": 32.0, "effort": 1, "metadata": policy}
+    with warnings.catch_warnings():
+        # Of the damaged Exif, and of a PSNR that is out of reach.
+        warnings.simplefilter("ignore")
+        encoded = run_serially(photos, tmp_path / "encoded", options=options)
+        assert folder.count_errors(encoded) == 0
+        files = dict(containers.pictures(encoded / "shard-000000.parquet"))
+        for photo in photos:
+            file = files[photo.with_suffix("").as_posix().lstrip("/")]
+            with Image.open(photo) as source, Image.open(io.BytesIO(file)) as found:
+                expected = ImageOps.exif_transpose(source).convert("RGB")
+                shown = found if policy == "none" else ImageOps.exif_transpose(found)
+                assert "exif" not in found.info or policy != "none"
+                assert shown.size == expected.size, photo
+                error = np.asarray(shown).astype(int) - np.asarray(expected)
+                assert np.abs(error).mean() < 9, photo
 
 
 @pytest.mark.parametrize("keep", [False, True])

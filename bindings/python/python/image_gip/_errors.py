@@ -1,4 +1,7 @@
-"""The exceptions of the module."""
+"""The exceptions and warnings of the module."""
+
+import sys
+import warnings
 
 
 class GipError(Exception):
@@ -49,3 +52,13 @@ class ShortfallWarning(UserWarning):
 
 class MetadataWarning(UserWarning):
     """Metadata that may be missed was dropped, as was asked for, or because it is damaged."""
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Warns at the line that calls this package, or that calls Pillow, which calls it."""
+    level, frame = 1, sys._getframe()
+    while frame.f_globals.get("__name__", "").partition(".")[0] in {"image_gip", "PIL"}:
+        if frame.f_back is None:
+            break
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, category, stacklevel=level)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import io
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageCms
+
+from image_gip._errors import MetadataWarning, warn
 
 #: What modes of 8 bits become, without alpha.
 _COLORS = {
@@ -51,8 +52,7 @@ def stored_profile(image: Image.Image, profile: bytes | None) -> bytes | None:
     if profile[36:40] == b"acsp" and profile[16:20] != space:
         found = profile[16:20].decode("ascii", "replace").strip()
         message = f"an ICC profile for {found} does not fit mode {image.mode}, and is not stored"
-        # At the line that calls `Image.save`.
-        warnings.warn(message, stacklevel=4)
+        warn(message, MetadataWarning)
         return None
     return profile
 

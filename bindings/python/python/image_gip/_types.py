@@ -1,6 +1,7 @@
 """What functions of the module take and return besides arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from operator import index
 from typing import Literal, TypeAlias
 
 #: The channels of a picture, as Pillow names them.
@@ -13,11 +14,23 @@ Precision: TypeAlias = Literal["entropy", "packed", "f32"]
 MetadataPolicy: TypeAlias = Literal["all", "safe", "none"]
 
 
+#: The largest value of each limit.
+_MOST = {
+    "max_width": 2**32 - 1,
+    "max_height": 2**32 - 1,
+    "max_pixels": 2**64 - 1,
+    "max_gaussians": 2**32 - 1,
+    "max_memory": 2**64 - 1,
+    "max_work": 2**64 - 1,
+}
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Limits:
-    """What decoding a file may cost at most.
+    """What decoding a file may cost at most: each an integer from 0.
 
-    The defaults accept every ordinary picture, and bound what a hostile file costs to a few hundred
+    A width, a height or a number of Gaussians is at most 2**32 - 1, and the others 2**64 - 1. The
+    defaults accept every ordinary picture, and bound what a hostile file costs to a few hundred
     megabytes and a few seconds more than an ordinary picture of its size.
     """
 
@@ -29,22 +42,27 @@ class Limits:
     max_pixels: int = 1 << 28
     #: Most Gaussians.
     max_gaussians: int = 1 << 22
-    #: Most bytes that the decoder holds; the output array does not count.
+    #: Most bytes that the decoder holds. The output array does not count, nor does another one,
+    #: which is needed to compose, and for float32 of several channels.
     max_memory: int = 512 << 20
     #: Most evaluations of the kernel in one rendering beyond 64 for each pixel.
     max_work: int = 1 << 32
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            try:
+                is_allowed = 0 <= index(value) <= _MOST[field.name]
+            except TypeError:
+                message = f"{field.name} must be an integer, not {type(value).__name__}"
+                raise TypeError(message) from None
+            if not is_allowed:
+                raise ValueError(f"{field.name} {value}; it must be 0 to {_MOST[field.name]}")
+
     @classmethod
     def none(cls) -> "Limits":
         """No limits but those of the format. For trusted files only."""
-        return cls(
-            max_width=2**32 - 1,
-            max_height=2**32 - 1,
-            max_pixels=2**64 - 1,
-            max_gaussians=2**32 - 1,
-            max_memory=2**64 - 1,
-            max_work=2**64 - 1,
-        )
+        return cls(**_MOST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +89,9 @@ class Info:
     mode: Mode
     #: Bits per sample of the picture that was encoded: 8 or 16.
     depth: int
-    #: How the picture is turned for display, as Exif has it: 1 (not at all) to 8. Width, height and
-    #: all samples are those of the picture as it is stored.
+    #: How the picture is turned for display, as the Exif of the file has it: 1 (not at all) to 8,
+    #: also where :func:`image_gip.info` leaves Exif out. Width, height and all samples are those of
+    #: the picture as it is stored.
     orientation: int
     #: Number of Gaussians, as the header declares it.
     gaussians: int

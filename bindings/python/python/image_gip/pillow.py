@@ -14,7 +14,8 @@ La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK 
 
 As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
 turns them; ``save`` stores the ICC profile of the picture by itself, and takes ``icc_profile``,
-``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``.
+``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``: with ``metadata="none"``,
+turn the picture before, as nothing in the file tells how it is to be turned.
 """
 
 from __future__ import annotations
@@ -176,7 +177,8 @@ class _Decoder(ImageFile.PyDecoder):
 
 
 def _accept(prefix: bytes) -> bool:
-    return prefix.startswith(_SIGNATURE)
+    # A file object may give any buffer.
+    return bytes(prefix).startswith(_SIGNATURE)
 
 
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
@@ -184,6 +186,8 @@ def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
     options: dict[str, Any] = {name: asked[name] for name in _OPTIONS & asked.keys()}
     # As in Pillow's own formats, the profile goes with the picture, and the rest on request.
     profile = asked.get("icc_profile", image.info.get("icc_profile"))
+    if profile is not None:
+        profile = bytes(memoryview(profile))
     options["icc"] = _modes.stored_profile(image, profile)
     if exif := asked.get("exif"):
         options["exif"] = exif.tobytes() if isinstance(exif, Image.Exif) else exif

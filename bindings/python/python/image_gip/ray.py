@@ -80,7 +80,8 @@ def encode_dataset(
     """Encodes pictures of the formats that Pillow reads to ``.gip``.
 
     Gray pictures of 16 bits keep them; colours have 8, as Pillow has no more. ICC
-    profile, Exif and XMP are kept, or what ``metadata`` says.
+    profile, Exif and XMP are kept, or what ``metadata`` says. If that is ``"none"``, so that no
+    orientation is stored, pictures are turned upright; else they are stored as they are, with it.
 
     Args:
         pictures: A list of paths, or a manifest: see the module.

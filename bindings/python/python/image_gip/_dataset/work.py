@@ -6,8 +6,9 @@ import errno
 import io
 import re
 import stat
+import struct
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -139,6 +140,10 @@ def _encode(data: bytes, **options: Any) -> Picture:
     with _opened(data, _FORMATS) as image:
         # PNG may have its metadata at the end.
         image.load()
+        if options.get("metadata") == "none":
+            # Nothing will tell how it is to be turned.
+            _make_upright(image)
+            return _saved(image, "gip", **options)
         metadata = _metadata(image, "exif", "xmp")
         if not metadata.get("exif", b"").startswith((b"Exif\0\0II", b"Exif\0\0MM", b"II", b"MM")):
             metadata.pop("exif", None)
@@ -162,6 +167,16 @@ def _thumbnail(data: bytes, *, size: list[int], format: str) -> Picture:
         image.thumbnail((width, height))
         ImageOps.exif_transpose(image, in_place=True)
         return _saved(image, format, **_metadata(image, "icc_profile"))
+
+
+def _make_upright(image: Image.Image) -> None:
+    """Turns a picture, and drops its Exif and XMP. Damaged Exif tells no orientation."""
+    with suppress(OSError, SyntaxError, ValueError, struct.error):
+        image.getexif()
+    # What was read is known still, and what is not there is not written anew.
+    for name in ("exif", "xmp"):
+        image.info.pop(name, None)
+    ImageOps.exif_transpose(image, in_place=True)
 
 
 def _metadata(image: Image.Image, *names: str) -> dict[str, Any]:
