@@ -509,15 +509,12 @@ fn options_out_of_range_are_refused_with_what_is_allowed() {
         assert_eq!((least, most), range, "{target:?}");
         assert!(name.contains(what), "{name}");
     }
-    // No file of this picture is that small: signature, header, end.
-    let error = refused(quick(Target::Bytes(20)));
-    let OptionError::Size { bytes: 20, least, metadata: 0 } = error else { panic!("{error}") };
-    let smallest = quick(Target::Bytes(least)).encode(&source).expect("it encodes");
-    assert!(smallest.bytes.len() as u64 <= least);
-    assert_eq!(
-        refused(quick(Target::Bytes(least - 1))),
-        OptionError::Size { bytes: least - 1, least, metadata: 0 }
-    );
+    // A size that the file would have without its metadata.
+    let mut metadata = Metadata::default();
+    metadata.xmp = Some(vec![b'x'; 1000]);
+    let error = refused(quick(Target::Bytes(500)).with_metadata(metadata));
+    let OptionError::Size { bytes: 500, least, metadata } = error else { panic!("{error}") };
+    assert!(metadata > 1000 && (metadata..metadata + 200).contains(&least), "{error}");
 
     for (keyword, text, expected) in [
         ("k".repeat(80), "", MetadataError::Keyword("k".repeat(80))),
@@ -627,6 +624,35 @@ fn what_a_target_does_not_reach_is_told() {
     ] {
         let text = shortfall.expect("just seen").to_string();
         assert!(text.contains(&said), "{text}");
+    }
+}
+
+#[test]
+fn a_size_below_the_least_file_gives_that() {
+    let samples = noise(24 * 24);
+    let source = Source::new_u8(24, 24, ColorModel::Gray, &samples).expect("sizes agree");
+    for precision in [Precision::Entropy, Precision::Packed, Precision::Float] {
+        let encoder = |target| quick(target).with_precision(precision);
+        let encoded = |target| encoder(target).encode(&source).expect("it encodes");
+        let smallest = encoded(Target::Bytes(1));
+        check(&smallest, &samples);
+        let bytes = smallest.bytes.len();
+        let shortfall = Some(Shortfall::SizeAbove { bytes, metadata: 0 });
+        assert_eq!(smallest.report.gaussians, 0);
+        assert_eq!(smallest.report.shortfall, shortfall);
+        // A rate of less than a byte, and the size just below.
+        for target in [Target::BitsPerPixel(1e-6), Target::Bytes(bytes as u64 - 1)] {
+            let same = encoded(target);
+            assert_eq!((same.bytes, same.report.shortfall), (smallest.bytes.clone(), shortfall));
+        }
+        assert_eq!(encoded(Target::Bytes(bytes as u64)).report.shortfall, None);
+        // Metadata that do not matter, as the file would be too large without them.
+        let mut metadata = Metadata::default();
+        metadata.xmp = Some(vec![b'x'; 1000]);
+        let with_metadata = encoder(Target::Bytes(20)).with_metadata(metadata);
+        let shortfall = with_metadata.encode(&source).expect("it encodes").report.shortfall;
+        let text = shortfall.expect("it is too large").to_string();
+        assert!(text.contains("the least") && text.contains("are metadata"), "{text}");
     }
 }
 

@@ -182,8 +182,8 @@ impl Encoder {
     /// it can, and [`Report::shortfall`] gives the reason.
     ///
     /// # Errors
-    /// [`EncodeError::Option`] when an option is out of range, when the target is a size smaller
-    /// than a file without Gaussians, or when no thread can be started. [`EncodeError::Limit`] when
+    /// [`EncodeError::Option`] when an option is out of range, when the target is a size that only
+    /// the metadata keep out of reach, or when no thread can be started. [`EncodeError::Limit`] when
     /// the decoder would refuse the file: for the size of the picture, its metadata or the target's
     /// number of Gaussians, before any work is done; for what the Gaussians take, at the end.
     pub fn encode(&self, source: &Source<'_>) -> Result<Encoded, EncodeError> {

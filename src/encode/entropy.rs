@@ -32,17 +32,14 @@ const FACTORS: (f64, f64) = (0.25, 4.0);
 /// there are two of each: of noise it is a low one, of smooth pictures a high one.
 const POWERS: (f64, f64) = (0.4, 2.0);
 
-/// The bits of the Gaussians in a file of a size.
-pub(crate) fn bits_for_size(
-    bytes: u64,
+/// Size in bytes of a file without Gaussians.
+pub(crate) fn least_length(
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<f64, EncodeError> {
+) -> Result<u64, EncodeError> {
     let lattice = rate_model::lattice(0.0, layout.header().color);
     let empty = LatticeCodes { lattice, codes: Vec::new() };
-    let least = layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64;
-    layout.check_size(bytes, least)?;
-    Ok(((bytes - least) * 8) as f64)
+    Ok(layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64)
 }
 
 /// The file of a finished fit, which is extended and coded for the target.

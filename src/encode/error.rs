@@ -82,7 +82,7 @@ pub enum OptionError {
         /// The largest number allowed.
         most: f64,
     },
-    /// The target is a size smaller than a file without Gaussians.
+    /// The target is a size that a file without Gaussians exceeds by its metadata alone.
     #[error(
         "a size of {bytes} bytes; this picture takes at least {least} without any Gaussian, of which \
          {metadata} are metadata"

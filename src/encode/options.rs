@@ -13,7 +13,7 @@ pub enum Target {
     Gaussians(u32),
     /// A file of at most this many bytes, from 1 to 2^30, and of at least 99 % of them. Where so many
     /// bytes bring hardly anything, the file is smaller, and [`Report::shortfall`](crate::Report) says
-    /// so.
+    /// so. So it does of the least file, one without Gaussians, where that is larger.
     Bytes(u64),
     /// A file of at most this many bits per pixel, from 10^-6 to 10^6, and of at least 99 % of
     /// them. The whole file counts; see also [`Target::Bytes`].

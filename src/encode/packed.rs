@@ -3,7 +3,6 @@
 use super::error::EncodeError;
 use super::file::{FileLayout, packed_layers_length};
 use super::fit::budget::Budget;
-use super::fit::training::Training;
 use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{PSNR_TOLERANCE, Precision, SIZE_TOLERANCE, Target};
@@ -30,25 +29,22 @@ const MAX_EXTENSIONS: u32 = 4;
 /// How many single Gaussians are tried without.
 const MAX_TRIALS: usize = 64;
 
-/// How many Gaussians a file of a size holds, up to `most`.
-pub(crate) fn count_for_size(
-    bytes: u64,
-    most: usize,
-    precision: Precision,
-    training: &Training,
-    channels: usize,
-    layout: &FileLayout<'_>,
-) -> Result<usize, EncodeError> {
-    let quantizers = quantizers(precision, training, channels);
-    let least = layout.least_length(&quantizers);
-    layout.check_size(bytes, least)?;
-    let fits = |count: usize| least + packed_layers_length(&quantizers, count) <= bytes;
-    let (mut low, mut high) = (0, most + 1);
+/// Size in bytes of a file without Gaussians.
+pub(crate) fn least_length(job: &Job<'_>, layout: &FileLayout<'_>) -> u64 {
+    let empty = PackedCodes { quantizers: quantizers(job), codes: Vec::new() };
+    layout.write_packed(&empty).len() as u64
+}
+
+/// How many Gaussians fit into so many bytes of layers, up to one for each pixel.
+pub(crate) fn count_for_size(bytes: u64, job: &Job<'_>) -> usize {
+    let quantizers = quantizers(job);
+    let fits = |count: usize| packed_layers_length(&quantizers, count) <= bytes;
+    let (mut low, mut high) = (0, job.pixels() + 1);
     while high - low > 1 {
         let middle = usize::midpoint(low, high);
         if fits(middle) { low = middle } else { high = middle }
     }
-    Ok(low)
+    low
 }
 
 /// The file of a finished fit, which is extended or trimmed to the target.
@@ -75,11 +71,11 @@ pub(crate) fn finish(
 }
 
 /// Quantizers of the depths that a file will have.
-fn quantizers(precision: Precision, training: &Training, channels: usize) -> Vec<Quantizer> {
-    let depths = &training.quantization;
+fn quantizers(job: &Job<'_>) -> Vec<Quantizer> {
+    let depths = &job.training.quantization;
     let packed = |bits| Quantizer::Linear(UniformQuantizer { bits, scale: 1.0, offset: 0.0 });
-    (0..5 + channels)
-        .map(|component| match (precision, component) {
+    (0..5 + job.source.color().channels())
+        .map(|component| match (job.precision, component) {
             (Precision::Float, _) => Quantizer::Float,
             (_, 0 | 1) if depths.center.is_some() => Quantizer::Float,
             (_, 5..) if depths.color.is_some() => Quantizer::Float,

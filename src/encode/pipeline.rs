@@ -86,6 +86,7 @@ fn encode_for_target(
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
+    let job = &Job { target: within_reach(job, &layout, observer)?, ..*job };
     let budget = budget(job, &raster, &layout, observer)?;
     let expected = match budget {
         Budget::Count(count) => count,
@@ -121,6 +122,7 @@ fn encode_for_target(
     let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
     let reached = Reached {
         bytes: file.len(),
+        metadata: layout.metadata_length(),
         psnr: distortion.psnr,
         exact_psnr,
         quality,
@@ -142,6 +144,30 @@ fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
     workload.training(iterations) + rounds * workload.retraining(iterations) + later
 }
 
+/// The target, or the size of a file without Gaussians if the target is a smaller one.
+fn within_reach(
+    job: &Job<'_>,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Target, EncodeError> {
+    let Some(bytes) = job.target.bytes(job.pixels()) else { return Ok(job.target) };
+    let least = least_length(job, layout, observer)?;
+    layout.check_size(bytes, least)?;
+    Ok(if bytes < least { Target::Bytes(least) } else { job.target })
+}
+
+/// Size in bytes of a file without Gaussians.
+fn least_length(
+    job: &Job<'_>,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<u64, EncodeError> {
+    match job.precision {
+        Precision::Entropy => entropy::least_length(layout, observer),
+        Precision::Packed | Precision::Float => Ok(packed::least_length(job, layout)),
+    }
+}
+
 /// What decides the number of Gaussians during training.
 fn budget(
     job: &Job<'_>,
@@ -149,16 +175,15 @@ fn budget(
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<Budget, EncodeError> {
-    let Job { target, precision, training, .. } = *job;
+    let Job { target, precision, .. } = *job;
     let is_coded = precision == Precision::Entropy;
     if let Some(bytes) = target.bytes(raster.pixels()) {
-        if is_coded {
-            let bits = entropy::bits_for_size(bytes, layout, observer)?;
-            return Ok(Budget::Bits { bits, tune: job.tune });
-        }
-        let most = raster.pixels();
-        return packed::count_for_size(bytes, most, precision, training, raster.channels, layout)
-            .map(Budget::Count);
+        let bytes = bytes - least_length(job, layout, observer)?;
+        return Ok(if is_coded {
+            Budget::Bits { bits: (bytes * 8) as f64, tune: job.tune }
+        } else {
+            Budget::Count(packed::count_for_size(bytes, job))
+        });
     }
     if let Some(quality) = target.quality() {
         let means = match &raster.sensitivity {

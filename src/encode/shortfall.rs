@@ -39,6 +39,13 @@ pub enum Shortfall {
         /// Gaussians in the file.
         gaussians: u32,
     },
+    /// The file has no Gaussian, and is larger than its target all the same.
+    SizeAbove {
+        /// Bytes of the file.
+        bytes: usize,
+        /// Bytes of the metadata in it.
+        metadata: usize,
+    },
     /// A file of the target's size shows no better picture at this effort than this smaller one.
     SizeUseless {
         /// Bytes of the file.
@@ -71,6 +78,8 @@ const BYTES_OF_GAUSSIAN: f64 = 24.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reached {
     pub(crate) bytes: usize,
+    /// Bytes of the metadata among them.
+    pub(crate) metadata: usize,
     /// In dB.
     pub(crate) psnr: f64,
     /// The PSNR in dB of a picture of which nothing but the rounding to samples is left.
@@ -85,7 +94,7 @@ pub(crate) struct Reached {
 impl Shortfall {
     /// That of a file; `None` if it meets its target.
     pub(crate) fn of(target: Target, pixels: usize, reached: Reached) -> Option<Self> {
-        let Reached { bytes, psnr, exact_psnr, quality, verdict, gaussians } = reached;
+        let Reached { bytes, metadata, psnr, exact_psnr, quality, verdict, gaussians } = reached;
         if let Target::Psnr(target) = target {
             return if psnr < target {
                 Some(Self::PsnrBelow { psnr })
@@ -108,6 +117,9 @@ impl Shortfall {
         }
         let most = target.bytes(pixels)? as f64;
         let missing = most - bytes as f64;
+        if missing < 0.0 {
+            return Some(Self::SizeAbove { bytes, metadata });
+        }
         if missing <= (1.0 - SIZE_TOLERANCE) * most {
             return None;
         }
@@ -137,6 +149,13 @@ impl fmt::Display for Shortfall {
             }
             Self::QualityAbove { quality, gaussians } => {
                 write!(f, "with {gaussians} Gaussians the picture already has quality {quality:.1}")
+            }
+            Self::SizeAbove { bytes, metadata } => {
+                write!(f, "{bytes} bytes are the least that this picture takes")?;
+                if *metadata > 0 {
+                    write!(f, ", of which {metadata} are metadata")?;
+                }
+                Ok(())
             }
             Self::SizeUseless { bytes, gaussians } => write!(
                 f,

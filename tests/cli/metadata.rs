@@ -186,9 +186,11 @@ fn a_size_that_metadata_alone_exceeds_names_the_way_out() {
     room.ok(&[&args[..], &["--metadata", "safe"]].concat());
     assert!(room.read("a.gip").len() <= 5000);
 
-    // What is too small without metadata, too, is another error.
-    let output = room.run(&["encode", "a.jpg", "b.gip", "--bytes", "50"]);
-    assert!(!text(&output.stderr).contains("--metadata"), "{}", text(&output.stderr));
+    // What is too small without metadata, too, is as small as can be.
+    let report =
+        room.json(&["encode", "a.jpg", "b.gip", "--bytes", "50", "--effort", "1", "--json"]);
+    let reason = report["shortfall"].as_str().expect("it says why");
+    assert!(reason.contains("are metadata"), "{reason}");
     let (_, errors) = room.batch(3, &["a.jpg", "--out", "out", "--bytes", "5000", "--effort", "1"]);
     assert!(errors.contains("--metadata safe"), "{errors}");
 }

@@ -30,8 +30,8 @@ const NEWS: f64 = 0.002;
 /// lock is released meanwhile, and Ctrl-C ends it.
 ///
 /// At most one target may be given; without any of them it is quality=75. A file that cannot meet its
-/// target comes as close as it can; where that means less PSNR or quality than that, there is a
-/// ShortfallWarning.
+/// target comes as close as it can; where that means less PSNR or quality than that, or a larger file,
+/// there is a ShortfallWarning.
 ///
 /// Args:
 ///     array: height x width or height x width x channels samples, C-contiguous and aligned: uint8, uint16, or
@@ -39,7 +39,8 @@ const NEWS: f64 = 0.002;
 ///         green, blue; or red, green, blue, alpha. Colours are sRGB unless `icc` says otherwise; alpha
 ///         is straight. The array is not copied, but for float32, and must not change during the call.
 ///     bpp: A file of at most so many bits per pixel, 1e-6 to 1e6.
-///     bytes: A file of at most so many bytes, 1 to 2**30.
+///     bytes: A file of at most so many bytes, 1 to 2**30. That only the metadata keep it out of reach is
+///         an error.
 ///     quality: A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 50 is
 ///         medium, 70 high, and from 90 on people see no difference. No more than 97 is aimed at.
 ///     psnr: A PSNR of the decoded file in dB, 1 to 120.
@@ -128,7 +129,8 @@ pub(crate) fn encode<'py>(
     if let Some(
         shortfall @ (Shortfall::PsnrBelow { .. }
         | Shortfall::QualityBelow { .. }
-        | Shortfall::QualityCapped { .. }),
+        | Shortfall::QualityCapped { .. }
+        | Shortfall::SizeAbove { .. }),
     ) = encoded.report.shortfall
     {
         warn(py, "ShortfallWarning", &shortfall.to_string())?;

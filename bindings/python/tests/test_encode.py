@@ -127,7 +127,7 @@ def test_options_that_are_refused(photo: Picture) -> None:
         ({"bytes": -5}, ValueError, "bytes -5; it must be 1 to 1073741824"),
         ({"bytes": 0}, ValueError, "bytes 0; it must be 1 to 1073741824"),
         ({"bytes": 2**63}, ValueError, f"bytes {2**63}; it must be 1 to 1073741824"),
-        ({"bytes": 20}, ValueError, "this picture takes at least"),
+        ({"bytes": 900, "xmp": b"x" * 2000}, ValueError, "of which 2... are metadata"),
         ({"gaussians": 1 << 40}, ValueError, f"gaussians {1 << 40}; it must be 1 to 4194304"),
         ({"quality": float("nan")}, ValueError, "quality NaN; it must be 0 to 100"),
         ({"tune": "ssim"}, ValueError, 'tune "ssim"; it must be "visual" or "psnr"'),
@@ -198,6 +198,12 @@ def test_a_target_out_of_reach(photo: Picture) -> None:
         Image.fromarray(corner).save(io.BytesIO(), "GIP", psnr=120, effort=1)
     assert [warning.filename for warning in caught] == [__file__]
     assert image_gip.decode(file).shape == (16, 16, 3)
+
+
+def test_a_size_below_the_least_file(photo: Picture) -> None:
+    with pytest.warns(image_gip.ShortfallWarning, match="are the least that this picture takes"):
+        file = image_gip.encode(photo, bytes=20, effort=1)
+    assert image_gip.decode(file).shape == photo.shape
 
 
 def test_without_a_target_warnings_are_those_of_the_default_quality() -> None:

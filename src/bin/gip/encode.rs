@@ -90,11 +90,7 @@ pub(crate) fn encode(
     }?;
     let encoded = encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress);
     encoded.map_err(|error| {
-        let is_by_metadata = matches!(
-            error,
-            EncodeError::Option(OptionError::Size { bytes, least, metadata })
-                if bytes >= least - metadata
-        );
+        let is_by_metadata = matches!(error, EncodeError::Option(OptionError::Size { .. }));
         let error = Error::new(error);
         if is_by_metadata { error.context("--metadata safe or none leaves room") } else { error }
     })

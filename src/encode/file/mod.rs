@@ -9,7 +9,7 @@ use super::progress::Observer;
 use super::source::Source;
 use crate::chunk::{ChunkType, FRAMING};
 use crate::coding::entropy::{Code, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
-use crate::coding::packed::{PackedCodes, Quantizer};
+use crate::coding::packed::PackedCodes;
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::kernel::Kernel;
@@ -147,21 +147,19 @@ impl<'a> FileLayout<'a> {
         file.finish()
     }
 
-    /// Refuses a target of `bytes` that is smaller than `least`, the size of a file without
-    /// Gaussians.
+    /// Size in bytes of the metadata.
+    pub(crate) fn metadata_length(&self) -> usize {
+        self.metadata.chunks().map(|(_, payload)| payload.len() + FRAMING).sum()
+    }
+
+    /// Refuses a target of `bytes` that a file without Gaussians, of `least`, exceeds by its metadata
+    /// alone.
     pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), OptionError> {
-        if bytes < least {
-            let lengths = self.metadata.chunks().map(|(_, payload)| payload.len() + FRAMING);
-            let metadata = lengths.sum::<usize>() as u64;
+        let metadata = self.metadata_length() as u64;
+        if (least - metadata..least).contains(&bytes) {
             return Err(OptionError::Size { bytes, least, metadata });
         }
         Ok(())
-    }
-
-    /// Size in bytes of a packed file without Gaussians.
-    pub(crate) fn least_length(&self, quantizers: &[Quantizer]) -> u64 {
-        let empty = PackedCodes { quantizers: quantizers.to_vec(), codes: Vec::new() };
-        self.write_packed(&empty).len() as u64
     }
 
     /// The codes sorted by the importance of their Gaussians, largest first, so that every prefix

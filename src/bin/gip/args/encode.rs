@@ -30,7 +30,8 @@ use super::values::{ThreadCount, number};
     allow_negative_numbers = true,
     after_help = "\
 At most one of --gaussians, --bpp, --bytes, --psnr, --quality and --lambda may be given. If the target cannot
-be met, the file comes as close as possible, and the report gives the reason. A size counts the metadata."
+be met, the file comes as close as possible, and the report gives the reason. A size counts the metadata: one
+that the file would have without them, but not with them, is an error."
 )]
 pub(crate) struct Encode {
     /// The picture, or `-` for standard input.
@@ -122,7 +123,7 @@ struct TargetArgs {
     bpp: Option<f64>,
     /// A file of at most N bytes, from 1 to 1073741824.
     #[arg(long, help_heading = "Targets", value_name = "N",
-          value_parser = clap::value_parser!(u64).range(1..))]
+          value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     bytes: Option<u64>,
     /// A PSNR of the decoded file of DB decibels, from 1 to 120.
     #[arg(long, help_heading = "Targets", value_name = "DB",
