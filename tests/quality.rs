@@ -153,6 +153,35 @@ fn the_quality_is_that_of_an_independent_metric() {
     }
 }
 
+/// The root mean square of the deviations of the means of square blocks in which the sample at the upper
+/// left passes a filter.
+fn deviation(
+    scene: &Scene,
+    found: &[u8],
+    side: usize,
+    filter: impl Fn(usize, usize) -> bool,
+) -> f32 {
+    let height = found.len() / (3 * scene.width);
+    let mut squares = (0.0, 0.0);
+    for (top, left) in (0..height)
+        .step_by(side)
+        .flat_map(|top| (0..scene.width).step_by(side).map(move |left| (top, left)))
+        .filter(|&(top, left)| filter(left, top))
+    {
+        let pixels = side * side;
+        for channel in 0..3 {
+            let mut sum = 0.0;
+            for at in (0..pixels).map(|at| (top + at / side) * scene.width + left + at % side) {
+                let at = 3 * at + channel;
+                sum += f32::from(found[at]) - f32::from(scene.samples[at]);
+            }
+            squares.0 += (sum / pixels as f32).powi(2);
+            squares.1 += 1.0;
+        }
+    }
+    (squares.0 / squares.1 as f32).sqrt()
+}
+
 #[test]
 fn gradients_come_back_without_blotches() {
     let names = ["night", "gradient", "ramp", "dusk", "glow", "bright"];
@@ -160,27 +189,54 @@ fn gradients_come_back_without_blotches() {
         for effort in 1..=3 {
             let encoder = Encoder::new().with_effort(effort);
             let found = decoded(&scene.encoded(&encoder).bytes);
-            let mut squares = (0.0, 0.0);
-            let height = found.len() / (3 * scene.width);
-            for (top, left) in (0..height)
-                .step_by(8)
-                .flat_map(|top| (0..scene.width).step_by(8).map(move |left| (top, left)))
-            {
-                for channel in 0..3 {
-                    let mut sum = 0.0;
-                    for at in (0..64).map(|at| (top + at / 8) * scene.width + left + at % 8) {
-                        let at = 3 * at + channel;
-                        sum += f32::from(found[at]) - f32::from(scene.samples[at]);
-                    }
-                    squares.0 += (sum / 64.0).powi(2);
-                    squares.1 += 1.0;
-                }
-            }
-            let deviation = (squares.0 / squares.1).sqrt();
+            let deviation = deviation(scene, &found, 8, |_, _| true);
             println!("{}, effort {effort}: {deviation}", scene.name);
             assert!(deviation < 0.2, "{}, effort {effort}: {deviation}", scene.name);
         }
     }
+}
+
+#[test]
+fn noise_does_not_hide_clouds() {
+    let size = [256, 160];
+    for strength in [0.5, 3.0] {
+        let rng = std::cell::RefCell::new(fastrand::Rng::with_seed(10));
+        let scene = Scene::new("sky", size, |x, y| {
+            let noise = || 2.0 * strength * (rng.borrow_mut().f32() - 0.5);
+            let sky = 60.0 + 90.0 * light(x, y, size);
+            [sky, sky + 30.0, sky + 70.0].map(|sample| (sample + noise()).round() as u8)
+        });
+        for effort in 1..=3 {
+            let found = decoded(&scene.encoded(&Encoder::new().with_effort(effort)).bytes);
+            let deviation = deviation(&scene, &found, 32, |_, _| true);
+            println!("{strength}, effort {effort}: {deviation}");
+            assert!(deviation < 0.6, "{strength}, effort {effort}: {deviation}");
+        }
+    }
+}
+
+#[test]
+fn a_gradient_does_not_make_the_rest_expensive() {
+    let size = [256, 192];
+    let rng = std::cell::RefCell::new(fastrand::Rng::with_seed(11));
+    let scene = |is_clean: bool| {
+        Scene::new("ground", size, |x, y| {
+            let mut noise = 100.0 * (rng.borrow_mut().f32() - 0.5);
+            let shade = if y < 96 { 200.0 - 0.7 * y as f32 } else { 110.0 };
+            if y < 96 {
+                noise = if is_clean { 0.0 } else { 0.02 * noise };
+            }
+            [(shade + noise).round() as u8; 3]
+        })
+    };
+    let [clean, noisy] = [true, false].map(|is_clean| {
+        let scene = scene(is_clean);
+        let encoded = scene.encoded(&Encoder::new().with_effort(2));
+        (encoded.bytes.len(), deviation(&scene, &decoded(&encoded.bytes), 8, |_, y| y < 80))
+    });
+    println!("{clean:?} {noisy:?}");
+    assert!(clean.1 < 0.4, "{clean:?}");
+    assert!((clean.0 as f64) < 1.3 * noisy.0 as f64, "{clean:?}, {noisy:?}");
 }
 
 #[test]

@@ -186,11 +186,11 @@ fn budget(
         });
     }
     if let Some(quality) = target.quality() {
-        let means = match &raster.sensitivity {
+        let [fine, .., coarse] = match &raster.sensitivity {
             Some(sensitivity) => sensitivity.means,
             None => Sensitivity::new(job.source, observer)?.means,
         };
-        let count = quality::count_for(quality, raster.pixels(), means);
+        let count = quality::count_for(quality, raster.pixels(), [fine, coarse]);
         return Ok(Budget::Count(count));
     }
     Ok(match target {

@@ -10,6 +10,7 @@ use core::ops::Range;
 
 use super::error::EncodeError;
 use super::progress::Observer;
+use super::quality::Gradients;
 use super::source::Source;
 
 /// Scales on which errors count: single pixels, and means of luma over 2 x 2 and 4 x 4 pixels.
@@ -30,6 +31,9 @@ const LEAST_VARIANCE: f64 = (6.0 / 255.0) * (6.0 / 255.0);
 const RADII: [usize; 3] = [2, 7, 20];
 /// The most and the least sensitivity on a scale, as a factor on its geometric mean.
 const MOST: f64 = 8.0;
+/// How often an error counts in a gradient without noise, where people see blotches and bands that measures
+/// of visible differences do not.
+const IN_GRADIENT: f32 = 8.0;
 /// Shares of the colour channels in luma, those of Y in SSIMULACRA2's colour space XYB, about.
 const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 /// Rows of blocks that one task computes.
@@ -92,6 +96,7 @@ impl Sensitivity {
                 block[scale] = (share * value) as f32;
             }
         }
+        stress_gradients(&mut blocks, columns, &Gradients::new(source));
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
         Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })
     }
@@ -121,6 +126,21 @@ impl Sensitivity {
         let sums = tasks * (width + 1) * (rows + 1) * size_of::<[f64; 2]>();
         sums + self.blocks.len() * size_of::<f32>()
     }
+}
+
+/// Raises the sensitivities of blocks in gradients, and lowers all of them to the same mean as before.
+fn stress_gradients(blocks: &mut [BlockSensitivity], columns: usize, gradients: &Gradients) {
+    let mut sum = 0.0;
+    for (index, block) in blocks.iter_mut().enumerate() {
+        let (x, y) = (index % columns * BLOCK, index / columns * BLOCK);
+        let factor = if gradients.has(x, y) { IN_GRADIENT } else { 1.0 };
+        for value in block {
+            *value *= factor;
+            sum += f64::from(*value);
+        }
+    }
+    let mean = (sum / blocks.len() as f64) as f32;
+    blocks.iter_mut().flatten().for_each(|value| *value /= mean);
 }
 
 /// Sensitivities from their logarithms, with a mean of 1, and their mean before.

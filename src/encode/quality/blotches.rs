@@ -1,14 +1,17 @@
 //! Blotches: shifts of the means of blocks where the source is smooth.
 //!
 //! SSIMULACRA2 hardly sees them, but people do on a dark or bright screen: a gradient that comes back
-//! with other bands than it had, or as one colour. Where there is any noise, as in a photograph, they do
-//! not show, so that only areas without noise count (`smooth.rs`).
+//! with other bands than it had, or as one colour. Noise, as in a photograph, hides those of a few pixels,
+//! but not clouds: there, the shifts of larger areas count (`smooth.rs`).
 
 #![expect(clippy::needless_range_loop, reason = "loops over indices are vectorized")]
 
+use core::array;
+use core::iter::Sum;
+
 use super::light::{COLUMNS, Samples};
 use super::pyramid::Shown;
-use super::smooth::{AREA, read};
+use super::smooth::{AREA, Weights, read};
 
 /// Side of the blocks whose means count.
 const BLOCK: usize = 8;
@@ -30,39 +33,64 @@ pub(super) fn allowed(quality: f64) -> f64 {
 pub(super) fn squares<A: Samples, B: Samples>(
     source: &Shown<'_, A>,
     rendering: &Shown<'_, B>,
-    weights: &[f32],
+    weights: &[Weights],
     first: usize,
     rows: usize,
 ) -> f64 {
     let mut squares = 0.0;
     let width = source.size[0];
     for (x, weights) in (0..width).step_by(COLUMNS).zip(weights.chunks(COLUMNS / AREA)) {
-        if weights.iter().all(|&weight| weight == 0.0) {
+        if weights.iter().all(|weights| *weights == Weights::default()) {
             continue;
         }
         let columns = COLUMNS.min(width - x);
-        let blocks = deviations(source, rendering, [x, first], [columns, rows]);
-        for (weight, blocks) in weights.iter().zip(blocks.chunks_exact(AREA / BLOCK)) {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for &[square, of] in blocks {
-                sum += square;
-                count += of;
-            }
-            squares += f64::from(weight * sum / count);
+        let found = deviations(source, rendering, [x, first], [columns, rows]);
+        for (weights, columns) in weights.iter().zip(found.chunks_exact(AREA / BLOCK)) {
+            squares += columns.iter().copied().sum::<Deviations>().weighted(weights);
         }
     }
     squares
 }
 
-/// The sum over the channels of squared mean deviations in each column of blocks, and their number.
+/// Deviations in a column of blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Deviations {
+    /// Of the means of blocks: the sum of the squares over blocks and channels, and their number.
+    squares: f32,
+    count: f32,
+    /// The sum over pixels in each channel, and the number of pixels.
+    sums: [f32; 3],
+    pixels: f32,
+}
+
+impl Deviations {
+    /// The weighted mean square.
+    fn weighted(&self, weights: &Weights) -> f64 {
+        let whole = self.sums.map(|sum| (sum / self.pixels).powi(2)).iter().sum::<f32>() / 3.0;
+        f64::from(weights.blocks * self.squares / self.count + weights.whole * whole)
+    }
+}
+
+impl Sum for Deviations {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            squares: a.squares + b.squares,
+            count: a.count + b.count,
+            sums: array::from_fn(|channel| a.sums[channel] + b.sums[channel]),
+            pixels: a.pixels + b.pixels,
+        })
+    }
+}
+
+/// The deviations in each column of blocks.
 #[inline(always)]
 fn deviations<A: Samples, B: Samples>(
     source: &Shown<'_, A>,
     rendering: &Shown<'_, B>,
     [x, y]: [usize; 2],
     [columns, rows]: [usize; 2],
-) -> [[f32; 2]; BLOCKS] {
-    let mut found = [[0.0; 2]; BLOCKS];
+) -> [Deviations; BLOCKS] {
+    let mut found = [Deviations::default(); BLOCKS];
     let mut lines = [[[0.0; COLUMNS]; 3]; 2];
     for top in (0..rows).step_by(BLOCK) {
         let end = rows.min(top + BLOCK);
@@ -76,14 +104,16 @@ fn deviations<A: Samples, B: Samples>(
                 }
             }
         }
-        for block in 0..columns.div_ceil(BLOCK) {
+        for (block, found) in found[..columns.div_ceil(BLOCK)].iter_mut().enumerate() {
             let range = block * BLOCK..columns.min((block + 1) * BLOCK);
             let pixels = (range.len() * (end - top)) as f32;
-            for sums in &sums {
-                let mean = sums[range.clone()].iter().sum::<f32>() / pixels;
-                found[block][0] += mean * mean;
-                found[block][1] += 1.0;
+            for (sums, of_channel) in sums.iter().zip(&mut found.sums) {
+                let sum = sums[range.clone()].iter().sum::<f32>();
+                found.squares += (sum / pixels).powi(2);
+                found.count += 1.0;
+                *of_channel += sum;
             }
+            found.pixels += pixels;
         }
     }
     found

@@ -25,7 +25,6 @@ use rayon::prelude::*;
 
 use super::error::EncodeError;
 use super::progress::Observer;
-use super::sensitivity::SCALES;
 use super::source::Source;
 use super::strips;
 use crate::region::Region;
@@ -33,6 +32,7 @@ use crate::render::Picture;
 use light::Strip;
 use pyramid::Shown;
 use scales::Scales;
+pub(crate) use smooth::Gradients;
 use smooth::SmoothAreas;
 
 /// The highest quality that is aimed at. People see no difference from 90 on.
@@ -203,11 +203,10 @@ fn dissimilarity_at(wanted: f64) -> f64 {
     0.5 * (least + most)
 }
 
-/// About how many Gaussians a picture needs for a quality, where `means` are the means of the
-/// eye's sensitivity to it. It is a fit to photographs with 110 and 320 iterations, good to a factor of
+/// About how many Gaussians a picture needs for a quality, given the means of the eye's sensitivity to it
+/// on the finest and on the coarsest scale. It is a fit to photographs with 110 and 320 iterations, good to a factor of
 /// 1.3 on average: texture, and above all fine texture, takes Gaussians.
-pub(crate) fn count_for(wanted: f64, pixels: usize, means: [f64; SCALES]) -> usize {
-    let [fine, .., coarse] = means;
+pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) -> usize {
     let dissimilarity = dissimilarity_at(wanted.min(MOST_QUALITY));
     let density = 0.5 * dissimilarity.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);
     // On even ground, sensitivities do not tell how smooth it is.

@@ -1,10 +1,11 @@
-//! Areas of a picture without noise: flat ones and gradients.
+//! Areas of a picture without edges and texture: flat ones, gradients, and both with weak noise.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::light::{COLUMNS, Samples};
 use super::pyramid::Shown;
+use crate::encode::source::Source;
 
 /// Side in pixels of the areas that are smooth as a whole, or not.
 pub(super) const AREA: usize = 32;
@@ -15,6 +16,9 @@ const STEPS: f32 = 255.0;
 /// ramp that is rounded to 8 bits are up to 2, and up to 1.
 const LARGEST: f32 = 3.0;
 const MEAN_SQUARE: f32 = 1.05;
+/// The same with noise, or dither: that of camera noise with a standard deviation of 2 is 24 on average.
+const LARGEST_OF_NOISE: f32 = 24.0;
+const MEAN_SQUARE_OF_NOISE: f32 = 26.0;
 /// The sum of a line's steps, up and down, as a factor on its range. It is 1 where the line rises or
 /// falls, and up to 2 where it turns once; noise turns often.
 const TURNS: f32 = 1.2;
@@ -22,6 +26,9 @@ const TURNS: f32 = 1.2;
 /// The weight of even ground that is no part of a gradient. The errors there are around edges, which hide
 /// them.
 const EVEN_WEIGHT: f32 = 0.14;
+/// The weight of the mean of noise, which hides the errors of its blocks: a shift of half a step is as bad
+/// as one of 0.15 of blocks in a gradient.
+const NOISE_WEIGHT: f32 = 0.09;
 
 /// One row of a picture over a background in steps, channel by channel.
 pub(super) type Line = [[f32; COLUMNS]; 3];
@@ -48,6 +55,16 @@ enum Ground {
     /// One colour, in steps.
     Even([f32; 3]),
     Gradient,
+    Noise,
+}
+
+/// How much deviations count in an area.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Weights {
+    /// Those of the means of blocks: 1 in a gradient, 0 where it is not smooth.
+    pub(super) blocks: f32,
+    /// That of the mean of the area.
+    pub(super) whole: f32,
 }
 
 /// How much errors count in the areas of a picture over a background.
@@ -55,8 +72,8 @@ enum Ground {
 pub(super) struct SmoothAreas {
     /// Areas in a row.
     columns: usize,
-    /// Row by row: 1 in a gradient, 0 where it is not smooth.
-    weights: Vec<f32>,
+    /// Row by row.
+    weights: Vec<Weights>,
 }
 
 impl SmoothAreas {
@@ -73,12 +90,12 @@ impl SmoothAreas {
                 found.copy_from_slice(&areas[..found.len()]);
             }
         });
-        let weights = (0..grounds.len()).map(|at| weight(&grounds, columns, at)).collect();
+        let weights = (0..grounds.len()).map(|at| weights(&grounds, columns, at)).collect();
         Self { columns, weights }
     }
 
     /// The weights in the row of areas that begins at a row of pixels.
-    pub(super) fn row(&self, y: usize) -> &[f32] {
+    pub(super) fn row(&self, y: usize) -> &[Weights] {
         &self.weights[y / AREA * self.columns..][..self.columns]
     }
 
@@ -88,9 +105,43 @@ impl SmoothAreas {
     }
 }
 
-/// The weight of an area, given those of the picture, row by row.
-fn weight(grounds: &[Option<Ground>], columns: usize, at: usize) -> f32 {
-    let Some(ground) = grounds[at] else { return 0.0 };
+/// Where a picture has gradients, over any of its backgrounds.
+#[derive(Debug)]
+pub(crate) struct Gradients {
+    /// Areas in a row.
+    columns: usize,
+    /// Row by row.
+    areas: Vec<bool>,
+}
+
+impl Gradients {
+    pub(crate) fn new(source: &Source<'_>) -> Self {
+        let size = [source.width() as usize, source.height() as usize];
+        let columns = size[0].div_ceil(AREA);
+        let mut areas = vec![false; columns * size[1].div_ceil(AREA)];
+        for &background in source.backgrounds() {
+            let shown = Shown { picture: source, size, background };
+            let smooth = SmoothAreas::new(&shown, Level::new());
+            for (area, weights) in areas.iter_mut().zip(&smooth.weights) {
+                *area |= weights.blocks == 1.0;
+            }
+        }
+        Self { columns, areas }
+    }
+
+    /// Whether a pixel is in one.
+    pub(crate) fn has(&self, x: usize, y: usize) -> bool {
+        self.areas[y / AREA * self.columns + x / AREA]
+    }
+}
+
+/// The weights of an area, given what there is in those of the picture, row by row.
+fn weights(grounds: &[Option<Ground>], columns: usize, at: usize) -> Weights {
+    let ground = match grounds[at] {
+        None => return Weights::default(),
+        Some(Ground::Noise) => return Weights { blocks: 0.0, whole: NOISE_WEIGHT },
+        Some(ground) => ground,
+    };
     let around = |at: usize, count: usize| at.saturating_sub(1)..count.min(at + 2);
     let rows = around(at / columns, grounds.len() / columns);
     let mut near = rows.flat_map(|y| &grounds[y * columns..][around(at % columns, columns)]);
@@ -101,7 +152,7 @@ fn weight(grounds: &[Option<Ground>], columns: usize, at: usize) -> f32 {
         }
         (_, other) => other == Some(Ground::Gradient),
     });
-    if is_in_gradient { 1.0 } else { EVEN_WEIGHT }
+    Weights { blocks: if is_in_gradient { 1.0 } else { EVEN_WEIGHT }, whole: 0.0 }
 }
 
 /// Reads a row of a picture, in which columns beyond the last one are of no use.
@@ -137,6 +188,7 @@ fn smooth<P: Samples>(
     let mut bounds = [[[f32::INFINITY; COLUMNS], [f32::NEG_INFINITY; COLUMNS]]; 3];
     // Across and down.
     let mut variations = [[[Variation::default(); 2]; 3]; AREAS];
+    let mut largest_bends = [0.0_f32; AREAS];
     let mut is_smooth: [bool; AREAS] = core::array::from_fn(|area| area * AREA < columns);
     for row in 0..rows {
         lines.rotate_left(1);
@@ -180,7 +232,8 @@ fn smooth<P: Samples>(
                     }
                 }
             }
-            is_smooth[area] = largest <= LARGEST;
+            largest_bends[area] = largest.max(largest_bends[area]);
+            is_smooth[area] = largest <= LARGEST_OF_NOISE;
         }
         if !is_smooth.contains(&true) {
             break;
@@ -192,18 +245,20 @@ fn smooth<P: Samples>(
         }
         let (start, end) = (area * AREA, columns.min((area + 1) * AREA));
         let pixels = ((end - start) * rows) as f32;
-        let (mut steps, mut ranges) = (0.0, 0.0);
+        let (mut curvature, mut steps, mut ranges) = (0.0_f32, 0.0, 0.0);
         for ([across, down], [least, most]) in variations[area].iter().zip(&bounds) {
-            if across.curvature.max(down.curvature) > MEAN_SQUARE * pixels {
-                return None;
-            }
+            curvature = curvature.max(across.curvature).max(down.curvature);
             steps += across.steps + down.steps;
             ranges += across.ranges + (start..end).map(|at| most[at] - least[at]).sum::<f32>();
         }
         if steps == 0.0 {
             return Some(Ground::Even(bounds.map(|[least, _]| least[start])));
         }
-        (steps <= TURNS * ranges).then_some(Ground::Gradient)
+        let is_clean = largest_bends[area] <= LARGEST && curvature <= MEAN_SQUARE * pixels;
+        if is_clean && steps <= TURNS * ranges {
+            return Some(Ground::Gradient);
+        }
+        (curvature <= MEAN_SQUARE_OF_NOISE * pixels).then_some(Ground::Noise)
     })
 }
 
@@ -211,18 +266,17 @@ fn smooth<P: Samples>(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
-    use crate::encode::source::Source;
     use crate::testing::simd_levels;
 
     /// The weights of the areas of a gray picture.
-    fn weights([width, height]: [usize; 2], sample: impl FnMut(usize) -> u8) -> Vec<f32> {
+    fn weights_of([width, height]: [usize; 2], sample: impl FnMut(usize) -> u8) -> Vec<Weights> {
         let samples: Vec<u8> = (0..width * height).map(sample).collect();
         let source = Source::new_u8(width as u32, height as u32, ColorModel::Gray, &samples)
             .expect("the sizes agree");
         let shown = Shown { picture: &source, size: [width, height], background: 0.0 };
         let mut found = simd_levels().into_iter().map(|(_, level)| {
             let areas = SmoothAreas::new(&shown, level);
-            let weights: Vec<f32> =
+            let weights: Vec<Weights> =
                 (0..height).step_by(AREA).flat_map(|y| areas.row(y).to_vec()).collect();
             assert_eq!(weights.len(), areas.count());
             weights
@@ -233,21 +287,28 @@ mod tests {
     }
 
     #[test]
-    fn gradients_count_and_noise_does_not() {
+    fn blocks_count_in_gradients_and_means_in_noise() {
         let size = [COLUMNS + 40, 50];
         let width = size[0];
         let mut rng = fastrand::Rng::with_seed(8);
-        let all = |weight: f32| vec![weight; width.div_ceil(AREA) * 2];
-        assert_eq!(weights(size, |at| (at % width / 20) as u8), all(1.0));
-        assert_eq!(weights(size, |at| (at % width + at / width) as u8), all(1.0));
+        let all = |weights: Weights| vec![weights; width.div_ceil(AREA) * 2];
+        let [none, gradient, even] =
+            [0.0, 1.0, EVEN_WEIGHT].map(|blocks| Weights { blocks, whole: 0.0 });
+        let noise = Weights { blocks: 0.0, whole: NOISE_WEIGHT };
+        assert_eq!(weights_of(size, |at| (at % width / 20) as u8), all(gradient));
+        assert_eq!(weights_of(size, |at| (at % width + at / width) as u8), all(gradient));
         // Steps where areas meet.
-        assert_eq!(weights(size, |at| (at % width / AREA) as u8), all(1.0));
-        assert_eq!(weights(size, |at| (at % width / 20) as u8 + rng.u8(..2)), all(0.0));
-        assert_eq!(weights(size, |_| 9), all(EVEN_WEIGHT));
+        assert_eq!(weights_of(size, |at| (at % width / AREA) as u8), all(gradient));
+        for strength in [2, 6] {
+            let with_noise = |at| (at % width / 20) as u8 + rng.u8(..strength);
+            assert_eq!(weights_of(size, with_noise), all(noise), "{strength}");
+        }
+        assert_eq!(weights_of(size, |at| (at % width / 20) as u8 + rng.u8(..20)), all(none));
+        assert_eq!(weights_of(size, |_| 9), all(even));
         // An edge.
-        let edge = weights(size, |at| if at % width < 70 { 9 } else { 200 });
-        let row = [EVEN_WEIGHT, EVEN_WEIGHT, 0.0, EVEN_WEIGHT, EVEN_WEIGHT, EVEN_WEIGHT];
+        let edge = weights_of(size, |at| if at % width < 70 { 9 } else { 200 });
+        let row = [even, even, none, even, even, even];
         assert_eq!(edge, [row, row].concat());
-        assert_eq!(weights([1, 1], |_| 7), [EVEN_WEIGHT]);
+        assert_eq!(weights_of([1, 1], |_| 7), [even]);
     }
 }
