@@ -393,6 +393,33 @@ fn one_bright_pixel_is_found() {
 }
 
 #[test]
+fn a_small_number_of_gaussians_is_used() {
+    // Far more colours than Gaussians: they make hardly anything of the picture.
+    let colors = noise(24 * 16 * 3);
+    let blocks = (0..192 * 128).flat_map(|at| {
+        let block = at % 192 / 8 + at / 192 / 8 * 24;
+        colors[3 * block..][..3].to_vec()
+    });
+    let samples: Vec<u8> = blocks.collect();
+    let source = Source::new_u8(192, 128, ColorModel::Rgb, &samples).expect("sizes agree");
+    for effort in [1, 4] {
+        let mut last = 0.0;
+        for count in [5, 20, 60] {
+            let encoder = quick(Target::Gaussians(count)).with_effort(effort);
+            let encoded = encoder.encode(&source).expect("it encodes");
+            let psnr = psnr_u8(&pixels_u8(&check(&encoded, &samples)), &samples);
+            let found = encoded.report.gaussians;
+            println!("{count}, effort {effort}: {found}, {psnr} dB");
+            assert!(
+                found >= count.div_ceil(3) && found <= count && psnr > last,
+                "{count}: {found}"
+            );
+            last = psnr;
+        }
+    }
+}
+
+#[test]
 fn many_gaussians_in_a_small_part_of_a_picture_come_to_rest() {
     const WIDTH: u32 = 640;
     const HEIGHT: u32 = 480;

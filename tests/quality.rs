@@ -220,7 +220,7 @@ fn a_gradient_does_not_make_the_rest_expensive() {
     let size = [256, 192];
     let rng = std::cell::RefCell::new(fastrand::Rng::with_seed(11));
     let scene = |is_clean: bool| {
-        Scene::new("ground", size, |x, y| {
+        Scene::new("ground", size, |_, y| {
             let mut noise = 100.0 * (rng.borrow_mut().f32() - 0.5);
             let shade = if y < 96 { 200.0 - 0.7 * y as f32 } else { 110.0 };
             if y < 96 {

@@ -9,7 +9,8 @@ pub enum Target {
     /// A picture that a person accepts without looking twice: the same as `Quality(75.0)`.
     #[default]
     Auto,
-    /// At most this many Gaussians, from 1 to 2^22. A picture that needs fewer gets fewer.
+    /// At most this many Gaussians, from 1 to 2^22. A picture that needs fewer gets fewer; of those of the
+    /// fit, the entropy coding leaves out what is not worth its bits, but no more than half.
     Gaussians(u32),
     /// A file of at most this many bytes, from 1 to 2^30, and of at least 99 % of them. Where so many
     /// bytes bring hardly anything, the file is smaller, and [`Report::shortfall`](crate::Report) says

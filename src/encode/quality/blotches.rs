@@ -4,8 +4,6 @@
 //! with other bands than it had, or as one colour. Noise, as in a photograph, hides those of a few pixels,
 //! but not clouds: there, the shifts of larger areas count (`smooth.rs`).
 
-#![expect(clippy::needless_range_loop, reason = "loops over indices are vectorized")]
-
 use core::array;
 use core::iter::Sum;
 

@@ -44,6 +44,11 @@ const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
 const FINEST: f64 = -4.0;
 /// Bytes that one of the least useful Gaussians takes, about.
 const BYTES_OF_LEAST_USEFUL: f64 = 2.3;
+/// The least share of a number of Gaussians that is asked for which a file has, if need be with finer
+/// steps: the step that suits the error is too coarse where they make hardly anything of the picture.
+const LEAST_KEPT: f64 = 0.5;
+/// How often the step is halved for that.
+const MOST_HALVINGS: u32 = 8;
 /// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
 
@@ -99,7 +104,9 @@ impl<'a> TargetSearch<'a> {
         let step = step.max(least);
         observer.expect(self.work.whole());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            return Ok(self.descended(gaussians, step, self.work.passes, observer)?.coded);
+            let is_counted = matches!(target, Target::Gaussians(_));
+            let halvings = if is_counted { MOST_HALVINGS } else { 0 };
+            return self.kept(gaussians, step, least, halvings, observer);
         };
         let finest = (step + FINEST).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
@@ -121,6 +128,27 @@ impl<'a> TargetSearch<'a> {
             }
         }
         self.trimmed(coded, deviation, aim, observer)
+    }
+
+    /// The codes of a step, which is halved until they are not too few, so many times at most.
+    fn kept(
+        &mut self,
+        gaussians: &[Gaussian],
+        mut step: f64,
+        least: f64,
+        halvings: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<CodedLayers, EncodeError> {
+        let enough = (LEAST_KEPT * gaussians.len() as f64).ceil() as usize;
+        for _ in 0..halvings {
+            let coded = self.descended(gaussians, step, self.work.passes, observer)?.coded;
+            if coded.codes.len() >= enough || step <= least {
+                return Ok(coded);
+            }
+            step = (step - 1.0).max(least);
+            observer.expect(self.work.one_more_try());
+        }
+        Ok(self.descended(gaussians, step, self.work.passes, observer)?.coded)
     }
 
     /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
