@@ -47,8 +47,11 @@ class CancelledError(GipError):
 
 
 class ShortfallWarning(UserWarning):
-    """The file has a lower PSNR or quality than asked for, which is out of reach at this effort, or it is
-    larger than asked for and holds nothing but its start and metadata."""
+    """The file misses its target.
+
+    Its PSNR or quality is lower than asked for, which is out of reach at this effort, or it is
+    larger than asked for and holds nothing but its start and metadata.
+    """
 
 
 class MetadataWarning(UserWarning):
