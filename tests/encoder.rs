@@ -704,6 +704,23 @@ fn more_bits_and_more_effort_give_no_worse_picture() {
 }
 
 #[test]
+fn isolated_pixels_are_found_at_every_effort() {
+    // Errors are in a few tiles, which get some Gaussians at a time.
+    let (width, height) = (160, 112);
+    let salt = noise(2 * width * height);
+    let pixel = |pair: &[u8]| if pair[0] < 8 { 255 - pair[1] / 8 } else { 110 };
+    let samples: Vec<u8> = salt.chunks(2).map(pixel).collect();
+    let source =
+        Source::new_u8(width as u32, height as u32, ColorModel::Gray, &samples).expect("agree");
+    for effort in 1..=4 {
+        let encoder = quick(Target::BitsPerPixel(3.0)).with_effort(effort).with_tune(Tune::Psnr);
+        let psnr = encoder.encode(&source).expect("it encodes").report.psnr;
+        println!("effort {effort}: {psnr} dB");
+        assert!(psnr > 45.0, "effort {effort}: {psnr} dB");
+    }
+}
+
+#[test]
 fn rounding_does_not_undo_smooth_pictures() {
     let side = 96;
     let samples: Vec<u8> = (0..side * side)

@@ -71,7 +71,7 @@ pub(crate) struct Densifier<'a> {
     /// The last pass over the picture, which measured the distortion.
     pub(crate) pass: Rendered<'a>,
     pub(crate) bounds: RowBounds,
-    /// Number of Gaussians before.
+    /// Number of Gaussians before, without those that new ones replace.
     pub(crate) count: usize,
 }
 

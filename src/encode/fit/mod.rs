@@ -140,7 +140,7 @@ impl<'a> Fit<'a> {
         let plan = TrainingSchedule::new(self.training, self.precision);
         self.forward(true, observer)?;
         let first = densification.initial * self.wanted(1.0) as f32;
-        self.grow((first.ceil() as usize).max(1), observer)?;
+        self.grow((first.ceil() as usize).max(1), 0, observer)?;
         let mut kept = usize::MAX;
         let total = self.work.iterations + iterations;
         for iteration in 0..*iterations {
@@ -161,8 +161,7 @@ impl<'a> Fit<'a> {
                 kept = self.wanted(FORESEEN);
                 let portion = self.portion(kept, steps_left);
                 let replaced = (densification.replaced * self.len() as f32) as usize;
-                self.cull(replaced, observer)?;
-                self.grow(portion + replaced, observer)?;
+                self.grow(portion, replaced, observer)?;
             }
             if let Some(culls_left) = plan.culls_left(done) {
                 // In a simple picture the error may fall much faster with the count than foreseen.
@@ -203,7 +202,7 @@ impl<'a> Fit<'a> {
         self.invalidate();
         self.forward(true, observer)?;
         self.cull(self.len().saturating_sub(count), observer)?;
-        self.grow(count.saturating_sub(self.len()), observer)?;
+        self.grow(count.saturating_sub(self.len()), 0, observer)?;
         let iterations = self.training.iterations.div_ceil(4);
         let total = self.work.iterations + iterations;
         let quantized_from = (self.training.quantization.warm_up * iterations as f32) as u32;
@@ -447,9 +446,15 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    /// Densification: adds up to `count` Gaussians where the distortion is large.
-    fn grow(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        if count == 0 {
+    /// Densification: adds up to `count` Gaussians where the distortion is large, and up to `replaced`
+    /// more in place of the least important ones. Where there is no place for all, fewer are replaced.
+    fn grow(
+        &mut self,
+        count: usize,
+        replaced: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        if count + replaced == 0 {
             return Ok(());
         }
         let pass = Rendered {
@@ -464,10 +469,11 @@ impl<'a> Fit<'a> {
             filter: self.training.filter,
             pass,
             bounds: self.bounds,
-            count: self.parameters.len(),
+            count: self.parameters.len() - replaced,
         };
-        let rows = densifier.new_gaussians(count, &mut self.rng, observer)?;
+        let rows = densifier.new_gaussians(count + replaced, &mut self.rng, observer)?;
         observer.poll()?;
+        self.cull(rows.len() * replaced / (count + replaced), observer)?;
         self.free_bins();
         self.parameters.extend(&rows);
         self.parameters.sort(observer)?;
