@@ -61,6 +61,7 @@ export class GipImageElement extends ImageAttributes {
     this.#internals = this.attachInternals();
     const root = this.attachShadow({ mode: 'open' });
     root.addEventListener('transitionrun', () => this.#refresh());
+    this.addEventListener('transitionrun', () => this.#follow());
     this.#alternative.part = 'alt';
     root.append(this.#painting.frame);
     this.#describe();
@@ -131,6 +132,13 @@ export class GipImageElement extends ImageAttributes {
     queueMicrotask(() => {
       if (!this.isConnected) this.#reset();
     });
+  }
+
+  /** Draws what a transition of the page makes of the styles, of whose last steps the frame tells nothing. */
+  #follow() {
+    this.#refresh();
+    const moves = ({ transitionProperty }) => transitionProperty?.startsWith('object-');
+    if (this.getAnimations().some(moves)) requestAnimationFrame(() => this.#follow());
   }
 
   adoptedCallback() {
