@@ -9,7 +9,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::Target;
 use super::progress::Observer;
-use super::quality::judge;
+use super::quality::Judge;
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, SearchWork, TargetSearch, Window};
@@ -46,6 +46,7 @@ pub(crate) fn least_length(
 pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
+    judge: &Judge<'_>,
     raster: &Raster,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
@@ -54,7 +55,7 @@ pub(crate) fn finish(
         extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), job, observer)?;
     }
     if let Some(quality) = job.target.quality() {
-        correct(&mut fit, quality, job, layout, observer)?;
+        correct(&mut fit, quality, job, judge, layout, observer)?;
     }
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -69,7 +70,7 @@ pub(crate) fn finish(
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
-    let mut search = TargetSearch::new(job.source, raster, layout, search_work, observer)?;
+    let mut search = TargetSearch::new(judge, raster, layout, search_work, observer)?;
     let coded = search.run(&gaussians, distortion, job.target, observer)?;
     Ok((layout.write_entropy(&coded, observer)?, work))
 }
@@ -105,6 +106,7 @@ fn correct(
     fit: &mut Fit<'_>,
     wanted_quality: f64,
     job: &Job<'_>,
+    judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(), EncodeError> {
@@ -117,7 +119,7 @@ fn correct(
         let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
         // The error is about inversely proportional to the number of Gaussians, but not where a few of
         // them make the picture. There, too many are better than too few.
-        let verdict = judge(job.source, &picture, observer)?;
+        let verdict = judge.judge(&picture, observer)?;
         let factor = verdict.excess(wanted_quality) / rate_model::SHARE_OF_FIT;
         let is_close = factor < CLOSE.end && (factor > CLOSE.start || round > 0);
         let count = before.max(1) as f64;

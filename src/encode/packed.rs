@@ -7,7 +7,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{PSNR_TOLERANCE, Precision, SIZE_TOLERANCE, Target};
 use super::progress::Observer;
-use super::quality::judge;
+use super::quality::Judge;
 use super::source::Source;
 use super::verify::Verified;
 use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
@@ -51,6 +51,7 @@ pub(crate) fn count_for_size(bytes: u64, job: &Job<'_>) -> usize {
 pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
+    judge: &Judge<'_>,
     budget: Budget,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
@@ -60,7 +61,7 @@ pub(crate) fn finish(
         let fitted = raised(&mut fit, target, layout, source, observer)?;
         trimmed(layout, layout.ordered(&fitted), source, target, observer)?
     } else if let Some(quality) = target.quality() {
-        extended(&mut fit, quality, layout, source, observer)?
+        extended(&mut fit, quality, layout, judge, observer)?
     } else {
         if let (Some(_), Budget::Count(count)) = (target.bytes(job.pixels()), budget) {
             fill(&mut fit, count, observer)?;
@@ -143,12 +144,12 @@ fn extended(
     fit: &mut Fit<'_>,
     wanted: f64,
     layout: &FileLayout<'_>,
-    source: &Source<'_>,
+    judge: &Judge<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<u8>, EncodeError> {
     let excess = |file: &[u8], observer: &mut Observer<'_>| {
-        let verified = Verified::new(file, source, observer)?;
-        let verdict = judge(source, &verified.picture(), observer)?;
+        let verified = Verified::new(file, judge.source(), observer)?;
+        let verdict = judge.judge(&verified.picture(), observer)?;
         Ok::<_, EncodeError>(verdict.excess_of_structure(wanted))
     };
     let file = layout.write_packed(&fit.fitted());

@@ -7,7 +7,7 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::options::{Precision, Target};
 use super::progress::Observer;
-use super::quality;
+use super::quality::{self, Judge};
 use super::raster::Raster;
 use super::rate_model;
 use super::rdo::SearchWork;
@@ -46,7 +46,8 @@ pub(crate) struct Outcome {
 /// The file for the target, or a smaller one where the target's size brings too little.
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
     verify::check_limits(job)?;
-    let mut outcome = encode_for_target(job, Work::default(), observer)?;
+    let judge = Judge::new(job.source);
+    let mut outcome = encode_for_target(job, &judge, Work::default(), observer)?;
     let pixels = job.pixels();
     let Some(most_bytes) = job.target.bytes(pixels) else { return Ok(outcome) };
     loop {
@@ -59,7 +60,7 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
         }
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
         let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
-        let modest = encode_for_target(&modest_job, outcome.work, observer)?;
+        let modest = encode_for_target(&modest_job, &judge, outcome.work, observer)?;
         let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
         let gain = outcome.distortion.psnr - modest.distortion.psnr;
         let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
@@ -76,6 +77,7 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
 /// `work` was done before.
 fn encode_for_target(
     job: &Job<'_>,
+    judge: &Judge<'_>,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
@@ -103,8 +105,10 @@ fn encode_for_target(
     let is_lost_to_rounding = fit.is_lost_to_rounding();
 
     let (file, mut work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, &raster, &layout, observer),
-        Precision::Packed | Precision::Float => packed::finish(fit, job, budget, &layout, observer),
+        Precision::Entropy => entropy::finish(fit, job, judge, &raster, &layout, observer),
+        Precision::Packed | Precision::Float => {
+            packed::finish(fit, job, judge, budget, &layout, observer)
+        }
     }?;
 
     // The decoder needs memory, too.
@@ -113,7 +117,7 @@ fn encode_for_target(
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());
-    let (distortion, verdict) = verified.judged(observer)?;
+    let (distortion, verdict) = verified.judged(judge, observer)?;
     let judging = quality::memory(source);
     work.peak_memory = work.peak_memory.max(judging).max(peak_before);
     // The estimate of an exact copy would have rounding errors.

@@ -9,7 +9,7 @@ use super::file::FileLayout;
 use super::job::Job;
 use super::options::Target;
 use super::progress::Observer;
-use super::quality::{Judgement, Verdict};
+use super::quality::{Judge, Judgement, Verdict};
 use super::source::{SPAN, Source};
 use super::strips;
 use crate::decode::StreamDecoder;
@@ -132,9 +132,10 @@ impl<'a> Verified<'a> {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn judged(
         &self,
+        judge: &Judge<'_>,
         observer: &mut Observer<'_>,
     ) -> Result<(FilePsnr, Verdict), EncodeError> {
-        let (mut errors, mut judgement) = (Errors::default(), Judgement::new(self.source));
+        let (mut errors, mut judgement) = (Errors::default(), Judgement::new(judge));
         strips::render(&self.picture(), u32::MAX, observer, |region, planes| {
             errors.add(self.source, region, planes);
             judgement.see(region, planes);

@@ -81,18 +81,44 @@ impl Verdict {
     }
 }
 
-/// Judges a picture, rendered at the source's size.
-///
-/// # Errors
-/// [`EncodeError::Cancelled`] when the caller cancels.
-pub(crate) fn judge(
-    source: &Source<'_>,
-    picture: &Picture<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<Verdict, EncodeError> {
-    let mut judgement = Judgement::new(source);
-    strips::render(picture, u32::MAX, observer, |region, planes| judgement.see(region, planes))?;
-    Ok(judgement.verdict())
+/// What judges renderings of a source. It knows what is the same for all of them.
+#[derive(Debug)]
+pub(crate) struct Judge<'a> {
+    source: &'a Source<'a>,
+    level: Level,
+    /// Those over each background.
+    smooth: Vec<SmoothAreas>,
+}
+
+impl<'a> Judge<'a> {
+    pub(crate) fn new(source: &'a Source<'a>) -> Self {
+        let size = [source.width() as usize, source.height() as usize];
+        let level = Level::new();
+        let smooth = |&background: &f32| {
+            SmoothAreas::new(&Shown { picture: source, size, background }, level)
+        };
+        Self { source, level, smooth: source.backgrounds().iter().map(smooth).collect() }
+    }
+
+    pub(crate) fn source(&self) -> &'a Source<'a> {
+        self.source
+    }
+
+    /// Judges a picture, rendered at the source's size.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn judge(
+        &self,
+        picture: &Picture<'_>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Verdict, EncodeError> {
+        let mut judgement = Judgement::new(self);
+        strips::render(picture, u32::MAX, observer, |region, planes| {
+            judgement.see(region, planes);
+        })?;
+        Ok(judgement.verdict())
+    }
 }
 
 /// Size in bytes of what a judgement holds: a strip of the rendering, and rows of both pictures.
@@ -108,52 +134,51 @@ pub(crate) fn memory(source: &Source<'_>) -> usize {
 /// A comparison of a rendering, which comes in strips from the top, with its source.
 #[derive(Debug)]
 pub(crate) struct Judgement<'a> {
-    source: &'a Source<'a>,
-    level: Level,
-    views: Vec<View>,
+    judge: &'a Judge<'a>,
+    views: Vec<View<'a>>,
 }
 
 /// What is known of a rendering over a background.
 #[derive(Debug)]
-struct View {
+struct View<'a> {
     background: f32,
     /// What SSIMULACRA2 measures, and what it would measure of a small picture among its mirror images.
     metric: Option<Scales>,
     mirrored: Option<Scales>,
-    smooth: SmoothAreas,
+    smooth: &'a SmoothAreas,
     /// The sum over areas so far of what there is of blotches.
     blotches: f64,
 }
 
 impl<'a> Judgement<'a> {
-    pub(crate) fn new(source: &'a Source<'a>) -> Self {
+    pub(crate) fn new(judge: &'a Judge<'a>) -> Self {
+        let source = judge.source;
         let size = [source.width() as usize, source.height() as usize];
-        let level = Level::new();
-        let view = |&background: &f32| View {
+        let view = |(&background, smooth)| View {
             background,
-            smooth: SmoothAreas::new(&Shown { picture: source, size, background }, level),
+            smooth,
             metric: Scales::of_metric(size),
             mirrored: Scales::of_mirrored(size),
             blotches: 0.0,
         };
-        let views = source.backgrounds().iter().map(view).collect();
-        Self { source, level, views }
+        Self { judge, views: source.backgrounds().iter().zip(&judge.smooth).map(view).collect() }
     }
 
     /// Takes in the next strip, all columns of it: float samples, plane after plane. The number of its
     /// rows is a multiple of 32, except at the bottom.
     pub(crate) fn see(&mut self, region: Region, planes: &[f32]) {
-        let Self { source, level, views } = self;
+        let Judge { source, level, .. } = *self.judge;
         let strip = Strip { model: source.color(), depth: source.depth(), region, planes };
-        for view in views {
-            view.see(source, &strip, *level);
+        for view in &mut self.views {
+            view.see(source, &strip, level);
         }
     }
 
     /// The verdict after the last strip, over the background where it is worst.
     pub(crate) fn verdict(&self) -> Verdict {
-        let worst =
-            |found: fn(&View) -> Option<f64>| self.views.iter().filter_map(found).reduce(f64::max);
+        let worst = |found: fn(&View<'_>) -> Option<f64>| {
+            self.views.iter().filter_map(found).reduce(f64::max)
+        };
         Verdict {
             dissimilarity: worst(|view| view.metric.as_ref().map(Scales::dissimilarity)),
             mirrored: worst(|view| view.mirrored.as_ref().map(Scales::dissimilarity)),
@@ -162,7 +187,7 @@ impl<'a> Judgement<'a> {
     }
 }
 
-impl View {
+impl View<'_> {
     /// Takes in the next strip.
     fn see(&mut self, source: &Source<'_>, strip: &Strip<'_>, level: Level) {
         let (region, background) = (strip.region, self.background);
@@ -170,7 +195,7 @@ impl View {
         let size = [source.width() as usize, source.height() as usize];
         let source = Shown { picture: source, size, background };
         let rendering = Shown { picture: strip, size, background };
-        let smooth = &self.smooth;
+        let smooth = self.smooth;
         let areas: Vec<_> = smooth::rows_of_areas(rows).collect();
         let found = areas.into_par_iter().map(|(row, rows)| {
             let y = first + row;
@@ -233,7 +258,8 @@ mod tests {
             source.iter().map(|sample| (sample * 65535.0).round() as u16).collect();
         let source =
             Source::new_u16(width as u32, height as u32, model, &samples).expect("the sizes agree");
-        let mut judgement = Judgement::new(&source);
+        let judge = Judge::new(&source);
+        let mut judgement = Judgement::new(&judge);
         let channels = model.channels();
         let rows = rendering.chunks(strip * width * channels).enumerate();
         for (index, rows) in rows {

@@ -8,10 +8,9 @@ use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::options::Target;
 use crate::encode::progress::Observer;
-use crate::encode::quality::judge;
+use crate::encode::quality::Judge;
 use crate::encode::raster::Raster;
 use crate::encode::rate_model;
-use crate::encode::source::Source;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
 
@@ -66,7 +65,7 @@ fn settling(passes: u32) -> f64 {
 /// Rate-distortion optimisation of a fit's codes for a target.
 #[derive(Debug)]
 pub(crate) struct TargetSearch<'a> {
-    source: &'a Source<'a>,
+    judge: &'a Judge<'a>,
     raster: &'a Raster,
     layout: &'a FileLayout<'a>,
     /// How many passes there shall be, and what they cost; for a target there may be a few more.
@@ -78,14 +77,14 @@ impl<'a> TargetSearch<'a> {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
-        source: &'a Source<'a>,
+        judge: &'a Judge<'a>,
         raster: &'a Raster,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
         let codes = CodeOptimizer::new(raster, layout, observer)?;
-        Ok(Self { source, raster, layout, work, codes })
+        Ok(Self { judge, raster, layout, work, codes })
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target.
@@ -305,13 +304,13 @@ impl<'a> TargetSearch<'a> {
         let deviation = match aim {
             Aim::Size { most } => (file.len() as f64 / most).log2(),
             Aim::Psnr(psnr) => {
-                let verified = Verified::new(&file, self.source, observer)?;
+                let verified = Verified::new(&file, self.judge.source(), observer)?;
                 let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
                 ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
             Aim::Quality(quality) => {
-                let verified = Verified::new(&file, self.source, observer)?;
-                let verdict = judge(self.source, &verified.picture(), observer)?;
+                let verified = Verified::new(&file, self.judge.source(), observer)?;
+                let verdict = self.judge.judge(&verified.picture(), observer)?;
                 verdict.excess(quality).log2().max(-LARGEST_DEVIATION)
             }
         };
