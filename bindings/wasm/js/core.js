@@ -165,7 +165,7 @@ export class Decoder extends Upright {
     return encodePng(samples, iccProfile);
   }
 
-  /** Frees the memory. Nothing else may be called after this. */
+  /** Frees the memory. What is called after this throws a `GipError`. */
   close() {
     this.#native?.free();
     this.#native = null;

@@ -138,10 +138,10 @@ export interface Statistics {
 }
 
 /**
- * What a file may cost at most. What is left out has the value of `defaultLimits`, which are those of the
- * other decoders of the format; `Infinity` removes a limit. A `LimitError` names the one to raise.
+ * What a file may cost at most, each a number from 0 to `Infinity`, which removes a limit. What is left out
+ * has the value of `defaultLimits`, which are those of the other decoders of the format. A `LimitError` names
+ * the one to raise.
  */
-/** Each is a number from 0 to Infinity. */
 export interface Limits {
   /** Largest width in pixels, of the file and of one rendering, as stored. Default 65,536. */
   width?: number;
