@@ -88,8 +88,9 @@ fn encode_for_target(
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
-    let job = &Job { target: within_reach(job, &layout, observer)?, ..*job };
-    let budget = budget(job, &raster, &layout, observer)?;
+    let (within_reach, room) = within_reach(job, &layout, observer)?;
+    let job = &Job { target: within_reach, ..*job };
+    let budget = budget(job, room, &raster, observer)?;
     let expected = match budget {
         Budget::Count(count) => count,
         Budget::Bits { .. } => budget.wanted(0, rate_model::USUAL_COMPONENT_BITS, job.pixels()),
@@ -148,41 +149,33 @@ fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
     workload.training(iterations) + rounds * workload.retraining(iterations) + later
 }
 
-/// The target, or the size of a file without Gaussians if the target is a smaller one.
+/// The target, or the size of a file without Gaussians if the target is a smaller one; and how many bytes
+/// of a size are for the Gaussians.
 fn within_reach(
     job: &Job<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Target, EncodeError> {
-    let Some(bytes) = job.target.bytes(job.pixels()) else { return Ok(job.target) };
-    let least = least_length(job, layout, observer)?;
+) -> Result<(Target, Option<u64>), EncodeError> {
+    let Some(bytes) = job.target.bytes(job.pixels()) else { return Ok((job.target, None)) };
+    let least = match job.precision {
+        Precision::Entropy => entropy::least_length(layout, observer)?,
+        Precision::Packed | Precision::Float => packed::least_length(job, layout),
+    };
     layout.check_size(bytes, least)?;
-    Ok(if bytes < least { Target::Bytes(least) } else { job.target })
+    let target = if bytes < least { Target::Bytes(least) } else { job.target };
+    Ok((target, Some(bytes.saturating_sub(least))))
 }
 
-/// Size in bytes of a file without Gaussians.
-fn least_length(
-    job: &Job<'_>,
-    layout: &FileLayout<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<u64, EncodeError> {
-    match job.precision {
-        Precision::Entropy => entropy::least_length(layout, observer),
-        Precision::Packed | Precision::Float => Ok(packed::least_length(job, layout)),
-    }
-}
-
-/// What decides the number of Gaussians during training.
+/// What decides the number of Gaussians during training, given the bytes for them if the target is a size.
 fn budget(
     job: &Job<'_>,
+    room: Option<u64>,
     raster: &Raster,
-    layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<Budget, EncodeError> {
     let Job { target, precision, .. } = *job;
     let is_coded = precision == Precision::Entropy;
-    if let Some(bytes) = target.bytes(raster.pixels()) {
-        let bytes = bytes - least_length(job, layout, observer)?;
+    if let Some(bytes) = room {
         return Ok(if is_coded {
             Budget::Bits { bits: (bytes * 8) as f64, tune: job.tune }
         } else {
