@@ -104,8 +104,8 @@ impl<'a> TargetSearch<'a> {
         observer.expect(self.work.whole());
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let is_counted = matches!(target, Target::Gaussians(_));
-            let halvings = if is_counted { MOST_HALVINGS } else { 0 };
-            return self.kept(gaussians, step, least, halvings, observer);
+            let kept = if is_counted { LEAST_KEPT * gaussians.len() as f64 } else { 0.0 };
+            return self.keeping(kept.ceil() as usize, gaussians, step, least, observer);
         };
         let finest = (step + FINEST).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
@@ -129,25 +129,25 @@ impl<'a> TargetSearch<'a> {
         self.trimmed(coded, deviation, aim, observer)
     }
 
-    /// The codes of a step, which is halved until they are not too few, so many times at most.
-    fn kept(
+    /// The codes of a step, which is halved while there are fewer than `count`.
+    fn keeping(
         &mut self,
+        count: usize,
         gaussians: &[Gaussian],
         mut step: f64,
         least: f64,
-        halvings: u32,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers, EncodeError> {
-        let enough = (LEAST_KEPT * gaussians.len() as f64).ceil() as usize;
-        for _ in 0..halvings {
+        let mut halvings = 0;
+        loop {
             let coded = self.descended(gaussians, step, self.work.passes, observer)?.coded;
-            if coded.codes.len() >= enough || step <= least {
+            if coded.codes.len() >= count || step <= least || halvings == MOST_HALVINGS {
                 return Ok(coded);
             }
+            halvings += 1;
             step = (step - 1.0).max(least);
             observer.expect(self.work.one_more_try());
         }
-        Ok(self.descended(gaussians, step, self.work.passes, observer)?.coded)
     }
 
     /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
