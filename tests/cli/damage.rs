@@ -3,8 +3,9 @@
 
 use std::io::Cursor;
 
+use ::tiff::encoder::{Compression, DeflateLevel, TiffEncoder, colortype};
 use image::codecs::jpeg::JpegEncoder;
-use image::{DynamicImage, ImageFormat, RgbImage};
+use image::{ColorType, DynamicImage, ImageEncoder, ImageFormat, RgbImage};
 use serde_json::Value;
 
 use super::common::layered;
@@ -68,7 +69,7 @@ fn overwritten(file: &[u8]) -> Vec<u8> {
 }
 
 /// What is made of a damaged file.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
     /// It is refused, and so is it with `--allow-partial`.
     Nothing,
@@ -76,6 +77,29 @@ enum Outcome {
     Partial,
     /// It is taken: the format has nothing that tells.
     Unnoticed,
+}
+
+/// Whether a message is in words for people, not those of a library's code.
+fn assert_plain(message: &str) {
+    let words = [
+        "{",
+        "}",
+        "(\"",
+        "::",
+        "`",
+        "_",
+        "ChunkType",
+        "whole buffer",
+        "Unexpected",
+        "Error",
+        "Some(",
+        "rror error",
+        "Invalid",
+        "Format",
+        "limits exceeded",
+        "checksum",
+    ];
+    assert!(!words.iter().any(|word| message.contains(word)), "{message}");
 }
 
 fn outcome(room: &Room, name: &str, file: &[u8]) -> Outcome {
@@ -91,6 +115,8 @@ fn outcome(room: &Room, name: &str, file: &[u8]) -> Outcome {
         text(printed).split_inclusive('\n').filter(is_damage).collect()
     };
     let (error, warning) = (told(&strict.stderr), told(&partial.stderr));
+    assert_plain(&error);
+    assert_plain(&warning);
     assert_eq!(error.lines().count().max(warning.lines().count()).max(1), 1, "{error}{warning}");
     match (strict.status.success(), partial.status.success()) {
         (true, true) => {
@@ -104,16 +130,17 @@ fn outcome(room: &Room, name: &str, file: &[u8]) -> Outcome {
         }
         (false, false) => {
             assert!(error.starts_with(&format!("error: {name}: ")), "{error}");
+            let nothing = warning.strip_suffix("; nothing of it can be read\n");
+            assert!(nothing.is_some() || name.ends_with(".gip"), "{warning}");
             Nothing
         }
         (true, false) => panic!("{name}: {warning}"),
     }
 }
 
-#[test]
-fn each_format_tells_damage_as_well_as_it_can() {
+/// A file of each format, what becomes of it when it is cut at 60 %, and when its middle is overwritten.
+fn table() -> [(&'static str, Vec<u8>, Outcome, Outcome); 21] {
     use Outcome::{Nothing, Partial, Unnoticed};
-    let room = Room::new();
     let gip = {
         let source = image_gip::Source::new_u8(
             SIZE.0,
@@ -127,8 +154,11 @@ fn each_format_tells_damage_as_well_as_it_can() {
         });
         source.expect("the sizes agree").expect("no target").bytes
     };
-    // A file, what becomes of it when it is cut, and when its middle is overwritten.
-    let table = [
+    let plain = |magic: &str, samples: Vec<u8>| {
+        [format!("{magic}\n{} {}\n255\n", SIZE.0, SIZE.1).into_bytes(), samples].concat()
+    };
+    let digits: Vec<String> = noise().iter().map(u8::to_string).collect();
+    [
         ("a.png", written(ImageFormat::Png), Partial, Partial),
         ("a.jpg", jpeg(90), Partial, Partial),
         ("a.gif", written(ImageFormat::Gif), Partial, Partial),
@@ -137,25 +167,66 @@ fn each_format_tells_damage_as_well_as_it_can() {
         ("a.ico", written(ImageFormat::Ico), Partial, Partial),
         ("a.exr", written(ImageFormat::OpenExr), Partial, Unnoticed),
         ("a.gip", gip, Partial, Partial),
-        // Without compression, any samples are valid.
+        // The directory comes last.
         ("a.tif", written(ImageFormat::Tiff), Nothing, Unnoticed),
+        // Without compression, any samples are valid.
         ("b.tif", tiff::rgb(SIZE, &noise().into_raw()), Partial, Unnoticed),
+        ("lzw.tif", compressed(Compression::Lzw), Nothing, Partial),
+        ("deflate.tif", compressed(Compression::Deflate(DeflateLevel::Fast)), Nothing, Partial),
+        ("packbits.tif", compressed(Compression::Packbits), Nothing, Unnoticed),
         ("a.bmp", written(ImageFormat::Bmp), Partial, Unnoticed),
         ("a.tga", written(ImageFormat::Tga), Partial, Unnoticed),
         ("a.pnm", written(ImageFormat::Pnm), Partial, Unnoticed),
+        ("a.ppm", plain("P6", noise().into_raw()), Partial, Unnoticed),
+        ("text.ppm", plain("P3", digits.join(" ").into_bytes()), Partial, Partial),
         ("a.ff", written(ImageFormat::Farbfeld), Partial, Unnoticed),
         ("a.hdr", written(ImageFormat::Hdr), Partial, Partial),
         ("a.dds", dds(), Partial, Unnoticed),
-    ];
+    ]
+}
+
+fn compressed(compression: Compression) -> Vec<u8> {
+    let mut file = Cursor::new(Vec::new());
+    let encoder = TiffEncoder::new(&mut file).expect("in memory");
+    let mut encoder = encoder.with_compression(compression);
+    let samples = noise().into_raw();
+    encoder.write_image::<colortype::RGB8>(SIZE.0, SIZE.1, &samples).expect("in memory");
+    file.into_inner()
+}
+
+#[test]
+fn each_format_tells_damage_as_well_as_it_can() {
+    let room = Room::new();
     let mut others = Vec::new();
-    for (name, file, when_cut, when_overwritten) in table {
-        assert_eq!(outcome(&room, name, &file), Unnoticed, "{name} is whole");
+    for (name, file, when_cut, when_overwritten) in table() {
+        assert_eq!(outcome(&room, name, &file), Outcome::Unnoticed, "{name} is whole");
         let found = (outcome(&room, name, &cut(&file)), outcome(&room, name, &overwritten(&file)));
         if found != (when_cut, when_overwritten) {
             others.push((name, found));
         }
     }
     assert!(others.is_empty(), "{others:?}");
+}
+
+#[test]
+fn a_file_that_ends_early_is_told_wherever_it_ends() {
+    let room = Room::new();
+    let table = table();
+    for (name, file, ..) in &table {
+        for tenths in 0..10 {
+            let cut = &file[..file.len() * tenths / 10];
+            let found = outcome(&room, name, cut);
+            assert_ne!(found, Outcome::Unnoticed, "{tenths} tenths of {name}");
+            room.write(&format!("in/{tenths}/{name}/{name}"), cut);
+        }
+    }
+    // The size alone is read in another way.
+    let args = ["in", "--out", "out", "--manifest", "m.jsonl"];
+    let (_, errors) = room.batch(3, &[&args[..], &QUICK].concat());
+    // A folder's .gip files are no sources.
+    let failed = errors.lines().filter(|line| line.starts_with("error: in/"));
+    assert_eq!(failed.count(), 10 * (table.len() - 1), "{errors}");
+    assert_plain(&errors);
 }
 
 #[test]
@@ -216,10 +287,45 @@ fn dds_without_compression_is_refused_in_plain_words() {
 fn a_webp_has_as_many_bytes_as_it_says() {
     let room = Room::new();
     let file = written(ImageFormat::WebP);
+    // Too short and too long for its one chunk.
+    let length = file.len() as u32 - 8;
+    for length in [length - 100, length - 2, length + 2] {
+        let file = [&file[..4], &length.to_le_bytes(), &file[8..]].concat();
+        assert_eq!(outcome(&room, "a.webp", &file), Outcome::Partial, "{length}");
+    }
     for bytes in [1, 2, 100] {
         assert_eq!(outcome(&room, "a.webp", &file[..file.len() - bytes]), Outcome::Partial);
     }
     assert_eq!(outcome(&room, "a.webp", &[&file[..], b"behind"].concat()), Outcome::Unnoticed);
+}
+
+#[test]
+fn the_end_of_a_file_is_missed() {
+    let room = Room::new();
+    let (png, gif) = (written(ImageFormat::Png), written(ImageFormat::Gif));
+    for (name, file, bytes) in [("a.png", &png, 4), ("a.png", &png, 12), ("a.gif", &gif, 1)] {
+        let file = &file[..file.len() - bytes];
+        assert_eq!(outcome(&room, name, file), Outcome::Partial, "{name} without {bytes} bytes");
+    }
+}
+
+#[test]
+fn a_webp_may_lose_its_metadata() {
+    let room = Room::new();
+    let mut file = Vec::new();
+    let mut encoder = image::codecs::webp::WebPEncoder::new_lossless(&mut file);
+    encoder.set_exif_metadata(b"II*\0\x08\0\0\0\0\0\0\0\0\0".to_vec()).expect("WebP has it");
+    encoder.write_image(&noise(), SIZE.0, SIZE.1, ColorType::Rgb8.into()).expect("in memory");
+    assert_eq!(outcome(&room, "a.webp", &file), Outcome::Unnoticed);
+    for bytes in [4, 20, 30, 500] {
+        let cut = &file[..file.len() - bytes];
+        assert_eq!(outcome(&room, "a.webp", cut), Outcome::Partial, "without {bytes} bytes");
+    }
+    // They are promised and not there, though the lengths agree.
+    let mut short = file[..file.len() - 22].to_vec();
+    let length = short.len() as u32 - 8;
+    short[4..8].copy_from_slice(&length.to_le_bytes());
+    assert_eq!(outcome(&room, "a.webp", &short), Outcome::Partial);
 }
 
 #[test]

@@ -3,7 +3,9 @@
 use std::io::Cursor;
 
 use image::codecs::gif::GifEncoder;
-use image::{ColorType, Frame, ImageFormat};
+use image::codecs::ico::{IcoEncoder, IcoFrame};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ColorType, Frame, ImageEncoder, ImageFormat};
 use serde_json::{Value, json};
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
@@ -94,6 +96,104 @@ fn tiff(kinds: &[u32]) -> Vec<u8> {
     file.into_inner()
 }
 
+/// JPEGs after each other, with an index of these kinds of pictures in the first (CIPA DC-007).
+fn mpo(kinds: &[u32]) -> Vec<u8> {
+    let mut picture = Vec::new();
+    let encoder = JpegEncoder::new_with_quality(&mut picture, 90);
+    encoder.write_image(&[99; 24 * 16], SIZE.0, SIZE.1, ColorType::L8.into()).expect("in memory");
+    // Offsets are from the index on.
+    let (prefix, index) = (b"\xFF\xD8\xFF\xE2", b"MM\0*\0\0\0\x08\0\x01\xB0\x02\0\x07");
+    let entries = 16 * kinds.len();
+    let segment = 2 + 4 + index.len() + 12 + entries;
+    let (before, first) = (2 + 2 + 2 + 4, picture.len() + 2 + segment);
+    let mut file = [&prefix[..], &(segment as u16).to_be_bytes(), b"MPF\0", index].concat();
+    for number in [entries, index.len() + 12, 0] {
+        file.extend((number as u32).to_be_bytes());
+    }
+    for (number, kind) in kinds.iter().enumerate() {
+        let offset = if number == 0 { 0 } else { first + (number - 1) * picture.len() - before };
+        for value in [*kind, picture.len() as u32, offset as u32, 0] {
+            file.extend(value.to_be_bytes());
+        }
+    }
+    file.extend(&picture[2..]);
+    file.extend(vec![picture; kinds.len() - 1].concat());
+    file
+}
+
+/// An icon of squares with these sides.
+fn ico(sides: &[u32]) -> Vec<u8> {
+    let pictures: Vec<_> =
+        sides.iter().map(|&side| pictures::picture((side, side), ColorType::Rgba8)).collect();
+    let frames = pictures.iter().map(|picture| {
+        IcoFrame::as_png(
+            picture.as_bytes(),
+            picture.width(),
+            picture.height(),
+            ColorType::Rgba8.into(),
+        )
+    });
+    let frames: Vec<_> = frames.collect::<Result<_, _>>().expect("in memory");
+    let mut file = Vec::new();
+    IcoEncoder::new(&mut file).encode_images(&frames).expect("in memory");
+    file
+}
+
+fn netpbm() -> Vec<u8> {
+    let size = format!("{} {}", SIZE.0, SIZE.1);
+    let samples = |bytes: u32| vec![7; (SIZE.0 * SIZE.1 * bytes) as usize];
+    let pam = format!(
+        "P7\nWIDTH {}\nHEIGHT {}\nDEPTH 4\nMAXVAL 255\nTUPLTYPE RGB_ALPHA\nENDHDR\n",
+        SIZE.0, SIZE.1
+    );
+    [
+        format!("P6 {size} 255\n").as_bytes(),
+        &samples(3),
+        format!("P5 {size} 65535\n").as_bytes(),
+        &samples(2),
+        format!("P4 {size}\n").as_bytes(),
+        &[7; 3 * 16],
+        pam.as_bytes(),
+        &samples(4),
+        format!("P5 {size} 255\n").as_bytes(),
+        &samples(1),
+    ]
+    .concat()
+}
+
+#[test]
+fn an_icon_is_its_largest_picture() {
+    let room = Room::new();
+    room.write("a.ico", ico(&[16, 48, 32]));
+    room.save_picture("a.png", &pictures::picture((48, 48), ColorType::Rgba8));
+    let output = room.run(&["compare", "a.ico", "a.png"]);
+    assert_eq!(text(&output.stdout), "identical\n");
+}
+
+#[test]
+fn what_is_cut_behind_the_picture_that_is_taken_is_told() {
+    let room = Room::new();
+    let cut = "the file is damaged: the data end too early";
+    for (name, file, bytes) in [
+        ("a.gif", gif(3), 1),
+        ("b.gif", gif(3), 200),
+        ("c.tif", tiff(&[0, 2]), 100),
+        ("d.ico", ico(&[48, 32]), 1),
+        ("e.pnm", netpbm(), 1),
+        ("f.png", apng(2, false), 20),
+    ] {
+        room.write(name, &file[..file.len() - bytes]);
+        let args = [&["encode", name, "a.gip"], &QUICK[..]].concat();
+        assert_eq!(room.fails(&args), format!("error: {name}: {cut}\n"));
+        room.ok(&[&args[..], &["--allow-partial"]].concat());
+    }
+    // An index is often kept where the other pictures are not.
+    let file = mpo(&[0x03_0000, 0]);
+    let first = file.len() / 2 + 60;
+    room.write("g.jpg", &file[..first.min(file.len())]);
+    room.ok(&[&["encode", "g.jpg", "a.gip"], &QUICK[..]].concat());
+}
+
 #[test]
 fn the_first_of_several_pictures_is_taken_with_a_warning() {
     let files = [
@@ -109,6 +209,15 @@ fn the_first_of_several_pictures_is_taken_with_a_warning() {
         ("f.tif", tiff(&[0, 2, 2]), Some("only the first of 3 pages is taken")),
         // Smaller versions and masks are no other pictures.
         ("g.tif", tiff(&[0, 1, 4]), None),
+        ("h.jpg", mpo(&[0x03_0000, 0, 0x02_0002]), Some("only the first of 3 pictures is taken")),
+        ("i.jpg", mpo(&[0x03_0000, 0x01_0001]), None),
+        (
+            "j.ico",
+            ico(&[16, 48, 32]),
+            Some("of its 3 pictures, only the one of most bits and pixels is taken"),
+        ),
+        ("k.ico", ico(&[16]), None),
+        ("l.pnm", netpbm(), Some("only the first of 5 pictures is taken")),
     ];
     let room = Room::new();
     for (name, file, _) in &files {

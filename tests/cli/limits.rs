@@ -58,6 +58,9 @@ fn limits_may_be_lowered_too() {
         let args = ["encode", "a.png", "a.gip", "--limit", limit];
         let error = room.fails(&[&args[..], &QUICK].concat());
         assert!(error.contains(&format!("--limit {name}=N")), "{limit}: {error}");
+        let (_, allowed) = limit.split_once('=').expect("there is one");
+        let allowed = allowed.replace('k', "000");
+        assert!(error.contains(&format!("required, {allowed} allowed")), "{limit}: {error}");
     }
     let usage = room.run(&["info", "a.gip", "--limit", "size=5"]);
     assert_eq!(usage.status.code(), Some(2));

@@ -196,6 +196,38 @@ fn alpha_and_other_channels() {
 }
 
 #[test]
+fn channels_that_are_left_out_are_told() {
+    let room = Room::new();
+    let bits = [8; 6];
+    for (photometric, count, extra, left_out) in [
+        (2_u32, 4_u32, &[2_u32][..], 0),
+        (2, 4, &[0], 1),
+        (2, 6, &[1, 0, 0], 2),
+        (2, 5, &[0, 2], 2),
+        (1, 3, &[2, 0], 1),
+        (5, 6, &[0, 0], 2),
+    ] {
+        let tags: [(u16, &[u32]); 4] = [
+            (BITS, &bits[..count as usize]),
+            (PHOTOMETRIC, &[photometric]),
+            (SAMPLES, &[count]),
+            (EXTRA_SAMPLES, extra),
+        ];
+        room.write("a.tif", file((2, 1), &tags, &[9; 12][..2 * count as usize]));
+        let output = room.run(&["encode", "a.tif", "a.gip", "--effort", "1"]);
+        assert!(output.status.success(), "{output:?}");
+        let expected = match left_out {
+            0 => String::new(),
+            _ => format!(
+                "warning: a.tif: what it has beside colours and alpha ({left_out} of its {count} \
+                 channels) is left out\n"
+            ),
+        };
+        assert_eq!(text(&output.stderr), expected);
+    }
+}
+
+#[test]
 fn what_of_its_colours_is_lost_is_told() {
     let room = Room::new();
     let tags: [(u16, &[u32]); 3] = [(BITS, &[8, 8, 8]), (PHOTOMETRIC, &[8]), (SAMPLES, &[3])];

@@ -1,7 +1,7 @@
 //! The limits of what is read and written, by the names that they have in `--limit`.
 
-use image::ImageError;
 use image_gip::{DecodeError, EncodeError, LimitKind, Limits};
+use thiserror::Error;
 
 /// Each kind of limit with its name.
 pub(crate) const NAMES: [(&str, LimitKind); 6] = [
@@ -25,6 +25,13 @@ pub(crate) fn set(limits: &mut Limits, kind: LimitKind, value: u64) {
         LimitKind::Work => limits.max_work = value,
         _ => {}
     }
+}
+
+/// A picture that takes more memory than is allowed, as its decoder says without a number.
+#[derive(Debug, Error)]
+#[error("limit exceeded: {}: more than {allowed} required, {allowed} allowed", LimitKind::Memory)]
+pub(crate) struct MemoryLimit {
+    pub(crate) allowed: u64,
 }
 
 /// Refuses a picture that is too large.
@@ -51,9 +58,7 @@ pub(crate) fn advice(error: &anyhow::Error) -> Option<String> {
         if let Some(EncodeError::Limit { kind, .. }) = cause.downcast_ref() {
             return Some(*kind);
         }
-        // `image` has no other of these limits.
-        let is_memory = matches!(cause.downcast_ref(), Some(ImageError::Limits(_)));
-        is_memory.then_some(LimitKind::Memory)
+        cause.is::<MemoryLimit>().then_some(LimitKind::Memory)
     })?;
     let (name, _) = NAMES.into_iter().find(|(_, named)| *named == kind)?;
     Some(format!("--limit {name}=N sets another limit"))

@@ -97,7 +97,7 @@ pub(crate) struct Batch {
     #[arg(long, value_name = "FILE")]
     pub(crate) manifest: Option<PathBuf>,
     /// Take what can be read of a file that is truncated or damaged, with a warning, instead of failing
-    /// with it.
+    /// with it. `gip encode --help` says for which formats damage in the middle goes unnoticed.
     #[arg(long)]
     pub(crate) allow_partial: bool,
     #[command(flatten)]

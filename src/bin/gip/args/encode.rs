@@ -13,7 +13,8 @@ use super::values::{ThreadCount, number};
 ///
 /// Reads PNG, JPEG, WebP, TIFF, GIF, BMP, Netpbm, QOI, TGA, DDS (DXT1, 3 and 5), ICO, farbfeld, OpenEXR, Radiance
 /// HDR and .gip, with 8 or 16 bits per sample, gray or RGB, with or without alpha. Gray stays gray.
-/// Alpha is dropped if every pixel is opaque. Of several pictures, the first is taken. Samples that are
+/// Alpha is dropped if every pixel is opaque. Of several pictures, the first is taken; of an icon's, the one
+/// of most bits per pixel, and of these the largest; of OpenEXR's layers, the first that is RGB. Samples that are
 /// floats are clipped and stored with 16 bits: in OpenEXR and HDR they are linear light, and become
 /// sRGB; in TIFF they are from 0 to 1, like integers from 0 to their largest. CMYK, YCbCr and CIELAB
 /// become RGB.
@@ -47,7 +48,9 @@ pub(crate) struct Encode {
     /// failing.
     ///
     /// PNG, JPEG, TIFF, GIF, .gip and formats without compression are shown as far as they go. Damage
-    /// in the middle of a JPEG is noticed where it changes how many data the picture takes.
+    /// in the middle of a JPEG is noticed where it changes how many data the picture takes. WebP, BMP, Netpbm, TGA,
+    /// QOI, DDS, farbfeld, HDR, and TIFF, ICO and OpenEXR without compression have no checksum: damage in the middle of
+    /// them is noticed only where the data that follow cannot be decoded.
     #[arg(long)]
     pub(crate) allow_partial: bool,
     #[command(flatten)]

@@ -7,7 +7,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use image::ImageFormat;
 use image_gip::{
     Decoder, EncodeError, Encoder, Header, MetadataPolicy, Orientation, RenderOptions,
     StreamDecoder, Threads,
@@ -24,7 +23,7 @@ use crate::decode::{self, Wanted};
 use crate::encode;
 use crate::errors::one_line;
 use crate::picture::StillImage;
-use crate::source::Reading;
+use crate::source::{Reading, is_picture};
 
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
@@ -84,9 +83,7 @@ impl Task {
     /// How a file of a folder is taken, by its name.
     pub(crate) fn kind(&self, path: &Path) -> Kind {
         let is_taken = match self {
-            Self::Encode { .. } => {
-                ImageFormat::from_path(path).is_ok_and(|format| format.reading_enabled())
-            }
+            Self::Encode { .. } => is_picture(path),
             Self::Decode { .. } => {
                 path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("gip"))
             }

@@ -3,6 +3,7 @@
 use std::io::Cursor;
 use std::ops::RangeInclusive;
 
+use exr::meta::header::Header;
 use image::DynamicImage;
 use image_gip::Metadata;
 use moxcms::{
@@ -12,7 +13,7 @@ use moxcms::{
 use png::{CodingIndependentCodePoints, Info, SourceChromaticities};
 
 use super::light;
-use super::stored::Stored;
+use super::stored::{Stored, left_out};
 
 /// The gamma that stands for sRGB, and how far others that do may be from it.
 const SRGB_GAMMA: f64 = 0.454_55;
@@ -27,6 +28,9 @@ const LEAST_SHARE: f64 = 0.001;
 const SAME_CHROMATICITY: f64 = 0.002;
 /// x and y of sRGB's white, red, green and blue.
 const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
+
+/// The channels of OpenEXR that are taken, but for alpha.
+const COLORS: [&str; 3] = ["R", "G", "B"];
 
 /// Applies the chunks of a PNG, of which the first of cICP, iCCP, sRGB, and gAMA with cHRM counts (PNG,
 /// third edition, 4.3). A gamma alone is turned to that of sRGB, and what has other colours gets a
@@ -206,17 +210,32 @@ pub(super) fn of_exif(metadata: &mut Metadata) {
     }
 }
 
-/// What of an OpenEXR file's colours is lost.
-pub(super) fn lost_of_exr(file: &[u8]) -> Option<String> {
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false).ok()?;
-    let found = meta.headers.first()?.shared_attributes.chromaticities?;
-    let exr::meta::attribute::Chromaticities { red, green, blue, white } = found;
-    let points = [white, red, green, blue].map(|point| (f64::from(point.0), f64::from(point.1)));
-    let is_srgb = points.iter().zip(SRGB).all(|(&(x, y), (u, v))| {
-        (x - u).abs() <= SAME_CHROMATICITY && (y - v).abs() <= SAME_CHROMATICITY
+/// What of an OpenEXR file's channels and colours is lost.
+pub(super) fn lost_of_exr(file: &[u8]) -> Vec<String> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false);
+    let headers = meta.map(|meta| meta.headers).unwrap_or_default();
+    // As in `image`, the first that has these is taken.
+    let count = |header: &Header, names: &[&str]| {
+        let channels = header.channels.list.iter();
+        channels.filter(|channel| names.iter().any(|name| channel.name.eq(name))).count()
+    };
+    let Some(header) = headers.iter().find(|header| !header.deep && count(header, &COLORS) == 3)
+    else {
+        return Vec::new();
+    };
+    let all = header.channels.list.len();
+    let extra = all - 3 - count(header, &["A"]);
+    let primaries = header.shared_attributes.chromaticities.filter(|found| {
+        let points = [found.white, found.red, found.green, found.blue];
+        points.into_iter().zip(SRGB).any(|(exr::math::Vec2(x, y), (u, v))| {
+            (f64::from(x) - u).abs() > SAME_CHROMATICITY
+                || (f64::from(y) - v).abs() > SAME_CHROMATICITY
+        })
     });
-    (!is_srgb)
-        .then(|| "its primaries (chromaticities) cannot be kept, and are taken as sRGB's".into())
+    let primaries = primaries.map(|_| {
+        "its primaries (chromaticities) cannot be kept, and are taken as sRGB's".to_owned()
+    });
+    left_out(extra, all).into_iter().chain(primaries).collect()
 }
 
 /// What of a Radiance file's colours is lost.

@@ -29,16 +29,77 @@ impl Format {
         if let Ok(format) = image::guess_format(start) {
             return Some(Self::from(format));
         }
+        Self::by_name(path)
+    }
+
+    fn by_name(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
         if extension.eq_ignore_ascii_case("gip") {
             return Some(Self::Gip);
         }
+        // JPEG with several pictures.
+        if extension.eq_ignore_ascii_case("mpo") {
+            return Some(Self::Image(ImageFormat::Jpeg));
+        }
         ImageFormat::from_extension(extension).map(Self::from)
     }
+
+    /// The name in messages.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Gip => "gip",
+            Self::Tiff => "TIFF",
+            Self::Image(format) => match format {
+                ImageFormat::Png => "PNG",
+                ImageFormat::Jpeg => "JPEG",
+                ImageFormat::Gif => "GIF",
+                ImageFormat::WebP => "WebP",
+                ImageFormat::Pnm => "Netpbm",
+                ImageFormat::Tga => "TGA",
+                ImageFormat::Dds => "DDS",
+                ImageFormat::Bmp => "BMP",
+                ImageFormat::Ico => "ICO",
+                ImageFormat::Hdr => "Radiance HDR",
+                ImageFormat::OpenExr => "OpenEXR",
+                ImageFormat::Farbfeld => "farbfeld",
+                ImageFormat::Avif => "AVIF",
+                ImageFormat::Qoi => "QOI",
+                _ => "picture",
+            },
+        }
+    }
+
+    /// Whether there is a decoder. `image` denies the one that it has for DDS.
+    pub(super) fn is_read(self) -> bool {
+        match self {
+            Self::Gip | Self::Tiff | Self::Image(ImageFormat::Dds) => true,
+            Self::Image(format) => format.reading_enabled(),
+        }
+    }
+}
+
+/// Whether the name is that of a picture that can be read, other than a .gip file.
+pub(crate) fn is_picture(path: &Path) -> bool {
+    Format::by_name(path).is_some_and(|format| format != Format::Gip && format.is_read())
 }
 
 impl From<ImageFormat> for Format {
     fn from(format: ImageFormat) -> Self {
         if format == ImageFormat::Tiff { Self::Tiff } else { Self::Image(format) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_can_be_read_are_told_by_their_names() {
+        for name in ["a.png", "b.JPG", "c.tif", "x/d.dds", "e.MPO", "f.pam"] {
+            assert!(is_picture(Path::new(name)), "{name}");
+        }
+        for name in ["a.gip", "b.avif", "c.txt", "png", "d.png/e"] {
+            assert!(!is_picture(Path::new(name)), "{name}");
+        }
     }
 }

@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::io::{BufRead, Cursor, Seek};
 
-use anyhow::{Error, Result, anyhow, bail};
-use image::{
-    ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult,
-};
+use anyhow::{Result, anyhow, bail};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use image_gip::Limits;
 
+use super::fault::{self, Fault, SHORT};
+use super::frames::{self, Others};
 use super::stored::{Stored, partly};
-use super::{clipping, colors, frames, ico, jpeg, light, metadata, png_chunks, screen};
+use super::{clipping, colors, ico, jpeg, light, metadata, png_chunks, screen, webp};
 use crate::limits::check_size;
 use crate::picture::DAMAGED_PROFILE;
 
@@ -33,10 +33,10 @@ pub(super) fn dimensions(
             file.read_to_end(&mut bytes)?;
             jpeg::dimensions(&bytes).ok_or_else(|| match jpeg::survey(&bytes).unread() {
                 Some(reason) => anyhow!(reason),
-                None => told(error, format),
+                None => error.into(),
             })
         }
-        Err(error) => Err(told(error, format)),
+        Err(error) => Err(error.into()),
     }
 }
 
@@ -46,14 +46,14 @@ pub(super) fn read(
     limits: &Limits,
     allow_partial: bool,
 ) -> Result<Stored> {
-    if format == ImageFormat::Ico
-        && let Some(png) = ico::png(file)
-    {
-        return read(ImageFormat::Png, png, limits, allow_partial);
-    }
+    let icon = (format == ImageFormat::Ico).then_some(file);
+    let png = icon.and_then(ico::png).map(|png| (ImageFormat::Png, png));
+    let (format, file) = png.unwrap_or((format, file));
+    let damage = damage(format, file).or_else(|| ico::is_cut(icon?).then_some(SHORT));
     let (file, mut warnings) = match format {
         ImageFormat::Gif => (screen::of_first_frame(file), Vec::new()),
         ImageFormat::Png => png_chunks::without_damaged(file),
+        ImageFormat::WebP if allow_partial => (webp::without_lost_metadata(file), Vec::new()),
         _ => (Cow::Borrowed(file), Vec::new()),
     };
     let jpeg = (format == ImageFormat::Jpeg).then(|| jpeg::survey(&file));
@@ -65,31 +65,34 @@ pub(super) fn read(
         _ => file,
     };
     let file = &file[..];
-    let told = |error| told(error, format);
-    let mut decoder = decoder(format, file, jpeg.as_ref(), limits).map_err(told)?;
+    let damage = damage.or_else(|| jpeg.as_ref()?.damage());
+    let refused = |error| damage.map_or(error, |damage| Fault::Damage(damage).into());
+    let mut decoder = decoder(format, file, jpeg.as_ref(), limits).map_err(refused)?;
     check_size(limits, decoder.dimensions())?;
     let (metadata, loss) = metadata::read(&mut decoder, file)?;
     // The decoders of `image` know nothing of the prefix that was removed from Exif.
     let orientation = metadata.orientation();
-    warnings.extend(frames::warning(format, file));
+    let others = Others::of(format, file);
+    warnings.extend(others.warning.or_else(|| ico::warning(icon?)));
     warnings.extend(loss.map(|loss| loss.to_string()));
     if metadata.icc_profile.is_none() && jpeg.as_ref().is_some_and(|jpeg| jpeg.has_profile) {
         warnings.push(DAMAGED_PROFILE.to_owned());
     }
-    let damage = match &jpeg {
-        Some(jpeg) => jpeg.damage(),
-        None => damage(format, file),
-    };
-    let mut damage = damage.map(String::from);
-    if let Some(damage) = damage.as_ref().filter(|_| !allow_partial) {
-        bail!("the file is damaged: {damage}");
+    if let Some(jpeg) = &jpeg {
+        warnings.extend(jpeg.pictures.and_then(|count| frames::first_of(count, "pictures")));
     }
-    let image = match DynamicImage::from_decoder(decoder).map_err(told) {
-        Err(error) if allow_partial => {
-            damage.get_or_insert_with(|| error.to_string());
-            partial(format, file, jpeg.as_ref(), limits).ok_or(error)?
+    let mut damage = damage.or(others.damage);
+    if let Some(damage) = damage.filter(|_| !allow_partial) {
+        bail!(Fault::Damage(damage));
+    }
+    let image = match DynamicImage::from_decoder(decoder) {
+        Ok(image) => image,
+        Err(error) => {
+            damage = damage.or(fault::damage(&error));
+            let is_partial = allow_partial && damage.is_some();
+            let part = is_partial.then(|| partial(format, file, jpeg.as_ref(), limits));
+            part.flatten().ok_or_else(|| refused(error.into()))?
         }
-        image => image?,
     };
     warnings.extend(damage.map(partly));
     warnings.extend(clipping::warning_of(&image));
@@ -107,24 +110,9 @@ pub(super) fn read(
 /// Damage that the decoder says nothing of.
 fn damage(format: ImageFormat, file: &[u8]) -> Option<&'static str> {
     match format {
-        ImageFormat::WebP => {
-            let length = u32::from_le_bytes(*file.get(4..)?.first_chunk()?);
-            (u64::from(length) + 8 > file.len() as u64).then_some("the data end too early")
-        }
+        ImageFormat::Png => png_chunks::is_cut(file).then_some(SHORT),
+        ImageFormat::WebP => webp::damage(file),
         _ => None,
-    }
-}
-
-/// An error in words that are not those of a library's code.
-fn told(error: ImageError, format: ImageFormat) -> Error {
-    match error {
-        ImageError::Decoding(_) | ImageError::Unsupported(_) if format == ImageFormat::Jpeg => {
-            anyhow!("the file is damaged, or of a kind of JPEG that is not read")
-        }
-        ImageError::Unsupported(_) if format == ImageFormat::Dds => {
-            anyhow!("DDS is read with the compression DXT1, DXT3 or DXT5 alone")
-        }
-        error => error.into(),
     }
 }
 
@@ -134,7 +122,7 @@ fn decoder<'a>(
     file: &'a [u8],
     jpeg: Option<&jpeg::Survey>,
     limits: &Limits,
-) -> ImageResult<Box<dyn ImageDecoder + 'a>> {
+) -> Result<Box<dyn ImageDecoder + 'a>> {
     Ok(match jpeg.and_then(jpeg::Survey::unusual) {
         Some(colors) => Box::new(jpeg::Unusual::new(file, colors, limits.max_memory)?),
         None => Box::new(usual_decoder(format, Cursor::new(file), limits)?),

@@ -1,40 +1,58 @@
-//! Files of several pictures, of which the first is taken.
+//! Files of several pictures, of which one is taken.
 
 use std::io::Cursor;
 
 use image::ImageFormat;
-use tiff::tags::Tag;
+use image::codecs::pnm::{PnmDecoder, PnmHeader, PnmSubtype, SampleEncoding};
 
-/// Bit of TIFF's `NewSubfileType`: a smaller version of another page.
-const REDUCED: u32 = 1;
-/// Bit of TIFF's `NewSubfileType`: a mask of another page.
-const MASK: u32 = 4;
+use super::fault::{self, SHORT};
 
-/// What is left out of a file of several pictures. A file that is damaged has those before the damage.
-pub(super) fn warning(format: ImageFormat, file: &[u8]) -> Option<String> {
-    let (count, unit) = match format {
-        ImageFormat::Gif => (gif_frames(file)?, "frames"),
-        ImageFormat::Png => return png_warning(file),
-        ImageFormat::WebP => (webp_frames(file)?, "frames"),
-        ImageFormat::Tiff => (tiff_pages(file)?, "pages"),
-        _ => return None,
-    };
-    first_of(count, unit)
+/// What a file has beside the picture that is taken.
+#[derive(Debug, Default)]
+pub(super) struct Others {
+    /// What is left out. A file that is damaged has those before the damage.
+    pub(super) warning: Option<String>,
+    /// What is damaged among them, if the picture that is taken may be whole.
+    pub(super) damage: Option<&'static str>,
 }
 
-fn first_of(count: u32, unit: &str) -> Option<String> {
+impl Others {
+    pub(super) fn of(format: ImageFormat, file: &[u8]) -> Self {
+        let warning = match format {
+            ImageFormat::Gif => return Self::after_first("frames", gif_frames(file)),
+            ImageFormat::Pnm => return Self::after_first("pictures", pnm_pictures(file)),
+            ImageFormat::Png => png_warning(file),
+            ImageFormat::WebP => webp_frames(file).and_then(|count| first_of(count, "frames")),
+            ImageFormat::OpenExr => exr_warning(file),
+            _ => None,
+        };
+        Self { warning, damage: None }
+    }
+
+    /// Of a file of so many pictures, which may be damaged after the first.
+    pub(super) fn after_first(unit: &str, (count, damage): (usize, Option<&'static str>)) -> Self {
+        Self { warning: first_of(count, unit), damage }
+    }
+}
+
+/// The warning of a file of so many pictures.
+pub(super) fn first_of(count: usize, unit: &str) -> Option<String> {
     (count > 1).then(|| format!("only the first of {count} {unit} is taken"))
 }
 
-fn gif_frames(file: &[u8]) -> Option<u32> {
+/// How many there are, and what is damaged on the way to the last block.
+fn gif_frames(file: &[u8]) -> (usize, Option<&'static str>) {
     let mut options = gif::DecodeOptions::new();
     options.skip_frame_decoding(true);
-    let mut decoder = options.read_info(file).ok()?;
+    let Ok(mut decoder) = options.read_info(file) else { return (0, None) };
     let mut count = 0;
-    while let Ok(Some(_)) = decoder.next_frame_info() {
-        count += 1;
+    loop {
+        match decoder.next_frame_info() {
+            Ok(Some(_)) => count += 1,
+            Ok(None) => return (count, None),
+            Err(error) => return (count, fault::damage(&error)),
+        }
     }
-    Some(count)
 }
 
 /// The picture that is read may be the first of the animation, or one beside it.
@@ -42,24 +60,46 @@ fn png_warning(file: &[u8]) -> Option<String> {
     let reader = png::Decoder::new(Cursor::new(file)).read_info().ok()?;
     let count = reader.info().animation_control?.num_frames;
     if reader.info().frame_control.is_some() {
-        return first_of(count, "frames");
+        return first_of(count as usize, "frames");
     }
     Some(format!("the still picture is taken, and its animation of {count} frames is not"))
 }
 
-fn webp_frames(file: &[u8]) -> Option<u32> {
+fn webp_frames(file: &[u8]) -> Option<usize> {
     let decoder = image_webp::WebPDecoder::new(Cursor::new(file)).ok()?;
-    decoder.is_animated().then(|| decoder.num_frames())
+    decoder.is_animated().then(|| decoder.num_frames() as usize)
 }
 
-/// Versions of a page in smaller sizes, and masks, are no pages.
-fn tiff_pages(file: &[u8]) -> Option<u32> {
-    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(file)).ok()?;
-    let mut count = 1;
-    // The library ends a chain that is a circle.
-    while decoder.more_images() && decoder.next_image().is_ok() {
-        let kind = decoder.find_tag_unsigned(Tag::NewSubfileType).ok().flatten().unwrap_or(0);
-        count += u32::from(kind & (REDUCED | MASK) == 0);
+fn exr_warning(file: &[u8]) -> Option<String> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false).ok()?;
+    let count = meta.headers.len();
+    (count > 1).then(|| format!("only the first of its {count} layers that is RGB is taken"))
+}
+
+/// Pictures that follow each other. One of plain text is alone.
+fn pnm_pictures(file: &[u8]) -> (usize, Option<&'static str>) {
+    let (mut rest, mut count) = (file, 0);
+    while let Ok(decoder) = PnmDecoder::new(&mut rest) {
+        count += 1;
+        let Some(length) = raster(decoder.header()) else { break };
+        match usize::try_from(length).ok().and_then(|length| rest.get(length..)) {
+            Some(next) => rest = next,
+            None => return (count, Some(SHORT)),
+        }
     }
-    Some(count)
+    (count, None)
+}
+
+/// Bytes of the samples of a Netpbm picture; `None` if they are text.
+fn raster(header: &PnmHeader) -> Option<u64> {
+    let (width, height) = (u64::from(header.width()), u64::from(header.height()));
+    let bytes = if header.maximal_sample() > 255 { 2 } else { 1 };
+    let channels = match header.subtype() {
+        PnmSubtype::Bitmap(SampleEncoding::Binary) => return Some(width.div_ceil(8) * height),
+        PnmSubtype::Graymap(SampleEncoding::Binary) => 1,
+        PnmSubtype::Pixmap(SampleEncoding::Binary) => 3,
+        PnmSubtype::ArbitraryMap => header.as_arbitrary()?.depth.into(),
+        _ => return None,
+    };
+    (width * height).checked_mul(channels * bytes)
 }

@@ -3,6 +3,7 @@
 mod clipping;
 mod colors;
 mod extended_xmp;
+mod fault;
 mod format;
 mod formats;
 mod frames;
@@ -16,5 +17,7 @@ mod read;
 mod screen;
 mod stored;
 mod tiff;
+mod webp;
 
+pub(crate) use format::is_picture;
 pub(crate) use read::Reading;

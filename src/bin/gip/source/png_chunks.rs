@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::Cursor;
+use std::ops::Range;
 
 /// Bytes of the signature, and of length, name and checksum of a chunk.
 const SIGNATURE: usize = 8;
@@ -19,28 +20,24 @@ const OPTIONAL: [&[u8]; 8] =
 /// The file without those [`OPTIONAL`] chunks before the samples that cannot be read, and a warning of
 /// each. The library ignores some of them without a word, and takes others for an error.
 pub(super) fn without_damaged(file: &[u8]) -> (Cow<'_, [u8]>, Vec<String>) {
-    let mut at = SIGNATURE;
     let (mut ranges, mut warnings, mut seen) = (Vec::new(), Vec::new(), Vec::new());
-    while let Some(length) = file.get(at..at + 4) {
-        let length = u32::from_be_bytes([length[0], length[1], length[2], length[3]]);
-        let end = at.saturating_add(length as usize).saturating_add(AROUND);
-        let Some(chunk) = file.get(at..end) else { break };
+    for range in chunks(file) {
+        let chunk = &file[range.clone()];
         let name = &chunk[4..8];
         if name == b"IDAT" {
             break;
         }
         // Nothing is made of bKGD, which the library wants after the palette. Of others, the first counts.
         if name == b"bKGD" || seen.contains(&name) {
-            ranges.push(at..end);
+            ranges.push(range);
         } else if OPTIONAL.contains(&name) {
             seen.push(name);
             if !is_readable(name, chunk) {
                 let name = name.escape_ascii();
                 warnings.push(format!("its chunk {name} is invalid, and is ignored"));
-                ranges.push(at..end);
+                ranges.push(range);
             }
         }
-        at = end;
     }
     if ranges.is_empty() {
         return (file.into(), warnings);
@@ -52,6 +49,22 @@ pub(super) fn without_damaged(file: &[u8]) -> (Cow<'_, [u8]>, Vec<String>) {
     }
     out.extend_from_slice(&file[at..]);
     (out.into(), warnings)
+}
+
+/// Whether the file ends before its last chunk does.
+pub(super) fn is_cut(file: &[u8]) -> bool {
+    !chunks(file).any(|range| file[range][4..8] == *b"IEND")
+}
+
+/// Where each chunk is that is whole.
+fn chunks(file: &[u8]) -> impl Iterator<Item = Range<usize>> {
+    let mut at = SIGNATURE;
+    std::iter::from_fn(move || {
+        let length = u32::from_be_bytes(*file.get(at..)?.first_chunk()?);
+        let start = at;
+        at = at.saturating_add(length as usize).saturating_add(AROUND);
+        file.get(start..at).map(|_| start..at)
+    })
 }
 
 /// Whether the library gets from a chunk what it is for.

@@ -9,7 +9,7 @@ use image_gip::{Decoder, Limits};
 
 use super::format::{Format, START};
 use super::stored::Stored;
-use super::{formats, gip, tiff};
+use super::{fault, formats, gip, tiff};
 use crate::files;
 use crate::limits::check_size;
 use crate::picture::StillImage;
@@ -39,26 +39,30 @@ impl Reading {
         let mut start = Vec::new();
         file.by_ref().take(START as u64).read_to_end(&mut start)?;
         file.rewind()?;
-        let size = match format(path, &start)? {
+        let format = format(path, &start)?;
+        let size = match format {
             Format::Gip => {
                 let decoder = Decoder::new_with_limits(file, self.limits.clone())?;
-                (decoder.header().width, decoder.header().height)
+                Ok((decoder.header().width, decoder.header().height))
             }
-            Format::Image(format) => formats::dimensions(format, file, &self.limits)?,
-            Format::Tiff => tiff::dimensions(file)?,
+            Format::Image(format) => formats::dimensions(format, file, &self.limits),
+            Format::Tiff => tiff::dimensions(file),
         };
+        let size = size.map_err(|error| fault::plain(error, format, &self.limits, false))?;
         check_size(&self.limits, size)?;
         Ok(size)
     }
 
     fn decode(&self, path: &Path, file: &[u8]) -> Result<StillImage> {
         let Self { limits, allow_partial } = self;
+        let format = format(path, &file[..file.len().min(START)])?;
+        let stored = match format {
+            Format::Gip => gip::read(file, limits, *allow_partial),
+            Format::Image(format) => formats::read(format, file, limits, *allow_partial),
+            Format::Tiff => tiff::read(file, limits, *allow_partial),
+        };
         let Stored { image, orientation, metadata, warnings } =
-            match format(path, &file[..file.len().min(START)])? {
-                Format::Gip => gip::read(file, limits, *allow_partial)?,
-                Format::Image(format) => formats::read(format, file, limits, *allow_partial)?,
-                Format::Tiff => tiff::read(file, limits, *allow_partial)?,
-            };
+            stored.map_err(|error| fault::plain(error, format, limits, *allow_partial))?;
         if image.width() == 0 || image.height() == 0 {
             bail!("it has no pixels");
         }
@@ -70,5 +74,9 @@ impl Reading {
 }
 
 fn format(path: &Path, start: &[u8]) -> Result<Format> {
-    Format::of(path, start).context("the format is none of those that are read")
+    let format = Format::of(path, start).context("the format is none of those that are read")?;
+    if !format.is_read() {
+        bail!("{} is not read", format.name());
+    }
+    Ok(format)
 }

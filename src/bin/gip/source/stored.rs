@@ -17,3 +17,12 @@ pub(super) struct Stored {
 pub(super) fn partly(damage: impl std::fmt::Display) -> String {
     format!("{damage}; what could be read is taken")
 }
+
+/// What is said of channels that mean neither colours nor alpha, so many of all.
+pub(super) fn left_out(channels: usize, all: usize) -> Option<String> {
+    (channels > 0).then(|| {
+        format!(
+            "what it has beside colours and alpha ({channels} of its {all} channels) is left out"
+        )
+    })
+}

@@ -2,8 +2,10 @@
 
 use std::io::Cursor;
 
-use image::error::{DecodingError, LimitError, LimitErrorKind};
+use anyhow::{Result, bail};
+use image::error::DecodingError;
 use image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
+use image_gip::{DecodeError, LimitKind};
 use jpeg_decoder::{ColorTransform, Decoder, PixelFormat};
 
 use super::survey::Colors;
@@ -26,7 +28,7 @@ pub(crate) struct Unusual<'a> {
 
 impl<'a> Unusual<'a> {
     /// Reads the header.
-    pub(crate) fn new(file: &'a [u8], colors: Colors, max_memory: u64) -> ImageResult<Self> {
+    pub(crate) fn new(file: &'a [u8], colors: Colors, max_memory: u64) -> Result<Self> {
         let mut decoder = Decoder::new(Cursor::new(file));
         decoder.set_color_transform(match colors {
             Colors::Rgb => ColorTransform::RGB,
@@ -37,9 +39,10 @@ impl<'a> Unusual<'a> {
         let info = decoder.info().filter(|info| info.pixel_format == PixelFormat::RGB24);
         let info = info.ok_or_else(|| refused("its colours are not three"))?;
         let size = (info.width, info.height);
-        if u64::from(size.0) * u64::from(size.1) * MEMORY > max_memory {
-            let kind = LimitErrorKind::InsufficientMemory;
-            return Err(ImageError::Limits(LimitError::from_kind(kind)));
+        let memory = u64::from(size.0) * u64::from(size.1) * MEMORY;
+        if memory > max_memory {
+            let kind = LimitKind::Memory;
+            bail!(DecodeError::Limit { kind, wanted: memory, allowed: max_memory });
         }
         Ok(Self { decoder, size })
     }

@@ -4,6 +4,7 @@
 mod bits;
 mod decoder;
 mod frame;
+mod index;
 mod scan;
 mod segments;
 mod survey;

@@ -2,6 +2,7 @@
 
 use super::bits::{Damage, Table};
 use super::frame::{COEFFICIENTS, Frame, unread};
+use super::index;
 use super::scan::Scan;
 use super::survey::Survey;
 
@@ -101,6 +102,9 @@ impl Segments {
             }
             0xE2 => {
                 survey.has_profile |= payload.starts_with(PROFILE);
+                if payload.starts_with(index::PREFIX) {
+                    survey.pictures = index::pictures(file, at + 2 + index::PREFIX.len());
+                }
                 true
             }
             0xEE => {

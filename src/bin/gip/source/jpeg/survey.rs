@@ -13,6 +13,8 @@ const END: &[u8] = &[0xFF, 0xD9];
 pub(crate) struct Survey {
     /// Whether there is an ICC profile, or a part of one.
     pub(crate) has_profile: bool,
+    /// How many pictures the file has, if it has an index of them.
+    pub(crate) pictures: Option<usize>,
     /// Why the data are not just as many as the picture takes, of the codes that there are.
     pub(super) damage: Option<Damage>,
     /// Where a segment begins that the file ends in.

@@ -3,22 +3,22 @@
 use std::io::{BufRead, Cursor, Seek};
 
 use anyhow::{Context, Result, bail};
-use image::ImageFormat;
 use image_gip::{Limits, Metadata, Orientation};
-use tiff::TiffResult;
 use tiff::decoder::Decoder;
 use tiff::tags::Tag;
 
 use super::tags::{Photometric, Tags};
-use super::{colors, samples};
+use super::{colors, pages, samples, strips};
 use crate::limits::check_size;
 use crate::picture::DAMAGED_PROFILE;
-use crate::source::stored::{Stored, partly};
-use crate::source::{frames, jpeg};
+use crate::source::fault::{Fault, SHORT};
+use crate::source::frames::Others;
+use crate::source::jpeg;
+use crate::source::stored::{Stored, left_out, partly};
 
 /// Width and height in pixels.
-pub(crate) fn dimensions(file: impl BufRead + Seek) -> TiffResult<(u32, u32)> {
-    Decoder::new(file)?.dimensions()
+pub(crate) fn dimensions(file: impl BufRead + Seek) -> Result<(u32, u32)> {
+    Ok(Decoder::new(file)?.dimensions()?)
 }
 
 pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<Stored> {
@@ -39,22 +39,27 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?;
     let orientation = orientation.and_then(|code| Orientation::from_exif(code.min(255) as u8));
 
-    let mut warnings: Vec<_> = frames::warning(ImageFormat::Tiff, file).into_iter().collect();
+    let others = Others::after_first("pages", pages::pages(file));
+    let mut warnings: Vec<_> = others.warning.into_iter().collect();
     if has_profile && metadata.icc_profile.is_none() {
         warnings.push(DAMAGED_PROFILE.to_owned());
     }
+    warnings.extend(left_out(tags.extra_channels(), tags.samples));
+    let mut damage = others.damage;
     if tags.is_jpeg {
         let jpegs = samples::jpegs(&mut decoder, file)?;
-        if let Some(damage) = jpegs.iter().find_map(|data| jpeg::survey(data).damage()) {
-            if !allow_partial {
-                bail!("the file is damaged: {damage}");
-            }
-            warnings.push(partly(damage));
-        }
+        damage = jpegs.iter().find_map(|data| jpeg::survey(data).damage()).or(damage);
+    }
+    if let Some(damage) = damage.filter(|_| !allow_partial) {
+        bail!(Fault::Damage(damage));
     }
     let memory = samples::limits(limits.max_memory, &tags);
-    let (samples, damage, clipped) = samples::read(file, &tags, memory, allow_partial)?;
-    warnings.extend(damage.map(partly));
+    // What decoders say of compressed data that end is that they are invalid.
+    let cut = strips::is_cut(&mut decoder, file).then_some(SHORT);
+    let read = samples::read(file, &tags, memory, allow_partial);
+    let (samples, stop, clipped) =
+        read.map_err(|error| cut.map_or(error, |cut| Fault::Damage(cut).into()))?;
+    warnings.extend(damage.or(stop.and(cut)).or(stop).map(partly));
     warnings.extend(clipped);
     if matches!(tags.photometric, Photometric::CieLab | Photometric::IccLab) {
         warnings.push("its CIELAB colours are turned to sRGB; what sRGB lacks is clipped".into());

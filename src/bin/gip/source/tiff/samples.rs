@@ -4,10 +4,12 @@ use std::io::Cursor;
 
 use anyhow::{Context, Result, bail};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
 
+use super::strips::strips;
 use super::tags::Tags;
-use crate::source::clipping;
+use crate::source::{clipping, fault};
 
 /// The tag `PhotometricInterpretation`.
 const PHOTOMETRIC: u16 = 262;
@@ -22,13 +24,13 @@ pub(super) enum Samples {
     Sixteen(Vec<u16>),
 }
 
-/// Reads all samples, an error if they are only those before it, and what of floats is clipped.
+/// Reads all samples, what is damaged if some are missing, and what of floats is clipped.
 pub(super) fn read(
     file: &[u8],
     tags: &Tags,
     limits: Limits,
     allow_partial: bool,
-) -> Result<(Samples, Option<TiffError>, Option<String>)> {
+) -> Result<(Samples, Option<&'static str>, Option<String>)> {
     let mut file = without_colors(file).context("the directory of the page is damaged")?;
     let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits.clone());
     let layout = decoder.image_buffer_layout()?;
@@ -43,7 +45,10 @@ pub(super) fn read(
         let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits);
         let _ = decoder.read_image_to_buffer(&mut decoded);
     }
-    if let Some(error) = damage.take_if(|_| !allow_partial || is_blank(&mut decoded)) {
+    let is_final = |error: &mut TiffError| {
+        !allow_partial || fault::damage(error).is_none() || is_blank(&mut decoded)
+    };
+    if let Some(error) = damage.take_if(is_final) {
         bail!(error);
     }
     if decoded.as_buffer(0).as_bytes().len() < layout.complete_len {
@@ -78,7 +83,7 @@ pub(super) fn read(
         Samples::Eight(samples) => Samples::Eight(interleaved(samples, planes)),
         Samples::Sixteen(samples) => Samples::Sixteen(interleaved(samples, planes)),
     };
-    Ok((samples, damage, clipped))
+    Ok((samples, damage.and_then(|error| fault::damage(&error)), clipped))
 }
 
 /// A copy of the file whose samples are gray or have no meaning, so that the library gives them as they
@@ -152,17 +157,6 @@ pub(super) fn limits(memory: u64, tags: &Tags) -> Limits {
 
 /// The JPEGs of strips and tiles, with the tables that they share.
 pub(super) fn jpegs(decoder: &mut Decoder<Cursor<&[u8]>>, file: &[u8]) -> TiffResult<Vec<Vec<u8>>> {
-    use tiff::tags::Tag;
-    let mut numbers = |tags: [Tag; 2]| -> TiffResult<Vec<u64>> {
-        for tag in tags {
-            if let Some(numbers) = decoder.find_tag_unsigned_vec(tag)? {
-                return Ok(numbers);
-            }
-        }
-        Ok(Vec::new())
-    };
-    let offsets = numbers([Tag::StripOffsets, Tag::TileOffsets])?;
-    let lengths = numbers([Tag::StripByteCounts, Tag::TileByteCounts])?;
     let tables = decoder.get_tag_u8_vec(Tag::JPEGTables).ok();
     let jpeg = |(offset, length): (u64, u64)| {
         let end = offset.saturating_add(length).min(file.len() as u64) as usize;
@@ -175,5 +169,5 @@ pub(super) fn jpegs(decoder: &mut Decoder<Cursor<&[u8]>>, file: &[u8]) -> TiffRe
             _ => data.to_vec(),
         }
     };
-    Ok(offsets.into_iter().zip(lengths).map(jpeg).collect())
+    Ok(strips(decoder)?.into_iter().map(jpeg).collect())
 }

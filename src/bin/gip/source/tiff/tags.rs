@@ -78,6 +78,12 @@ impl Photometric {
 }
 
 impl Tags {
+    /// Channels that are neither colours nor alpha. That of a palette's picture is not taken.
+    pub(super) fn extra_channels(&self) -> usize {
+        let has_alpha = self.alpha.is_some() && self.photometric != Photometric::Palette;
+        self.samples - self.photometric.colors() - usize::from(has_alpha)
+    }
+
     /// `None` if the colours are none of those that are read.
     pub(super) fn read(decoder: &mut Decoder<Cursor<&[u8]>>) -> TiffResult<Option<Self>> {
         let size = decoder.dimensions()?;
