@@ -310,6 +310,18 @@ fn the_end_of_a_file_is_missed() {
 }
 
 #[test]
+fn frames_in_frames_do_not_take_the_stack() {
+    let room = Room::new();
+    let chunk = |name: &[u8], length: usize| [name, &(length as u32).to_le_bytes()].concat();
+    let depth = 100_000;
+    let mut file = [chunk(b"RIFF", 4 + 24 * depth), b"WEBP".to_vec()].concat();
+    for depth in (0..depth).rev() {
+        file.extend([chunk(b"ANMF", 16 + 24 * depth), vec![0; 16]].concat());
+    }
+    assert_eq!(outcome(&room, "a.webp", &file), Outcome::Nothing);
+}
+
+#[test]
 fn a_webp_may_lose_its_metadata() {
     let room = Room::new();
     let mut file = Vec::new();

@@ -161,6 +161,26 @@ fn netpbm() -> Vec<u8> {
     .concat()
 }
 
+/// OpenEXR with layers of these channels, a letter each.
+fn exr(layers: &[&str]) -> Vec<u8> {
+    use ::exr::prelude::*;
+    let size = (SIZE.0 as usize, SIZE.1 as usize);
+    let layers = layers.iter().enumerate().map(|(number, names)| {
+        let channel = |name: char| {
+            let samples = FlatSamples::F32(vec![0.5; size.0 * size.1]);
+            AnyChannel::new(&*name.to_string(), samples)
+        };
+        let attributes = LayerAttributes::named(&*number.to_string());
+        let channels = AnyChannels::sort(names.chars().map(channel).collect());
+        Layer::new(size, attributes, Encoding::UNCOMPRESSED, channels)
+    });
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let picture = Image::from_layers(attributes, layers.collect::<Layers<_>>());
+    let mut file = Cursor::new(Vec::new());
+    picture.write().to_buffered(&mut file).expect("in memory");
+    file.into_inner()
+}
+
 #[test]
 fn an_icon_is_its_largest_picture() {
     let room = Room::new();
@@ -189,9 +209,10 @@ fn what_is_cut_behind_the_picture_that_is_taken_is_told() {
     }
     // An index is often kept where the other pictures are not.
     let file = mpo(&[0x03_0000, 0]);
-    let first = file.len() / 2 + 60;
-    room.write("g.jpg", &file[..first.min(file.len())]);
-    room.ok(&[&["encode", "g.jpg", "a.gip"], &QUICK[..]].concat());
+    let second = file.windows(2).rposition(|pair| pair == b"\xFF\xD8").expect("there are two");
+    room.write("g.jpg", &file[..second]);
+    let output = room.run(&[&["encode", "g.jpg", "a.gip"], &QUICK[..]].concat());
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 }
 
 #[test]
@@ -218,6 +239,17 @@ fn the_first_of_several_pictures_is_taken_with_a_warning() {
         ),
         ("k.ico", ico(&[16]), None),
         ("l.pnm", netpbm(), Some("only the first of 5 pictures is taken")),
+        (
+            "m.exr",
+            exr(&["Z", "ABGR", "RGB"]),
+            Some("only the first of its 3 layers that is RGB is taken"),
+        ),
+        (
+            "n.exr",
+            exr(&["BGRXYZ"]),
+            Some("what it has beside colours and alpha (3 of its 6 channels) is left out"),
+        ),
+        ("o.exr", exr(&["ABGR"]), None),
     ];
     let room = Room::new();
     for (name, file, _) in &files {

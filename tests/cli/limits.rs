@@ -48,14 +48,17 @@ fn a_picture_beyond_the_limits_is_refused_until_they_are_raised() {
 #[test]
 fn limits_may_be_lowered_too() {
     let room = Room::new();
-    room.save_picture("a.png", &pictures::picture((60, 50), ColorType::Rgb8));
-    for (limit, name) in [
-        ("width=59", "width"),
-        ("pixels=2k", "pixels"),
-        ("gaussians=4", "gaussians"),
-        ("memory=100", "memory"),
+    for source in ["a.png", "a.tif"] {
+        room.save_picture(source, &pictures::picture((60, 50), ColorType::Rgb8));
+    }
+    for (source, limit, name) in [
+        ("a.png", "width=59", "width"),
+        ("a.png", "pixels=2k", "pixels"),
+        ("a.png", "gaussians=4", "gaussians"),
+        ("a.png", "memory=100", "memory"),
+        ("a.tif", "memory=100", "memory"),
     ] {
-        let args = ["encode", "a.png", "a.gip", "--limit", limit];
+        let args = ["encode", source, "a.gip", "--limit", limit];
         let error = room.fails(&[&args[..], &QUICK].concat());
         assert!(error.contains(&format!("--limit {name}=N")), "{limit}: {error}");
         let (_, allowed) = limit.split_once('=').expect("there is one");
@@ -64,7 +67,7 @@ fn limits_may_be_lowered_too() {
     }
     let usage = room.run(&["info", "a.gip", "--limit", "size=5"]);
     assert_eq!(usage.status.code(), Some(2));
-    assert_eq!(room.names(), ["a.png"]);
+    assert_eq!(room.names(), ["a.png", "a.tif"]);
 
     // 64 evaluations for a pixel are always allowed, and each Gaussian that is near takes them all.
     room.ok(&[&["encode", "a.png", "a.gip", "--limit", "work=1"], &QUICK[..]].concat());

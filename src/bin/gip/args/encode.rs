@@ -48,9 +48,9 @@ pub(crate) struct Encode {
     /// failing.
     ///
     /// PNG, JPEG, TIFF, GIF, .gip and formats without compression are shown as far as they go. Damage
-    /// in the middle of a JPEG is noticed where it changes how many data the picture takes. WebP, BMP, Netpbm, TGA,
-    /// QOI, DDS, farbfeld, HDR, and TIFF, ICO and OpenEXR without compression have no checksum: damage in the middle of
-    /// them is noticed only where the data that follow cannot be decoded.
+    /// in the middle of a JPEG is noticed where it changes how many data the picture takes. WebP, GIF, BMP, Netpbm,
+    /// TGA, QOI, DDS, farbfeld, HDR, and most of TIFF, ICO and OpenEXR have no checksum either: damage in the middle
+    /// of them is noticed only where what follows cannot be decoded.
     #[arg(long)]
     pub(crate) allow_partial: bool,
     #[command(flatten)]

@@ -85,7 +85,6 @@ fn cause(error: &(dyn StdError + 'static)) -> Option<Cause> {
     } else if let Some(error) = error.downcast_ref() {
         match error {
             TiffError::IoError(error) => of_io(error),
-            TiffError::LimitsExceeded => Cause::Memory,
             TiffError::UnsupportedError(UnsupportedCompressionMethod(method)) => {
                 Cause::Compression(method.to_u16())
             }

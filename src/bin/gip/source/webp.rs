@@ -15,23 +15,23 @@ const METADATA: [(&[u8], u8); 2] = [(b"EXIF", 8), (b"XMP ", 4)];
 
 /// What the lengths of the file and of its chunks tell.
 pub(super) fn damage(file: &[u8]) -> Option<&'static str> {
-    let end = BEFORE - 4 + length(file)?;
+    let end = length(file)?.saturating_add(NAME);
     let Some(chunks) = file.get(BEFORE..end.max(BEFORE)) else { return Some(SHORT) };
-    if !adds_up(chunks) {
+    if !adds_up(chunks, false) {
         return Some("the lengths of its chunks do not add up");
     }
     (lost_metadata(file).1 != 0).then_some("its metadata are missing")
 }
 
-/// Whether chunks are just as long as all of them. The last one may lack the byte that makes it even.
-fn adds_up(mut chunks: &[u8]) -> bool {
+/// Whether chunks, of a file or of a frame in it, are just as long as all of them. The last one may lack
+/// the byte that makes it even.
+fn adds_up(mut chunks: &[u8], is_frame: bool) -> bool {
     while chunks.len() > 1 {
-        let Some((name, contents)) = length(chunks)
-            .and_then(|length| Some((&chunks[..4], chunks.get(NAME..NAME.checked_add(length)?)?)))
-        else {
-            return false;
-        };
-        if name == b"ANMF" && !contents.get(FRAME..).is_some_and(adds_up) {
+        let end = length(chunks).and_then(|length| length.checked_add(NAME));
+        let Some(contents) = end.and_then(|end| chunks.get(NAME..end)) else { return false };
+        let is_whole = |frame| adds_up(frame, true);
+        let has_chunks = !is_frame && chunks.starts_with(b"ANMF");
+        if has_chunks && !contents.get(FRAME..).is_some_and(is_whole) {
             return false;
         }
         chunks = chunks.get(NAME + contents.len().next_multiple_of(2)..).unwrap_or_default();

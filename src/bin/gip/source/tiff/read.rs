@@ -53,10 +53,9 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     if let Some(damage) = damage.filter(|_| !allow_partial) {
         bail!(Fault::Damage(damage));
     }
-    let memory = samples::limits(limits.max_memory, &tags);
     // What decoders say of compressed data that end is that they are invalid.
     let cut = strips::is_cut(&mut decoder, file).then_some(SHORT);
-    let read = samples::read(file, &tags, memory, allow_partial);
+    let read = samples::read(file, &tags, limits.max_memory, allow_partial);
     let (samples, stop, clipped) =
         read.map_err(|error| cut.map_or(error, |cut| Fault::Damage(cut).into()))?;
     warnings.extend(damage.or(stop.and(cut)).or(stop).map(partly));

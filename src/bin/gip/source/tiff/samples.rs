@@ -9,6 +9,7 @@ use tiff::{TiffError, TiffResult};
 
 use super::strips::strips;
 use super::tags::Tags;
+use crate::limits::MemoryLimit;
 use crate::source::{clipping, fault};
 
 /// The tag `PhotometricInterpretation`.
@@ -28,14 +29,18 @@ pub(super) enum Samples {
 pub(super) fn read(
     file: &[u8],
     tags: &Tags,
-    limits: Limits,
+    max_memory: u64,
     allow_partial: bool,
 ) -> Result<(Samples, Option<&'static str>, Option<String>)> {
+    let (limits, over) = (limits(max_memory, tags), MemoryLimit { allowed: max_memory });
     let mut file = without_colors(file).context("the directory of the page is damaged")?;
     let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits.clone());
     let layout = decoder.image_buffer_layout()?;
     let mut decoded = DecodingResult::U8(Vec::new());
     let mut damage = decoder.read_image_to_buffer(&mut decoded).err();
+    if let Some(TiffError::LimitsExceeded) = damage {
+        bail!(over);
+    }
     let is_blank = |decoded: &mut DecodingResult| {
         decoded.as_buffer(0).as_bytes().iter().all(|&byte| byte == 0)
     };
@@ -45,14 +50,11 @@ pub(super) fn read(
         let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits);
         let _ = decoder.read_image_to_buffer(&mut decoded);
     }
-    let is_final = |error: &mut TiffError| {
-        !allow_partial || fault::damage(error).is_none() || is_blank(&mut decoded)
-    };
-    if let Some(error) = damage.take_if(is_final) {
+    if let Some(error) = damage.take_if(|_| !allow_partial || is_blank(&mut decoded)) {
         bail!(error);
     }
     if decoded.as_buffer(0).as_bytes().len() < layout.complete_len {
-        bail!(TiffError::LimitsExceeded);
+        bail!(over);
     }
     let planes = if layout.planes > 1 { tags.samples } else { 1 };
     let clipped = match &decoded {
@@ -145,7 +147,7 @@ fn interleaved<T: Copy>(samples: Vec<T>, planes: usize) -> Vec<T> {
 }
 
 /// What reading may take: its own memory, and that of the samples.
-pub(super) fn limits(memory: u64, tags: &Tags) -> Limits {
+fn limits(memory: u64, tags: &Tags) -> Limits {
     let pixels = u64::from(tags.size.0) * u64::from(tags.size.1);
     let bytes = |count: u64| usize::try_from(count).unwrap_or(usize::MAX);
     let mut limits = Limits::default();
