@@ -48,6 +48,8 @@ run(
   join(root, 'node_modules', '.bin', 'wasm-opt'),
   // The features are those that the module says it has.
   '-O3',
+  // Once more while the module shrinks: it is 2 kB smaller when compressed.
+  '--converge',
   '--strip-debug',
   '--strip-producers',
   '--strip-target-features',

@@ -6,7 +6,7 @@ import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
 import { naturalSize } from './orientation.js';
 import { Painting } from './painting.js';
-import { contentSize, layOut, newSheet } from './styles.js';
+import { contentSize, layoutOf, newSheet } from './styles.js';
 
 export * from './index.js';
 
@@ -29,6 +29,8 @@ export class GipImageElement extends ImageAttributes {
   limits = this.limits;
   #internals;
   #style = null;
+  /** The text of the style sheet; `null` for none. */
+  #layout = null;
   #painting = new Painting();
   #alternative = document.createElement('span');
 
@@ -122,6 +124,7 @@ export class GipImageElement extends ImageAttributes {
         this.#refresh();
       },
     });
+    this.#layOut();
     this.#refresh();
   }
 
@@ -144,7 +147,7 @@ export class GipImageElement extends ImageAttributes {
   adoptedCallback() {
     this.#style = newSheet(this.ownerDocument);
     this.shadowRoot.adoptedStyleSheets = this.#style ? [this.#style] : [];
-    this.#layOut();
+    this.#layout = null;
   }
 
   attributeChangedCallback(name, before, after) {
@@ -167,14 +170,19 @@ export class GipImageElement extends ImageAttributes {
     return this.#orientation === 'none' ? this.#header : this.#natural;
   }
 
+  /** Gives the element its size in the layout, and tells whether that may have changed. */
   #layOut() {
-    if (!this.#style) return;
-    layOut(this.#style, {
+    if (!this.#style || !this.isConnected) return false;
+    const layout = layoutOf(this, {
       width: this.getAttribute('width'),
       height: this.getAttribute('height'),
       natural: this.#size,
       broken: this.#state === 'broken',
     });
+    if (layout === this.#layout) return false;
+    this.#layout = layout;
+    this.#style.replaceSync(layout);
+    return true;
   }
 
   /** Forgets the picture. */
@@ -189,13 +197,10 @@ export class GipImageElement extends ImageAttributes {
     this.shadowRoot.replaceChildren(this.#painting.frame);
   }
 
-  /** Follows the orientation that the page's styles want. */
+  /** Follows the orientation that the page's styles want, and what surrounds the element. */
   #orient() {
-    const orientation = getComputedStyle(this).imageOrientation === 'none' ? 'none' : 'from-image';
-    if (orientation === this.#orientation) return;
-    this.#orientation = orientation;
-    this.#layOut();
-    this.#measure();
+    this.#orientation = getComputedStyle(this).imageOrientation === 'none' ? 'none' : 'from-image';
+    if (this.#layOut() || !this.isConnected) this.#measure();
   }
 
   #measure() {

@@ -1,4 +1,5 @@
-// The pixels of an element: a canvas that shows a region of the picture, in a frame that is its box.
+// The pixels of an element: a canvas that shows a region of the picture, in a window that is its box, in a
+// frame that has the picture's size in the layout.
 
 import { moved } from './layout.js';
 
@@ -6,10 +7,13 @@ export class Painting {
   frame = document.createElement('div');
   /** What the canvas shows: the plan that was rendered, and of what; `null` for nothing. */
   drawn = null;
+  #window = document.createElement('div');
   #canvas = null;
 
   constructor() {
     this.frame.className = 'frame';
+    this.#window.className = 'window';
+    this.frame.append(this.#window);
   }
 
   /** Shows an `ImageData` or an `ImageBitmap`. */
@@ -17,7 +21,7 @@ export class Painting {
     if (!this.#canvas) {
       this.#canvas = document.createElement('canvas');
       this.#canvas.part = 'picture';
-      this.frame.append(this.#canvas);
+      this.#window.append(this.#canvas);
     }
     const context = this.#canvas.getContext('2d', { colorSpace });
     Object.assign(this.#canvas, { width: image.width, height: image.height });
@@ -33,8 +37,8 @@ export class Painting {
   /** Puts what is shown where it belongs in a box of this size, by the plan for it. */
   place(box, plan) {
     if (!this.drawn) return;
-    this.frame.style.width = `${box.width}px`;
-    this.frame.style.height = `${box.height}px`;
+    this.#window.style.width = `${box.width}px`;
+    this.#window.style.height = `${box.height}px`;
     const place = moved(this.drawn.plan, plan);
     for (const side of ['left', 'top', 'width', 'height']) {
       this.#canvas.style[side] = `${place[side]}px`;

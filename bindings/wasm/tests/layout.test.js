@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { moved, plan } from '../js/layout.js';
-import { file, harness, script, settled, withPage } from './harness.js';
+import { file, harness, script, settled, until, withPage } from './harness.js';
 import { makePicture } from './picture.js';
 
 const natural = { width: 300, height: 200 };
@@ -69,7 +69,8 @@ test('a drawn region moves to its place in another layout', () => {
   assert.ok(Math.abs(place.top - 50) < 1e-9 && Math.abs(place.height - 200) < 1e-9);
 });
 
-const styles = [
+/** Attributes and styles, in a block. */
+const inBlocks = [
   ['', ''],
   ['width="48"', ''],
   ['height="32"', ''],
@@ -94,32 +95,117 @@ const styles = [
   ['', 'writing-mode: vertical-rl; height: 100px'],
 ];
 
+/** Containers, and the styles that each of their items is tried with. */
+const containers = [
+  'display: flex',
+  'display: flex; height: 150px',
+  'display: flex; width: 60px; align-items: center',
+  'display: flex; flex-direction: column',
+  'display: flex; flex-direction: column; height: 40px',
+  'display: flex; flex-direction: column; align-items: flex-start',
+  'display: flex; flex-direction: column; direction: rtl',
+  'display: flex; height: 100px; writing-mode: vertical-rl',
+  'display: inline-grid',
+  'display: grid; height: 200px',
+  'display: grid; place-items: stretch',
+  'display: grid; place-items: center; height: 200px',
+  'display: grid; grid-template-columns: 1fr 1fr; width: 150px',
+  'display: grid; grid-template: 50px / 50px; justify-items: stretch',
+  'float: left; width: auto; max-width: 60px',
+];
+const items = [
+  '',
+  'width: 50px',
+  'height: 50%',
+  'width: 50%; height: auto',
+  'max-width: 100%',
+  'max-width: 100%; height: auto',
+  'max-height: 20px',
+  'min-width: 150px',
+  'flex: 1',
+  'flex: 0 0 50px',
+  'place-self: stretch; min-height: 100px',
+  'place-self: start',
+  'margin: auto',
+  'padding: 5px; border: 2px solid',
+  'aspect-ratio: 1',
+];
+const absolute = [
+  'left: 5px; right: 5px',
+  'top: 5px; bottom: 5px',
+  'inset: 0; margin: auto',
+  'inset: 0; width: 100%; height: 100%',
+  'inset: 0; width: 50%',
+  'inset: 0; height: 30px',
+  'inset: 0; max-width: 100%',
+  'inset: 0; min-width: 150px',
+  'inset: 0; place-self: stretch',
+  'inset: 0; place-self: center',
+  'right: 0; bottom: 0',
+];
+/** The style of the container, attributes and style. */
+const cases = [
+  ...inBlocks.map(([attributes, style]) => ['', attributes, style]),
+  ...containers.flatMap((container) => [
+    ...items.map((style) => [container, '', style]),
+    ...['width="48"', 'height="32"'].map((attributes) => [container, attributes, '']),
+  ]),
+  ...['', 'display: flex;', 'display: grid;'].flatMap((container) =>
+    absolute.map((style) => [`${container} height: 200px`, '', `position: absolute; ${style}`])),
+];
+
 test('it is laid out like <img>', async () => {
   harness.routes['/layout.gip'] = file(makePicture({ width: 96, height: 64 }));
   const svg = encodeURIComponent('<svg xmlns="http://www.w3.org/2000/svg" width="96" height="64"/>');
-  const cases = styles.map(([attributes, style], index) => {
-    const both = [`<img src="data:image/svg+xml,${svg}"`, '<gip-image src="/layout.gip"'];
-    const [img, gip] = both.map(
-      (tag) => `<div class="case">text ${tag} id="x" alt="" ${attributes} style="${style}">`,
-    );
-    return `<section id="case-${index}">${img} text</div>${gip}</gip-image> text</div></section>`;
-  });
-  const css = '<style>.case { width: 250px; position: relative; display: flow-root; font: 16px/20px sans-serif }</style>';
-  await withPage(script + css + cases.join(''), async (page) => {
-    await page.evaluate(async () => {
+  const html = cases.map(([container, attributes, style]) =>
+    [`<img src="data:image/svg+xml,${svg}"`, '<gip-image src="/layout.gip"'].map((tag) =>
+      `<section><div class="case" style="${container}">text
+        ${tag} class="x" alt="" ${attributes} style="${style}"></gip-image> <i>text</i></div></section>`).join(''));
+  const css = `<style>
+    section { height: 500px; overflow: hidden; }
+    .case { width: 250px; position: relative; display: flow-root; font: 16px/20px sans-serif }
+  </style>`;
+  await withPage(script + css + html.join(''), async (page) => {
+    const boxes = await page.evaluate(async () => {
       await customElements.whenDefined('gip-image');
-      await Promise.all([...document.querySelectorAll('gip-image')].map((image) => image.decode()));
+      await Promise.all([...document.querySelectorAll('.x')].map((image) => image.decode()));
+      return [...document.querySelectorAll('.case')].map((box) => {
+        const [outer, inner, text] = [box, ...box.querySelectorAll('.x, i')].map((e) => e.getBoundingClientRect());
+        const numbers = [outer.width, outer.height, inner.width, inner.height];
+        for (const { x, y } of [inner, text]) numbers.push(x - outer.x, y - outer.y);
+        return numbers.map((value) => Math.round(value * 4) / 4);
+      });
     });
-    for (const [index, style] of styles.entries()) {
-      const [img, gip] = await page.evaluate((index) => {
-        const numbers = (box) => {
-          const [outer, inner] = [box, box.querySelector('#x')].map((e) => e.getBoundingClientRect());
-          return [inner.x - outer.x, inner.y - outer.y, inner.width, inner.height, outer.height]
-            .map((value) => Math.round(value * 4) / 4);
-        };
-        return [...document.querySelectorAll(`#case-${index} .case`)].map(numbers);
-      }, index);
-      assert.deepEqual(gip, img, `attributes ${style[0]}, style ${style[1]}`);
+    for (const [index, layout] of cases.entries()) {
+      assert.deepEqual(boxes[2 * index + 1], boxes[2 * index], layout.join(' | '));
     }
+  });
+});
+
+test('it follows a container that becomes another one', async () => {
+  const html = `${script}<style>
+    div { width: 250px; display: flex; flex-direction: column; }
+    @media (width < 500px) { div { width: 240px; display: block; } gip-image { display: block; } }
+  </style><div><gip-image src="/layout.gip"></gip-image></div>`;
+  await withPage(html, async (page) => {
+    await settled(page);
+    const sizes = await page.evaluate(async () => {
+      globalThis.errors = [];
+      addEventListener('error', ({ message }) => errors.push(message));
+      const sizes = [];
+      const image = document.querySelector('gip-image');
+      const grid = document.createElement('div');
+      grid.style.cssText = 'display: grid; justify-items: start';
+      for (const parent of [image.parentElement, document.body.appendChild(grid), document.body, image.parentElement]) {
+        parent.append(image);
+        sizes.push(image.clientWidth);
+      }
+      return sizes;
+    });
+    assert.deepEqual(sizes, [250, 96, 96, 250]);
+    const width = () => page.evaluate(() => document.querySelector('gip-image').clientWidth);
+    await page.setViewportSize({ width: 400, height: 300 });
+    await until(async () => (await width()) === 96, 'a block as wide as the picture');
+    assert.deepEqual(await page.evaluate(() => errors), []);
   });
 });
