@@ -704,6 +704,29 @@ fn more_bits_and_more_effort_give_no_worse_picture() {
 }
 
 #[test]
+fn the_surroundings_of_a_gradient_are_fitted_at_every_effort() {
+    // Errors count several times as much in the gradient as beside it.
+    let (width, height) = (256_usize, 160_usize);
+    let pixel = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let is_inside = (40..200).contains(&x) && (24..136).contains(&y);
+        let rise = (x / 8) as u8;
+        if is_inside { [40 + rise, 60 + rise / 2, 96] } else { [200; 3] }
+    };
+    let samples: Vec<u8> = (0..width * height).flat_map(pixel).collect();
+    let source = Source::new_u8(width as u32, height as u32, ColorModel::Rgb, &samples);
+    let source = source.expect("sizes agree");
+    for (effort, least) in [(1, 40.0), (2, 46.0)] {
+        for rate in [0.5, 2.0] {
+            let encoder = quick(Target::BitsPerPixel(rate)).with_effort(effort);
+            let psnr = encoder.encode(&source).expect("it encodes").report.psnr;
+            println!("effort {effort}, {rate} bpp: {psnr} dB");
+            assert!(psnr > least, "effort {effort}, {rate} bpp: {psnr} dB");
+        }
+    }
+}
+
+#[test]
 fn isolated_pixels_are_found_at_every_effort() {
     // Errors are in a few tiles, which get some Gaussians at a time.
     let (width, height) = (160, 112);

@@ -137,6 +137,17 @@ impl Raster {
         self.sensitivity((x as usize).min(self.width - 1), (y as usize).min(self.height - 1))
     }
 
+    /// How much a squared error counts on average under a Gaussian, which may lie across areas of very
+    /// different sensitivity: at three points around its centre, one standard deviation away.
+    #[inline]
+    pub(crate) fn sensitivity_under(&self, center: [f32; 2], cholesky: [f32; 3]) -> f32 {
+        const HALF_ROOT_OF_THREE: f32 = 0.866_025_4;
+        let ([x, y], [l11, l21, l22]) = (center, cholesky);
+        let near = |u: f32, v: f32| self.sensitivity_near([x + l11 * u, y + l21 * u + l22 * v]);
+        let [left, right] = [-HALF_ROOT_OF_THREE, HALF_ROOT_OF_THREE].map(|u| near(u, -0.5));
+        (near(0.0, 1.0) + left + right) / 3.0
+    }
+
     /// The sum of squared errors at a PSNR in dB, where a full sample is 1.
     pub(crate) fn error_of(&self, psnr: f64) -> f64 {
         (self.pixels() * self.channels) as f64 * 10_f64.powf(-psnr / 10.0)
@@ -253,4 +264,31 @@ pub(crate) fn visible<S: Simd>(simd: S, residual: f32x16<S>, sample: f32x16<S>) 
 #[inline(always)]
 pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
     f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::ColorModel;
+    use crate::encode::progress::unobserved;
+
+    #[test]
+    fn what_lies_under_a_gaussian_counts() {
+        // Even ground on the left, and noise on the right.
+        let mut rng = fastrand::Rng::with_seed(2);
+        let samples: Vec<u8> =
+            (0..96 * 96).map(|i| if i % 96 < 48 { 128 } else { rng.u8(..) }).collect();
+        let source = Source::new_u8(96, 96, ColorModel::Gray, &samples).expect("the sizes agree");
+        let raster = |tune| unobserved(|observer| Raster::new(&source, tune, observer));
+        let visual = raster(Tune::Visual);
+        let [even, noise] = [8.0, 88.0].map(|x| visual.sensitivity_near([x, 48.0]));
+        assert!(even > 4.0 * noise, "{even}, {noise}");
+        let under = |x, cholesky| visual.sensitivity_under([x, 48.0], cholesky);
+        // Small, wide, high, outside the picture.
+        assert!((under(8.5, [0.1, 0.0, 0.1]) / even - 1.0).abs() < 1e-5);
+        assert!((under(60.0, [30.0, 0.0, 2.0]) - noise) > 0.1 * even);
+        assert!(under(60.0, [2.0, 0.0, 30.0]) < 2.0 * noise);
+        assert!(under(-1e30, [1e30, 1e30, 1.0]).is_finite());
+        assert_eq!(raster(Tune::Psnr).sensitivity_under([60.0, 48.0], [30.0, 0.0, 2.0]), 1.0);
+    }
 }

@@ -8,6 +8,10 @@ use crate::render::tile_grid::TILE_HEIGHT;
 
 /// The distortion of every pixel of a tile, of which the first pixel is (left, top) and the residuals are
 /// `planes`; 0 where the output is exact already.
+///
+/// Residuals count as in the error that training minimizes: times the square root of the sensitivity. The
+/// planes have them times the sensitivity itself, which would leave next to nothing to places of low
+/// sensitivity.
 pub(super) fn of_tile(
     raster: &Raster,
     [left, top]: [usize; 2],
@@ -29,14 +33,18 @@ pub(super) fn of_tile(
     };
     for y in (0..TILE_HEIGHT).step_by(BLOCK) {
         for x in (0..TILE_WIDTH).step_by(BLOCK) {
+            let sensitivity = raster.sensitivity_near([(left + x) as f32, (top + y) as f32]);
             // A residual of less than half a quantization step disappears when samples are
             // rounded.
-            let position = [(left + x) as f32, (top + y) as f32];
-            let exact = raster.half_step * raster.sensitivity_near(position);
+            let exact = raster.half_step * sensitivity;
+            let weight = match measure {
+                Distortion::L1 => 1.0 / sensitivity.sqrt(),
+                Distortion::L3 => 1.0 / (sensitivity * sensitivity.sqrt()),
+            };
             for row in y..y + BLOCK {
                 for column in x..x + BLOCK {
                     let is_exact = largest[row][column] < exact;
-                    distortions[row][column] *= if is_exact { 0.0 } else { 1.0 };
+                    distortions[row][column] *= if is_exact { 0.0 } else { weight };
                 }
             }
         }

@@ -405,7 +405,8 @@ impl<'a> Fit<'a> {
                 observer,
                 #[inline(always)]
                 |index, row| {
-                    let sensitivity = raster.sensitivity_near([row[0], row[1]]);
+                    let [x, y, l11, l21, l22, ..] = *row;
+                    let sensitivity = raster.sensitivity_under([x, y], [l11, l21, l22]);
                     (pass.gradient(index, channels), sensitivity)
                 },
             )?;
@@ -417,12 +418,11 @@ impl<'a> Fit<'a> {
         let by_chunk: Vec<QuantizerGradients> =
             self.parameters.step(self.bounds, factor, observer, |index, row, sum| {
                 let decoded = decoded(quantizers, row);
+                let gaussian =
+                    Gaussian::from_components(&decoded[..5 + channels], parameterization);
                 let mut by_splat = pass.gradient(index, channels);
                 if let Some(rate_term) = rate_term {
-                    by_splat += rate_term.gradient(&Gaussian::from_components(
-                        &decoded[..5 + channels],
-                        parameterization,
-                    ));
+                    by_splat += rate_term.gradient(&gaussian);
                 }
                 let (center, shape) =
                     by_splat.geometry.gradients(parameterization, shape_of(&decoded));
@@ -433,7 +433,7 @@ impl<'a> Fit<'a> {
                 if let Some(quantizers) = quantizers {
                     add(sum, &quantizers.backward(row, &decoded, &mut gradient));
                 }
-                let sensitivity = raster.sensitivity_near([decoded[0], decoded[1]]);
+                let sensitivity = raster.sensitivity_under(gaussian.center, gaussian.cholesky);
                 Slope { gradient, sensitivity }
             })?;
         if let Some(quantizers) = &mut self.quantizers {
@@ -501,7 +501,8 @@ impl<'a> Fit<'a> {
         let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, rows)| {
             let key = |(index, row): (usize, &Row)| {
                 let gaussian = Gaussian::from_components(&row[..], parameterization);
-                let sensitivity = self.raster.sensitivity_near(gaussian.center);
+                let Gaussian { center, cholesky, .. } = gaussian;
+                let sensitivity = self.raster.sensitivity_under(center, cholesky);
                 u64::from(ordered(gaussian.importance() * sensitivity)) << 32 | index as u64
             };
             (chunk * CHUNK..).zip(rows).map(key).collect::<Vec<u64>>()

@@ -83,7 +83,8 @@ impl<'a> CodeOptimizer<'a> {
     ) -> Result<CodedLayers, EncodeError> {
         let lattice = rate_model::lattice(step, self.model);
         let codes = observer.map(WORK.0, gaussians.iter(), |gaussian| {
-            let sensitivity = self.raster.sensitivity_near(gaussian.center);
+            let Gaussian { center, cholesky, .. } = *gaussian;
+            let sensitivity = self.raster.sensitivity_under(center, cholesky);
             let class = rate_model::class_of(gaussian, sensitivity, &lattice, self.model);
             lattice.code(gaussian, class, &self.grid, self.model)
         })?;
