@@ -403,8 +403,8 @@ fn layers_are_read_until_there_are_enough_gaussians() {
         assert_eq!(found, bits(&whole.gaussians()[..arrived]), "{wanted}");
     }
     let header = whole.header().expect("read");
-    let sizes = [(1, 1), (8, 4), (1 << 20, 1 << 20)];
-    assert_eq!(sizes.map(|(width, height)| header.gaussians_for(width, height)), [1, 2, 8]);
+    let sizes = [(1, 1), (8, 2), (8, 4), (1 << 20, 1 << 20)];
+    assert_eq!(sizes.map(|(width, height)| header.gaussians_for(width, height)), [1, 1, 8, 8]);
 }
 
 #[test]

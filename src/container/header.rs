@@ -179,8 +179,9 @@ impl Header {
         5 + self.color.channels()
     }
 
-    /// How many Gaussians are enough for a preview of this size in pixels: one for 16 pixels, but
-    /// at least a sixth of all, and at most all. The first Gaussians of a file are the strongest.
+    /// How many Gaussians are enough for a preview of this size in pixels: the first sixth, which are the
+    /// strongest, if that is at least one for 16 pixels, or all. A preview of a part lacks small things,
+    /// such as text.
     #[must_use]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
         plan::gaussians_for(self.gaussians, width, height)

@@ -4,15 +4,16 @@
 
 /// In a small output, one Gaussian is enough for this many pixels.
 const PIXELS_PER_GAUSSIAN: u64 = 16;
-/// A thumbnail needs at least one out of this many of a file's Gaussians: with fewer it would
-/// differ visibly, however small it is.
-const LEAST_THUMBNAIL: u64 = 6;
+/// The first layers have one out of this many of a file's Gaussians. With fewer, a preview would differ
+/// visibly, however small it is; those after them may be only a part of the picture each.
+const ALL_OF_FIRST: u32 = 6;
 
-/// How many of a file's Gaussians are enough for a preview of a size in pixels.
+/// How many of a file's Gaussians are enough for a preview of a size in pixels: those of the first layers, or
+/// all.
 pub(crate) fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
-    let all = u64::from(all);
+    let first = all / ALL_OF_FIRST;
     let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
-    shown.clamp(all / LEAST_THUMBNAIL, all) as u32
+    if shown <= u64::from(first) { first } else { all }
 }
 
 #[cfg(feature = "encode")]
@@ -118,9 +119,10 @@ mod tests {
     }
 
     #[test]
-    fn a_small_output_needs_a_sixth_of_the_gaussians_at_least() {
+    fn a_small_output_needs_a_sixth_of_the_gaussians_or_all() {
         assert_eq!(gaussians_for(6000, 1, 1), 1000);
-        assert_eq!(gaussians_for(6000, 160, 200), 2000);
+        assert_eq!(gaussians_for(6000, 160, 100), 1000);
+        assert_eq!(gaussians_for(6000, 160, 102), 6000);
         assert_eq!(gaussians_for(6000, 4000, 3000), 6000);
         assert_eq!(gaussians_for(u32::MAX, u32::MAX, u32::MAX), u32::MAX);
         assert_eq!(gaussians_for(0, 100, 100), 0);

@@ -108,8 +108,7 @@ pub(crate) struct Batch {
     pub(crate) decode: bool,
     /// Decode .gip files to thumbnails that fit into SIZE: one number for both sides, or WxH.
     ///
-    /// Pictures are not enlarged. Only as much of a file is read and decoded as the thumbnail needs,
-    /// so damage in the rest is not noticed.
+    /// Pictures are not enlarged.
     #[arg(long, help_heading = "Decoding", value_name = "SIZE", value_parser = bounds,
           group = "decoding", conflicts_with_all = EncoderArgs::IDS)]
     pub(crate) thumbnail: Option<(u32, u32)>,

@@ -190,20 +190,16 @@ fn decode(
         Decoder::new_with_limits(file, reading.limits.clone()).with_context(context)?;
     let metadata = decoder.metadata().clone();
     let mut options = RenderOptions::new().with_threads(Threads::One);
-    let size = bounds.map(|bounds| fitted(decoder.header(), metadata.orientation(), bounds));
-    if let Some((width, height)) = size {
+    if let Some(bounds) = bounds {
+        let (width, height) = fitted(decoder.header(), metadata.orientation(), bounds);
         options = options.with_size(width, height);
     }
     let wanted = Wanted::new(options, codec, decoder.header()).with_context(context)?;
     let _permit = budget.wait_for(wanted.pixels());
     check(stop)?;
     let start = Instant::now();
-    let image = match size {
-        None => wanted.decode(&mut decoder),
-        Some(size) => thumbnail(&wanted, &mut decoder, size),
-    };
     let mut warnings = Vec::new();
-    let image = match image {
+    let image = match wanted.decode(&mut decoder) {
         Err(error) if reading.allow_partial => {
             // An error in a layer that was not decoded yet comes now, and then the layers before it.
             let _ = decoder.picture();
@@ -214,8 +210,8 @@ fn decode(
         }
         image => image,
     };
-    let gaussians = match size {
-        None if warnings.is_empty() => decoder.header().gaussians,
+    let gaussians = match warnings[..] {
+        [] => decoder.header().gaussians,
         _ => decoder.stream().gaussians().len() as u32,
     };
     let image = image.with_context(context)?;
@@ -232,17 +228,6 @@ fn decode(
         ..Facts::default()
     };
     Ok((bytes, facts))
-}
-
-/// Reads and renders as many Gaussians as a thumbnail of this size needs.
-fn thumbnail(
-    wanted: &Wanted,
-    decoder: &mut Decoder<BufReader<File>>,
-    (width, height): (u32, u32),
-) -> Result<image::DynamicImage> {
-    decoder.set_options(wanted.options.clone());
-    decoder.read_at_least(decoder.header().gaussians_for(width, height))?;
-    wanted.render(&decoder.picture()?)
 }
 
 /// The size, before it is turned upright, of a thumbnail that fits into these sides.
