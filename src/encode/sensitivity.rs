@@ -33,7 +33,7 @@ const RADII: [usize; 3] = [2, 7, 20];
 const MOST: f64 = 8.0;
 /// How often an error counts in a gradient without noise, where people see blotches and bands that measures
 /// of visible differences do not.
-const IN_GRADIENT: f32 = 8.0;
+const IN_GRADIENT: f32 = 4.0;
 /// Shares of the colour channels in luma, those of Y in SSIMULACRA2's colour space XYB, about.
 const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 /// Rows of blocks that one task computes.
