@@ -190,6 +190,26 @@ fn gradients_come_back_without_blotches() {
 }
 
 #[test]
+fn ordered_dither_has_its_quality() {
+    // With few more Gaussians, a bad copy is an exact one.
+    const THRESHOLDS: [[u32; 4]; 4] =
+        [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+    let (width, height) = (240, 160);
+    let pixel = |at: u32| {
+        let (x, y) = (at % width, at / width);
+        let is_white =
+            32 * (x + y) > (width + height) * (2 * THRESHOLDS[y as usize % 4][x as usize % 4] + 1);
+        u8::from(is_white) * 255
+    };
+    let samples: Vec<u8> = (0..width * height).map(pixel).collect();
+    let source = Source::new_u8(width, height, ColorModel::Gray, &samples).expect("sizes agree");
+    let encoded = Encoder::new().encode(&source).expect("it encodes");
+    let quality = encoded.report.quality;
+    println!("quality {quality}, {} bytes", encoded.bytes.len());
+    assert!((73.0..77.0).contains(&quality) && encoded.bytes.len() < 50_000, "{quality}");
+}
+
+#[test]
 fn noise_does_not_hide_clouds() {
     let size = [256, 160];
     for strength in [0.5, 3.0] {

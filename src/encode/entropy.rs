@@ -32,6 +32,16 @@ const FACTORS: (f64, f64) = (0.25, 4.0);
 /// there are two of each: of noise it is a low one, of smooth pictures a high one.
 const POWERS: (f64, f64) = (0.4, 2.0);
 
+/// The base-2 logarithm of how far a file misses its quality, from which on the codes of another fit are tried:
+/// a point or two.
+const MISSED: f64 = 0.1;
+
+/// A fit before it was changed.
+struct Fitted {
+    gaussians: Vec<Gaussian>,
+    distortion: f64,
+}
+
 /// Size in bytes of a file without Gaussians.
 pub(crate) fn least_length(
     layout: &FileLayout<'_>,
@@ -54,9 +64,10 @@ pub(crate) fn finish(
     if let Target::Psnr(psnr) = job.target {
         extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), job, observer)?;
     }
-    if let Some(quality) = job.target.quality() {
-        correct(&mut fit, quality, job, judge, layout, observer)?;
-    }
+    let too_good = match job.target.quality() {
+        Some(quality) => correct(&mut fit, quality, job, judge, layout, observer)?,
+        None => None,
+    };
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
     // Gaussians and their rendering; codes before a pass and after it, with what they are chosen by.
@@ -64,14 +75,23 @@ pub(crate) fn finish(
     let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
     let residuals = raster.memory() + Residuals::memory(raster);
     let window = Window::memory(raster, &gaussians);
-    let memory = residuals + strip.max(window) + gaussians.len() * by_gaussian;
+    let of_other = too_good.as_ref().map_or(0, |fitted| size_of_val(&fitted.gaussians[..]));
+    let memory = residuals + strip.max(window) + gaussians.len() * by_gaussian + of_other;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
     let mut search = TargetSearch::new(judge, raster, layout, search_work, observer)?;
-    let coded = search.run(&gaussians, distortion, job.target, observer)?;
+    let (mut coded, deviation) = search.run(&gaussians, distortion, job.target, observer)?;
+    if let Some(fitted) = too_good.filter(|_| deviation > MISSED) {
+        observer.expect(SearchWork::new(job, fitted.gaussians.len()).whole());
+        let (other, deviation_of_other) =
+            search.run(&fitted.gaussians, fitted.distortion, job.target, observer)?;
+        if deviation_of_other < deviation {
+            coded = other;
+        }
+    }
     Ok((layout.write_entropy(&coded, observer)?, work))
 }
 
@@ -101,7 +121,9 @@ fn extend(
     Ok(())
 }
 
-/// Adds or removes Gaussians until a fit has about as many as the quality needs.
+/// Adds or removes Gaussians until a fit has about as many as the quality needs. Returns the fit of before if
+/// it was too good: of a picture such as ordered dither, which few more Gaussians turn from a bad copy into an
+/// exact one, the next fit may have such strong Gaussians that no file of it comes near the quality.
 fn correct(
     fit: &mut Fit<'_>,
     wanted_quality: f64,
@@ -109,7 +131,8 @@ fn correct(
     judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<(), EncodeError> {
+) -> Result<Option<Fitted>, EncodeError> {
+    let mut too_good = None;
     let mut power = 1.0;
     let mut last: Option<(f64, f64)> = None;
     for round in 0..MAX_CORRECTIONS {
@@ -133,6 +156,9 @@ fn correct(
         if is_close || wanted == before {
             break;
         }
+        if factor <= CLOSE.start {
+            too_good = Some(Fitted { gaussians, distortion: fit.best_error().distortion });
+        }
         observer.expect(
             job.workload(wanted).retraining(job.training.iterations)
                 + SearchWork::new(job, wanted).whole(),
@@ -142,5 +168,5 @@ fn correct(
             break;
         }
     }
-    Ok(())
+    Ok(too_good)
 }

@@ -87,14 +87,15 @@ impl<'a> TargetSearch<'a> {
         Ok(Self { judge, raster, layout, work, codes })
     }
 
-    /// The codes of `gaussians`, whose rendering has this distortion, for a target.
+    /// The codes of `gaussians`, whose rendering has this distortion, for a target; and the base-2 logarithm of
+    /// how far their error or size is from it, 0 for a target that is neither.
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
         distortion: f64,
         target: Target,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<(CodedLayers, f64), EncodeError> {
         let step = match target {
             Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             _ => rate_model::step_for(distortion, gaussians.len()),
@@ -105,14 +106,15 @@ impl<'a> TargetSearch<'a> {
         let Some(aim) = Aim::new(target, self.raster.pixels()) else {
             let is_counted = matches!(target, Target::Gaussians(_));
             let kept = if is_counted { LEAST_KEPT * gaussians.len() as f64 } else { 0.0 };
-            return self.keeping(kept.ceil() as usize, gaussians, step, least, observer);
+            let coded = self.keeping(kept.ceil() as usize, gaussians, step, least, observer)?;
+            return Ok((coded, 0.0));
         };
         let finest = (step + FINEST).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            return self.shortened(coded, bytes, observer);
+            return Ok((self.shortened(coded, bytes, observer)?, deviation));
         }
         if aim.miss(deviation) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
@@ -126,7 +128,7 @@ impl<'a> TargetSearch<'a> {
                     self.passed(gaussians, finer, self.work.passes, aim, observer)?;
             }
         }
-        self.trimmed(coded, deviation, aim, observer)
+        Ok((self.trimmed(coded, deviation, aim, observer)?, deviation))
     }
 
     /// The codes of a step, which is halved while there are fewer than `count`.
