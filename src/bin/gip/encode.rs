@@ -3,8 +3,8 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Error, Result, bail};
-use image_gip::{EncodeError, Encoded, Encoder, OptionError, Progress, Source};
+use anyhow::{Result, bail};
+use image_gip::{Encoded, Encoder, Progress, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
@@ -88,12 +88,7 @@ pub(crate) fn encode(
         SampleSlice::Eight(samples) => Source::new_u8(width, height, picture.color(), samples),
         SampleSlice::Sixteen(samples) => Source::new_u16(width, height, picture.color(), samples),
     }?;
-    let encoded = encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress);
-    encoded.map_err(|error| {
-        let is_by_metadata = matches!(error, EncodeError::Option(OptionError::Size { .. }));
-        let error = Error::new(error);
-        if is_by_metadata { error.context("--metadata safe or none leaves room") } else { error }
-    })
+    Ok(encoder.with_metadata(picture.metadata.clone()).encode_with(&source, progress)?)
 }
 
 /// What `--json` prints.

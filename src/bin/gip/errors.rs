@@ -1,6 +1,6 @@
 //! What an error prints, and the exit status that it ends with.
 
-use image_gip::EncodeError;
+use image_gip::{EncodeError, OptionError};
 use thiserror::Error;
 
 use crate::limits;
@@ -29,9 +29,20 @@ pub(crate) fn one_line(error: &anyhow::Error) -> String {
             line.push_str(&cause);
         }
     }
-    if let Some(advice) = limits::advice(error) {
+    if let Some(advice) = advice(error) {
         line.push_str("; ");
         line.push_str(&advice);
     }
     line
+}
+
+/// What the user can do about an error.
+fn advice(error: &anyhow::Error) -> Option<String> {
+    let is_by_metadata = error.chain().any(|cause| {
+        matches!(cause.downcast_ref(), Some(EncodeError::Option(OptionError::Size { .. })))
+    });
+    if is_by_metadata {
+        return Some("--metadata safe or none leaves room".to_owned());
+    }
+    limits::advice(error)
 }
