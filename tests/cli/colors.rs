@@ -187,6 +187,17 @@ fn colours_that_cannot_be_kept_are_told() {
         assert_eq!(printed, expected);
     }
 
+    // Code points that leave open what they do not share with sRGB say nothing; others do.
+    for (primaries, transfer, is_told) in
+        [(2, 2, false), (1, 2, false), (2, 13, false), (9, 2, true), (2, 4, true)]
+    {
+        let file = png(&picture, &[code_points(primaries, transfer)]);
+        let (profile, printed) = carried(&room, "a.png", &file);
+        assert!(profile.is_none());
+        let told = format!("cICP {primaries}/{transfer}/0/1) cannot be kept");
+        assert_eq!(printed.contains(&told), is_told, "{printed}");
+    }
+
     let mut radiance = Cursor::new(Vec::new());
     let floats = DynamicImage::from(picture.to_rgb32f());
     floats.write_to(&mut radiance, ImageFormat::Hdr).expect("in memory");

@@ -42,7 +42,7 @@ pub(super) fn of_png(file: &[u8], stored: &mut Stored) {
         matches!(stored.image, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_))
             || matches!(stored.image, DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_));
     if let Some(points) = info.coding_independent_code_points
-        && !is_unspecified(points)
+        && !is_default(points)
     {
         match profile_of_code_points(points, is_gray) {
             Some(profile) => {
@@ -57,8 +57,11 @@ pub(super) fn of_png(file: &[u8], stored: &mut Stored) {
     }
 }
 
-fn is_unspecified(points: CodingIndependentCodePoints) -> bool {
-    points.color_primaries == 2 || points.transfer_function == 2
+/// Whether code points leave open (2) what they do not have in common with sRGB. Then what else the file says
+/// about its colours counts.
+fn is_default(points: CodingIndependentCodePoints) -> bool {
+    let (primaries, transfer) = (points.color_primaries, points.transfer_function);
+    matches!((primaries, transfer), (1 | 2, 2) | (2, 13))
 }
 
 /// The profile for code points; `Some(None)` for sRGB, and `None` if no profile can express them.
@@ -67,8 +70,8 @@ fn profile_of_code_points(
     is_gray: bool,
 ) -> Option<Option<ColorProfile>> {
     let (primaries, transfer) = (points.color_primaries, points.transfer_function);
-    // Others than these are of high dynamic range, or historical.
-    let is_known = matches!(transfer, 1 | 4..=8 | 13..=15);
+    // Others than these are of high dynamic range, historical, or unspecified.
+    let is_known = primaries != 2 && matches!(transfer, 1 | 4..=8 | 13..=15);
     if !is_known || points.matrix_coefficients != 0 || !points.is_video_full_range_image {
         return None;
     }
