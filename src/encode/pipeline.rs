@@ -50,14 +50,16 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
     let mut outcome = encode_for_target(job, &judge, Work::default(), observer)?;
     let pixels = job.pixels();
     let Some(most_bytes) = job.target.bytes(pixels) else { return Ok(outcome) };
-    let mut was_better_with_fewer = false;
     loop {
         let gaussians = outcome.gaussians as usize;
         let is_large = gaussians > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
-        // An effort that finds no use for the bytes may have begun with too many Gaussians.
-        let is_unused = matches!(outcome.shortfall, Some(Shortfall::SizeUnused { .. }));
-        let is_doubtful = is_large || is_unused || outcome.is_lost_to_rounding;
-        if !(is_doubtful || was_better_with_fewer) || gaussians < 2 {
+        // An effort that finds no use for the bytes may have begun with too many Gaussians; and where fewer
+        // were better, still fewer may be.
+        let is_unused = matches!(
+            outcome.shortfall,
+            Some(Shortfall::SizeUnused { .. } | Shortfall::SizeUseless { .. })
+        );
+        if !(is_large || is_unused || outcome.is_lost_to_rounding) || gaussians < 2 {
             return Ok(outcome);
         }
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
@@ -72,7 +74,6 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
         let (bytes, gaussians) = (modest.file.len(), modest.gaussians);
         let shortfall = Some(Shortfall::SizeUseless { bytes, gaussians });
         outcome = Outcome { shortfall, ..modest };
-        was_better_with_fewer = true;
     }
 }
 
