@@ -88,7 +88,7 @@ impl<'a> TargetSearch<'a> {
     }
 
     /// The codes of `gaussians`, whose rendering has this distortion, for a target; and the base-2 logarithm of
-    /// how far their error or size is from it, 0 for a target that is neither.
+    /// how far their error is from it, 0 for a target that is no error.
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
@@ -114,7 +114,7 @@ impl<'a> TargetSearch<'a> {
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
-            return Ok((self.shortened(coded, bytes, observer)?, deviation));
+            return Ok((self.shortened(coded, bytes, observer)?, 0.0));
         }
         if aim.miss(deviation) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
@@ -128,7 +128,7 @@ impl<'a> TargetSearch<'a> {
                     self.passed(gaussians, finer, self.work.passes, aim, observer)?;
             }
         }
-        Ok((self.trimmed(coded, deviation, aim, observer)?, deviation))
+        self.trimmed(coded, deviation, aim, observer)
     }
 
     /// The codes of a step, which is halved while there are fewer than `count`.
@@ -348,17 +348,18 @@ impl<'a> TargetSearch<'a> {
         Ok(coded)
     }
 
-    /// The codes of a picture that is too good without the least useful ones, as many as can be spared.
+    /// The codes of a picture that is too good without the least useful ones, as many as can be spared, and
+    /// their deviation from the aim.
     fn trimmed(
         &self,
         optimized: Optimized,
         mut deviation: f64,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<(CodedLayers, f64), EncodeError> {
         let Optimized { mut coded, mut by_use } = optimized;
         if deviation > 0.0 || aim.miss(deviation) == 0.0 {
-            return Ok(coded);
+            return Ok((coded, deviation));
         }
         // Those from `end` on cannot be spared, and likely not many more at a time.
         let mut end = by_use.len();
@@ -381,6 +382,6 @@ impl<'a> TargetSearch<'a> {
                 break;
             }
         }
-        Ok(coded)
+        Ok((coded, deviation))
     }
 }
