@@ -22,18 +22,19 @@ use crate::render::Picture;
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
 
-/// How often the number of Gaussians of a finished fit may be corrected for a quality, and the
-/// factors that need no correction, because the steps of quantization make up for them.
+/// How often the number of Gaussians of a finished fit may be corrected for a quality.
 const MAX_CORRECTIONS: u32 = 5;
+/// The factors on the number of Gaussians that need no correction: finer or coarser steps of quantization
+/// make up for them.
 const CLOSE: Range<f64> = 0.75..1.2;
 /// The least and the largest factor for a correction.
 const FACTORS: (f64, f64) = (0.25, 4.0);
-/// The powers of the number of Gaussians that the error is taken to be inversely proportional to, once
-/// there are two of each: of noise it is a low one, of smooth pictures a high one.
+/// The range of p, where the error is taken to be proportional to the number of Gaussians to the power of -p.
+/// Two fits tell p: it is low for noise, and high for smooth pictures.
 const POWERS: (f64, f64) = (0.4, 2.0);
 
-/// The base-2 logarithm of how far a file misses its quality, from which on the codes of another fit are tried:
-/// a point or two.
+/// From this deviation from a quality on (see `rdo/step_search.rs`; a point or two), the codes of a second
+/// fit are tried.
 const MISSED: f64 = 0.1;
 
 /// A fit before it was changed.

@@ -13,8 +13,8 @@ pub enum Target {
     /// fit, the entropy coding leaves out what is not worth its bits, but no more than half.
     Gaussians(u32),
     /// A file of at most this many bytes, from 1 to 2^30, and of at least 99 % of them. Where so many
-    /// bytes bring hardly anything, the file is smaller, and [`Report::shortfall`](crate::Report) says
-    /// so. So it does of the least file, one without Gaussians, where that is larger.
+    /// bytes bring hardly anything, the file is smaller. Where even a file without Gaussians has more
+    /// bytes, that is the file. [`Report::shortfall`](crate::Report) says so in both cases.
     Bytes(u64),
     /// A file of at most this many bits per pixel, from 10^-6 to 10^6, and of at least 99 % of
     /// them. The whole file counts; see also [`Target::Bytes`].
@@ -26,10 +26,10 @@ pub enum Target {
     Psnr(f64),
     /// A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 30 is low, 50
     /// medium, 70 high, and from 90 on people see no difference. The encoder aims at its estimate of
-    /// the metric, [`Report::quality`](crate::Report), and no higher than 97. Where the picture is smooth,
-    /// as in a gradient, it aims at more, so that there are no blotches. So it does where a side has less
-    /// than 113 pixels: of such pictures the metric says little, and they must have the quality among
-    /// their mirror images as well, as a part of a large one.
+    /// the metric, [`Report::quality`](crate::Report), and no higher than 97. It aims at more in two cases:
+    /// where the picture is smooth, as in a gradient, so that there are no blotches; and where a side has
+    /// less than 113 pixels. Of such a picture the metric says little, so a larger one, made of the
+    /// picture and its mirror images, must have the quality as well.
     Quality(f64),
     /// A Lagrange multiplier lambda from 0.01 to 10^6: with all files of a set at the same lambda, no
     /// bit would bring more in another one. It is the squared error that a bit must save, where

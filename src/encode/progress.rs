@@ -29,9 +29,10 @@ pub struct Progress {
 const WORK_PER_POLL: f64 = 4e6;
 /// The least work that a thread takes from what all of them share: taking it costs a hundredth.
 const LEAST_WORK: f64 = 1e4;
-/// A thread takes this part of its share of what is left, so that all are done at about the same time.
+/// A thread takes an nth of its equal share of the remaining work at a time, so that all threads end at
+/// about the same time.
 const PART_OF_SHARE: usize = 3;
-/// At least so much work is taken to be left, as a share of what is done: an estimate may be too low.
+/// The least work that is assumed to be left, as a share of the work done: an estimate may be too low.
 const LEAST_LEFT: f64 = 0.03;
 
 /// The caller's callback and the last progress reported to it. Code that runs for more than a few

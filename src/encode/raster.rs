@@ -250,9 +250,9 @@ fn by_tiles<T: Copy + Default + Into<u64> + Send + Sync>(
     Ok((planes, core::array::from_fn(total)))
 }
 
-/// The residuals of sixteen samples of the source, which are up to [`FULL_SCALE`], as far as they show.
-/// The output is clamped: where the source is white, a rendering above white is no error, and below
-/// black where the source is black.
+/// The residuals of sixteen samples of the source (from 0 to [`FULL_SCALE`]) after clamping, as in the
+/// output: a rendering above white is no error where the source is white, nor one below black where the
+/// source is black.
 #[inline(always)]
 pub(crate) fn visible<S: Simd>(simd: S, residual: f32x16<S>, sample: f32x16<S>) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);

@@ -14,7 +14,7 @@ use crate::gaussian::Gaussian;
 
 /// The bits of a component ([`component_bits`]) on average over the Gaussians of a usual picture.
 pub(crate) const USUAL_COMPONENT_BITS: f64 = 2.2;
-/// The base-2 logarithm of what one more bit of a component is to [`bits_per_gaussian`].
+/// The increase of log2 of [`bits_per_gaussian`] for one more bit per component.
 const BITS_BY_COMPONENT: f64 = 0.15;
 /// The share of a target's squared error that the fit may have; quantization adds the rest.
 pub(crate) const SHARE_OF_FIT: f64 = 0.8;

@@ -5,17 +5,17 @@ use super::progress::Observer;
 use crate::region::Region;
 use crate::render::{BAND_HEIGHT, Picture, RenderOptions};
 
-/// Pixels of a strip for each thread, but at least [`BANDS`] bands. They bound the memory of a rendering
-/// to floats, and the time from one poll of the observer to the next.
+/// Pixels of a strip per thread, unless [`BANDS`] bands have more. The size of a strip bounds the memory of a
+/// rendering to floats, and the time between two polls of the observer.
 const PIXELS: usize = 3 << 14;
-/// Bands of a strip for each thread: with one alone, threads would wait for the slowest.
+/// Least number of bands of a strip per thread: with one, threads would wait for the slowest.
 const BANDS: usize = 2;
 /// Most pixels of a strip, unless a band has more.
 const MOST_PIXELS: usize = 1 << 21;
 
-/// Renders the first `prefix` Gaussians of a picture, of which there are no limits, strip by strip from
-/// the top, and shows every strip to `visit`: float samples, plane after plane. The number of rows of a
-/// strip is a multiple of [`BAND_HEIGHT`], except at the bottom.
+/// Renders the first `prefix` Gaussians of a picture strip by strip from the top, and hands every strip to
+/// `visit`: float samples, plane after plane. The number of rows of a strip is a multiple of
+/// [`BAND_HEIGHT`], except at the bottom. The picture must have no [`Limits`](crate::Limits).
 ///
 /// # Errors
 /// [`EncodeError::Cancelled`] when the caller cancels.

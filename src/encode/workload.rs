@@ -1,17 +1,18 @@
-//! How much work the parts of an encoding are. The progress that is told to the caller counts in it.
+//! Estimates of the work of each stage of an encoding, by which progress is measured.
 
 /// Nanoseconds of one core for a pixel and for a Gaussian, about: measured on a photograph of three
 /// megapixels with 8,000 to 170,000 Gaussians.
 type Rates = (f64, f64);
 
-/// All before training.
+/// Everything before training.
 const PREPARATION: Rates = (70.0, 0.0);
-/// A pass over the picture without Gaussians; what they add when they cover all of it; and what each
-/// adds, however small it is.
+/// An iteration of training: for a pixel without Gaussians, and for a Gaussian, however small.
 const ITERATION: Rates = (3.0, 260.0);
+/// What an iteration takes more for a pixel that Gaussians cover.
 const COVERAGE: f64 = 6.7;
-/// A late pass of coordinate descent, without and with the rendering before it.
+/// A late pass of coordinate descent.
 const DESCENT: Rates = (70.0, 3_300.0);
+/// The rendering before each pass.
 const RENDERING: Rates = (25.0, 800.0);
 /// Coding, and measuring the squared error or the visual quality.
 const CODING: Rates = (0.0, 800.0);
@@ -35,7 +36,7 @@ impl Workload {
         self.pixels * pixel + self.gaussians * gaussian
     }
 
-    /// All before training.
+    /// Everything before training.
     pub(crate) fn preparation(&self) -> f64 {
         self.of(PREPARATION)
     }

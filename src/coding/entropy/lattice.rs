@@ -68,7 +68,8 @@ pub(crate) struct Shape {
 pub(crate) struct ExpTable {
     /// The step of precision class 0.
     step: f32,
-    /// The table, precision class by precision class: decoding cannot go on until it has the shape.
+    /// The table, precision class by precision class. It is worth it: decoding waits for the shape of each
+    /// Gaussian before it reads on.
     likely: Vec<f32>,
 }
 

@@ -157,8 +157,8 @@ impl RowBins {
         self.sort_rows(&chunks, observer)
     }
 
-    /// Sets where rows start. Returns for each chunk, and each row from its first one on, the index of its
-    /// first span.
+    /// Sets the index of the first span of every row of tiles. Returns, for each chunk and for each row of
+    /// tiles from `first_row` on, the index of the chunk's first span in that row.
     fn count_rows(&mut self, chunks: &[ChunkSpans]) -> Vec<Vec<u32>> {
         self.starts.clear();
         self.starts.resize(self.grid.rows + 1, 0);

@@ -18,13 +18,13 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
 /// pruned: a 16th of the quantization step of 8 bits.
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
-/// Gaussians that are placed in a tile at the same time see the same residuals. If too many of them overlap,
-/// their steps together go too far: the distortion of the tile rises, and it gets most of the next Gaussians,
-/// too. So they may overlap up to this many times as much as all would if they were spread evenly,
+/// How much the new Gaussians of a tile may overlap, as a multiple of what they would if all were spread
+/// evenly. Those that are placed at the same time see the same residuals. If too many of them overlap, their
+/// steps together go too far: the distortion of the tile rises, and it gets most of the next Gaussians, too.
 const MOST_OVERLAP: f64 = 3.0;
-/// and there are at most so many: about one for ten pixels, or several times as many as the tiles get on
-/// average, where that is more.
+/// Most new Gaussians of a tile at a time, about one for ten pixels; or, where that is more,
 const MOST_AT_ONCE: f64 = 12.0;
+/// as a factor on the average over the tiles.
 const MOST_OF_AVERAGE: f64 = 4.0;
 /// Work for the distortions of a tile.
 const WORK: f64 = 2000.0;
@@ -40,12 +40,11 @@ struct NewPosition {
     /// nearly all of the distortion, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
-    /// What the rendering lacks there in each channel, minus the residual ([`Rendered::residuals`]), if the
-    /// colour depends on that.
+    /// The negative residual of each channel ([`Rendered::residuals`]), if the colour depends on it.
     missing: [f32; 4],
 }
 
-/// What new Gaussians are placed by in a tile.
+/// The errors of a tile, by which new Gaussians are placed.
 struct TileErrors {
     distortions: TilePlane,
     /// One plane per channel.
@@ -53,7 +52,7 @@ struct TileErrors {
 }
 
 impl TileErrors {
-    /// What the rendering lacks at a pixel of the tile; 0 for absent channels.
+    /// The negative residuals at a pixel of the tile; 0 for absent channels.
     fn missing(&self, x: usize, y: usize) -> [f32; 4] {
         let mut missing = [0.0; 4];
         for (value, plane) in missing.iter_mut().zip(&self.residuals) {
@@ -115,7 +114,7 @@ impl Densifier<'_> {
         Ok(rows)
     }
 
-    /// Sets what the rendering lacks at positions.
+    /// Sets the negative residuals at positions.
     fn find_missing(
         &self,
         positions: &mut [NewPosition],

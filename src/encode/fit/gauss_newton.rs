@@ -1,9 +1,9 @@
 //! A Gauss-Newton step with momentum.
 //!
-//! The curvature is that of a Gaussian alone. Those that overlap take their steps at the same time, and
-//! together they would go too far, or, where they share the way, not far enough. So every Gaussian has
-//! a pace of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
-//! falls when they turn round (as in Rprop; Riedmiller and Braun, 1993).
+//! The curvature is that of a Gaussian alone. Gaussians that overlap take their steps at the same time:
+//! together they may go too far, or not far enough. So every Gaussian has a step size of its own, its
+//! *pace*, which is a factor on its steps: it rises while successive gradients agree, and falls when they
+//! turn round (as in Rprop; Riedmiller and Braun, 1993).
 
 pub(super) mod blocks;
 

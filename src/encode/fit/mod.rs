@@ -76,7 +76,7 @@ pub(crate) struct Fit<'a> {
     base: [f32; 4],
     bounds: RowBounds,
     parameters: Parameters,
-    /// Those of quantization-aware training, once it has started.
+    /// The quantizers, once quantization-aware training has started.
     quantizers: Option<LsqQuantizers>,
     /// The squared error before quantization started; 0 without it.
     float_error: f64,
@@ -85,7 +85,7 @@ pub(crate) struct Fit<'a> {
     pass: Pass,
     /// Passes for which the present bins remain valid.
     binned_for: u32,
-    /// Those of the last pass, or of the next one.
+    /// The splats of the last pass; after a step, those of the next one if `has_splats`.
     splats: Vec<Splat>,
     /// Whether `splats` are those of the present values.
     has_splats: bool,

@@ -65,15 +65,15 @@ impl RateTerm {
         }
     }
 
-    /// What the colours are multiplied by in [`Self::gradient`], for sixteen Gaussians of these areas
+    /// The factor that [`Self::gradient`] multiplies colours with, for sixteen Gaussians of these areas
     /// and squared lengths of colour.
     #[inline(always)]
     pub(super) fn by_color<S: Simd>(&self, area: f32x16<S>, squared: f32x16<S>) -> f32x16<S> {
         area * (self.weight * self.components) / (squared * area + self.squared_step)
     }
 
-    /// The gradient of half the term by the size at the same strength, the ratio and the slant in the
-    /// own frames of sixteen Gaussians with these Cholesky factors.
+    /// The gradients of half the term by size (at constant strength), ratio and slant, each in the
+    /// Gaussian's own frame, for sixteen Gaussians with these Cholesky factors.
     #[inline(always)]
     pub(super) fn by_shape<S: Simd>(
         &self,

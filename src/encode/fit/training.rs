@@ -183,10 +183,9 @@ pub struct Adam {
     pub epsilon: f32,
 }
 
-/// Gauss-Newton steps with momentum: every gradient is divided by the curvature of the squared error
-/// of the Gaussian alone, which integrals of the kernel tell. What overlapping Gaussians do to each
-/// other, the pace of each makes up for: it rises while gradients agree, and falls when they turn
-/// round.
+/// Gauss-Newton steps with momentum: every gradient is divided by the curvature that the squared error
+/// would have if the Gaussian were alone, an integral of the kernel. As Gaussians overlap, each has a step
+/// size of its own, which rises while successive gradients agree and falls when they turn round.
 ///
 /// A step is taken in the Gaussian's own frame: its centre moves in standard deviations, and its shape
 /// changes relative to itself. The same rate suits Gaussians of all sizes and colours.

@@ -1,9 +1,9 @@
 //! An estimate of the visual quality of a rendering, on the scale of SSIMULACRA2.
 //!
 //! SSIMULACRA2 (<https://github.com/cloudinary/ssimulacra2>) adds up 108 norms of differences in three
-//! channels on six scales, with weights that were fitted to what people said. Here are all of them that
-//! have any weight, with a plain window in place of a recursive filter. Unlike the metric, a picture with
-//! alpha is judged over black and over white, where the metric takes darker and lighter grays.
+//! channels on six scales, with weights that were fitted to ratings by people. The estimate has all norms
+//! whose weight is not 0, with a window of fixed size in place of a recursive filter. A picture with alpha is
+//! judged over black and over white; the metric takes a darker and a lighter gray.
 //!
 //! Of small pictures the metric says little: what is near a border hardly counts, and with fewer than six
 //! scales its channels have weights that were fitted for others. Noise of 8 x 8 pixels may have quality 75
@@ -38,10 +38,12 @@ use smooth::SmoothAreas;
 /// The highest quality that is aimed at. People see no difference from 90 on.
 pub(crate) const MOST_QUALITY: f64 = 97.0;
 
-/// The mean sensitivity of a picture without any variance, from how far below it on a picture is taken to
-/// have large even areas, and the least share of Gaussians that those take.
+/// The mean sensitivity of a picture without any variance.
 const MOST_SENSITIVITY: f64 = 20.07;
+/// A picture whose mean sensitivity is less than this below the most is taken to have large even areas, and
+/// begins with fewer Gaussians:
 const EVEN: f64 = 6.0;
+/// at least this share of them.
 const LEAST_SHARE: f64 = 0.15;
 /// Most Gaussians per pixel that are tried first.
 const MOST_DENSITY: f64 = 0.25;

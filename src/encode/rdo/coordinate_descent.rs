@@ -67,13 +67,13 @@ impl Candidate {
     }
 }
 
-/// What became of the Gaussians of a band.
+/// The result of optimizing the Gaussians of a band.
 #[derive(Debug, Default)]
 struct PassedBand {
-    /// Those that are left: the use of their bits, their indices, and their codes.
+    /// The Gaussians that remain: [`Candidate::use_of_bits`], index and code.
     found: Vec<(f32, u32, Code)>,
-    /// Gaussians that reach beyond the band and are added to the rendering, each times a factor, and the
-    /// rows where they are already.
+    /// Gaussians that reach beyond the band, with the factor that they are added to the rendering with, and
+    /// the rows of the band, where that is done.
     beyond: Vec<(Gaussian, f32, Range<usize>)>,
 }
 
@@ -111,9 +111,9 @@ impl Cheapest {
 }
 
 impl CoordinateDescent<'_> {
-    /// One pass: improves or removes every Gaussian. `contexts` are those of the codes, and
-    /// `residuals` those of their rendering, which are updated. Returns the codes; the less one lowers
-    /// the error for each of its bits, the later it comes.
+    /// One pass: improves or removes every Gaussian. `contexts` has the context of each code. `residuals`
+    /// are those of the rendering of `codes`, and in the end those of the new codes. Returns the new codes,
+    /// sorted by how much each lowers the error per bit, the most first.
     ///
     /// Bands of the picture are processed in parallel; the result does not depend on the threads.
     ///

@@ -31,8 +31,8 @@ impl GeometryChange {
         }
     }
 
-    /// The change of the squared error by a change of geometry, where `self` is the gradient. The
-    /// Gaussian has this slant, l21 / l22, and this squared strength: the sum of its squared colour
+    /// The change of the squared error that the model predicts for a change of geometry; `self` is the
+    /// gradient. `slant` is the Gaussian's l21 / l22, and `squared_strength` the sum of its squared colours
     /// times its area.
     pub(crate) fn error_change(&self, change: &Self, slant: f32, squared_strength: f32) -> f32 {
         let linear = self.center[0] * change.center[0]

@@ -40,8 +40,8 @@ pub(crate) type StoredLanes = [i16; LANES];
 /// The residuals of a picture, rendering minus source, and how much their squares count.
 ///
 /// The rendering is clamped as in the output: where the source is black, a rendering below black is no
-/// error, and above white where the source is white. Changes of the rendering are not, so that what
-/// lies beyond is preserved rather than used.
+/// error, nor one above white where the source is white. Changes of the rendering are not clamped: they
+/// count as errors there, although the output would hide them, so the descent avoids them.
 ///
 /// The descent minimizes the sum of squared residuals, each times the sensitivity of its pixel. The
 /// distortion counts the means of blocks too: [`Residuals::shift`] moves the residuals such that the

@@ -1,9 +1,9 @@
 //! The order in which Gaussians are optimized: in rounds, and in each by bands of the picture, which
 //! are independent of each other.
 //!
-//! Large windows, which overlap many others, come first. Bands are at least twice as high as the
-//! windows in them, so that a window which crosses a border is inside of a band that is shifted by half
-//! its height.
+//! Large windows come first: they overlap many others. A band is at least twice as high as the windows
+//! that are assigned to it. A window that crosses the border of two bands lies inside one band of a
+//! second division, which is shifted by half the height of a band.
 
 use core::cmp::Reverse;
 use core::ops::Range;
@@ -47,7 +47,7 @@ impl Entry {
         Self {
             height: Reverse(height as u32),
             is_shifted: rows.start / height != last / height,
-            // Also of the shifted ones: that has the border, which is the first row of the band that is not.
+            // A shifted band has the number of the unshifted one that begins in its middle.
             band: (last / height) as u32,
             area_class: Reverse((columns.len() * rows.len()).ilog2()),
             index: index as u32,

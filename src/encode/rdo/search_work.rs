@@ -1,14 +1,14 @@
-//! How much work the search for a target is, for the progress that is told.
+//! Estimates of the work of the search for a target, for the progress report.
 
 use super::step_search::Aim;
 use crate::encode::job::Job;
 use crate::encode::workload::Workload;
 
-/// Tries until a size is met, and a PSNR or a quality, on average over photographs.
+/// Average number of tries until a size is met, and until a PSNR or a quality is met.
 const TRIES: (f64, f64) = (1.0, 1.5);
 
-/// The work of a search and of what follows it. When more turns out to be needed than is usual, the
-/// estimate is replaced.
+/// The estimated work of a search and of the stages after it. A search that needs more tries or passes than
+/// usual replaces the estimate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchWork {
     workload: Workload,

@@ -8,7 +8,7 @@ const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 const AIMED_PSNR_EXCESS: f64 = 0.02;
 /// The deviations of size that are good enough: a file that is a little too large will be shortened.
 const TOLERANCE_OF_SIZE: (f64, f64) = (-0.009, 0.04);
-/// Those that are not corrected even if there are passes left.
+/// The deviations of size that are left to the shortening, even if there are passes left.
 const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
 /// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
 /// right side is preferred.
@@ -89,8 +89,7 @@ impl Aim {
         }
     }
 
-    /// By how much a Lagrange multiplier changes the deviation, given the base-2 logarithm of its ratio
-    /// to the usual one. A pass removes Gaussians, but adds none.
+    /// The change of the deviation with a Lagrange multiplier of 2^`lambda` times the usual one.
     pub(crate) fn change_by_lambda(self, lambda: f64) -> f64 {
         lambda * self.by_lambda(lambda > 0.0)
     }
@@ -104,8 +103,9 @@ impl Aim {
         -deviation / self.by_lambda(rises)
     }
 
-    /// By how much the deviation changes when the Lagrange multiplier doubles, or, if it does not rise,
-    /// on the way from a half of it.
+    /// The change of the deviation when the Lagrange multiplier doubles: from the usual one if it rises above
+    /// that, and up to the usual one otherwise. Errors change less below it, because a pass removes
+    /// Gaussians but adds none.
     fn by_lambda(self, rises: bool) -> f64 {
         match (self, rises) {
             (Self::Size { .. }, _) => -0.05,

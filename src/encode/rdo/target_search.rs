@@ -21,10 +21,10 @@ const MOST_TRIES: u32 = 4;
 const CLOSE_OF_ROUNDED: f64 = 0.025;
 /// Gaussians of at most this strength are weak: most of them are not worth their bits.
 const WEAK: i64 = 2;
-/// By how much size and error fall from the first pass on until they change no more, as base-2
-/// logarithms. After n passes, an nth of it is left.
+/// The fall of size and of error, as base-2 logarithms, that further passes of coordinate descent bring
+/// after the first one. After n passes, 1 / n of it is still to come.
 const SETTLING: f64 = 0.03;
-/// By how much more they fall in a pass after the step was changed.
+/// The additional fall in the first pass after a change of the step.
 const SETTLING_AGAIN: f64 = 0.012;
 /// The deviation of a file that decodes to an exact copy, which has no finite PSNR.
 const LARGEST_DEVIATION: f64 = 10.0;
@@ -51,7 +51,7 @@ const MOST_HALVINGS: u32 = 8;
 /// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
 
-/// By how much the size falls in the first pass, as a base-2 logarithm, if this share of the Gaussians is
+/// The fall of the size in the first pass, as a base-2 logarithm, given the share of Gaussians that are
 /// weak (24 photographs, efforts 1 and 2: good to 0.02).
 fn settling_of_rounded(weak: f64) -> f64 {
     (0.02 + 1.9 * weak).min(0.1).max(1.15 * weak)
@@ -87,8 +87,8 @@ impl<'a> TargetSearch<'a> {
         Ok(Self { judge, raster, layout, work, codes })
     }
 
-    /// The codes of `gaussians`, whose rendering has this distortion, for a target; and the base-2 logarithm of
-    /// how far their error is from it, 0 for a target that is no error.
+    /// Finds codes of `gaussians`, whose rendering has this distortion, for a target. Returns them with their
+    /// deviation from the target (see [`Aim`]); it is 0 if the target is no error.
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
@@ -152,8 +152,8 @@ impl<'a> TargetSearch<'a> {
         }
     }
 
-    /// The codes that come nearest to an aim, their deviation from it, and the step that would be tried
-    /// next; `step` is the first.
+    /// Tries up to [`MOST_TRIES`] steps, `step` first. Returns the codes that come nearest to an aim, their
+    /// deviation from it, and the step at which the search has arrived.
     fn aimed(
         &mut self,
         gaussians: &[Gaussian],
@@ -179,8 +179,9 @@ impl<'a> TargetSearch<'a> {
         Ok((optimized, deviation, search.at))
     }
 
-    /// The codes that come nearest to an aim from the step that is to be tried next, their deviation
-    /// from it, and what the deviation would be with that step and the usual lambda.
+    /// Tries the step at which the search is; passes with other lambdas, or another rounding, bring the codes
+    /// nearer to the aim. Returns the codes, their deviation from the aim, and an estimate of the deviation
+    /// that the step itself has, with the usual lambda.
     fn tried(
         &mut self,
         gaussians: &[Gaussian],
