@@ -14,7 +14,7 @@ const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden");
 const PICTURES: [&str; 4] = ["photograph", "cut-out", "gray", "deep"];
 const COLUMNS: &str =
     "picture\tprecision\teffort\ttune\ttarget\thash\tbytes\tGaussians\tPSNR\tquality\n";
-const EFFORTS: [u8; 2] = [1, 4];
+const EFFORTS: [(&str, u8); 2] = [("1", 1), ("4", 4)];
 const VISUAL: (&str, Tune) = ("visual", Tune::Visual);
 const PSNR: (&str, Tune) = ("psnr", Tune::Psnr);
 const RATE: (&str, Target) = ("1.5 bpp", Target::BitsPerPixel(1.5));
@@ -50,6 +50,35 @@ fn fnv1a(bytes: &[u8]) -> u64 {
     })
 }
 
+/// An encoder, after the columns of the table that tell it.
+type Named = (String, Encoder);
+
+/// The encoders of [`WAYS`].
+fn encoders() -> impl Iterator<Item = Named> {
+    WAYS.into_iter().flat_map(|(precision, tunes, targets)| {
+        let all = vec![(String::new(), Encoder::new())];
+        let all = with_each(&all, &[precision], Encoder::with_precision);
+        let all = with_each(&all, &EFFORTS, Encoder::with_effort);
+        let all = with_each(&all, tunes, Encoder::with_tune);
+        with_each(&all, targets, Encoder::with_target)
+    })
+}
+
+/// Each of the encoders with each of the options, which have names.
+fn with_each<T: Copy>(
+    encoders: &[Named],
+    options: &[(&str, T)],
+    with: impl Fn(Encoder, T) -> Encoder,
+) -> Vec<Named> {
+    let each = |(names, encoder): &Named| {
+        let named = |(name, option): &(&str, T)| {
+            (format!("{names}\t{name}"), with(encoder.clone(), *option))
+        };
+        options.iter().map(named).collect::<Vec<_>>()
+    };
+    encoders.iter().flat_map(each).collect()
+}
+
 /// The lines of the table for a picture.
 fn lines(name: &str) -> Vec<String> {
     let image = image::open(Path::new(FOLDER).join(format!("{name}.png"))).expect(name);
@@ -70,26 +99,14 @@ fn lines(name: &str) -> Vec<String> {
         _ => unreachable!("no picture is of another kind"),
     };
     let source = source.expect("the sizes agree");
-    let mut lines = Vec::new();
-    for ((precision_name, precision), tunes, targets) in WAYS {
-        for effort in EFFORTS {
-            for (tune_name, tune) in tunes {
-                for (target_name, target) in targets {
-                    let encoder = Encoder::new().with_precision(precision).with_effort(effort);
-                    let encoder = encoder.with_tune(*tune).with_target(*target);
-                    let encoded = encoder.encode(&source).expect("it encodes");
-                    let (hash, bytes) = (fnv1a(&encoded.bytes), encoded.bytes.len());
-                    let (count, psnr) = (encoded.report.gaussians, encoded.report.psnr);
-                    let quality = encoded.report.quality;
-                    lines.push(format!(
-                        "{name}\t{precision_name}\t{effort}\t{tune_name}\t{target_name}\t{hash:016x}\t{bytes}\t\
-                         {count}\t{psnr:.3}\t{quality:.2}"
-                    ));
-                }
-            }
-        }
-    }
-    lines
+    let line = |(way, encoder): Named| {
+        let encoded = encoder.encode(&source).expect("it encodes");
+        let (hash, bytes) = (fnv1a(&encoded.bytes), encoded.bytes.len());
+        let (count, psnr) = (encoded.report.gaussians, encoded.report.psnr);
+        let quality = encoded.report.quality;
+        format!("{name}{way}\t{hash:016x}\t{bytes}\t{count}\t{psnr:.3}\t{quality:.2}")
+    };
+    encoders().map(line).collect()
 }
 
 /// Whether a line says what another one does, as far as platforms agree.
