@@ -4,14 +4,14 @@
 
 /// In a small output, one Gaussian is enough for this many pixels.
 const PIXELS_PER_GAUSSIAN: u64 = 16;
-/// The first layers have one out of this many of a file's Gaussians. With fewer, a preview would differ
-/// visibly, however small it is; those after them may be only a part of the picture each.
-const ALL_OF_FIRST: u32 = 6;
+/// A preview has the Gaussians of the first layers, which are one in this many of the file's. With fewer, it
+/// would differ visibly, however small it is; layers after them may be only a part of the picture each.
+const PREVIEW_DIVISOR: u32 = 6;
 
 /// How many of a file's Gaussians are enough for a preview of a size in pixels: those of the first layers, or
 /// all.
 pub(crate) fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
-    let first = all / ALL_OF_FIRST;
+    let first = all / PREVIEW_DIVISOR;
     let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
     if shown <= u64::from(first) { first } else { all }
 }
