@@ -1,9 +1,6 @@
 //! What to draw of a picture (spec, section 9.1).
 
-use image_gip::{Header, Region, RequestError};
-
-/// Largest width and height of an output in pixels: every pixel centre is exact in `f32`.
-const MAX_OUTPUT_SIDE: u32 = 1 << 23;
+use image_gip::{Header, Region, RenderOptions, RequestError};
 
 /// What to draw of a picture: its scale and a region (spec, section 9.1). The default is the whole
 /// picture at its stored size, with all Gaussians.
@@ -43,7 +40,7 @@ impl View {
     /// The scale, region and Gaussians for a picture.
     pub(crate) fn resolve(self, header: &Header, gaussians: u32) -> Result<Frame, RequestError> {
         let (width, height) = self.size.unwrap_or((header.width, header.height));
-        let sides = 1..=MAX_OUTPUT_SIDE;
+        let sides = 1..=RenderOptions::MAX_OUTPUT_SIDE;
         if !sides.contains(&width) || !sides.contains(&height) {
             return Err(RequestError::OutputSize { width, height });
         }

@@ -39,17 +39,21 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
+    /// Largest width and height of an output in pixels, 2^23.
+    pub const MAX_OUTPUT_SIDE: u32 = MAX_OUTPUT_SIDE;
+
     /// The default options.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Renders the whole picture with `width` x `height` pixels, each 1 to 2^23. A larger output is
-    /// evaluated at the centres of its pixels; nothing is resampled. A smaller one is the average by
-    /// area of the picture at its stored size, in which colours count times their alpha; below an
-    /// eighth, of the picture at a half of its stored size, a quarter, and so on, with Gaussians
-    /// widened by the variance of the larger pixels (spec, section 9.2). For a detail of a very
-    /// large output, add [`RenderOptions::with_region`].
+    /// Renders the whole picture with `width` x `height` pixels, each 1 to
+    /// [`RenderOptions::MAX_OUTPUT_SIDE`]. A larger output is evaluated at the centres of its
+    /// pixels; nothing is resampled. A smaller one is the average by area of the picture at its
+    /// stored size, in which colours count times their alpha; below an eighth, of the picture at a
+    /// half of its stored size, a quarter, and so on, with Gaussians widened by the variance of the
+    /// larger pixels (spec, section 9.2). For a detail of a very large output, add
+    /// [`RenderOptions::with_region`].
     pub fn with_size(mut self, width: u32, height: u32) -> Self {
         self.size = Some((width, height));
         self

@@ -7,9 +7,6 @@ use pyo3::prelude::*;
 use crate::background::{Background, Channels};
 use crate::numbers::{Integer, Real, shown};
 
-/// Most pixels on a side of the output.
-const MAX_SIDE: u32 = 1 << 23;
-
 /// Names of the colour models, as Pillow has them.
 const MODES: [(&str, ColorModel); 4] = [
     ("L", ColorModel::Gray),
@@ -52,7 +49,8 @@ impl Request<'_, '_> {
     /// Refuses numbers and names that are out of range.
     pub(crate) fn check(&self) -> PyResult<Rendering> {
         let mut options = RenderOptions::new();
-        let side = |name: &str, side: &Integer<'_>| side.within(name, 1..=MAX_SIDE);
+        let most = RenderOptions::MAX_OUTPUT_SIDE;
+        let side = |name: &str, side: &Integer<'_>| side.within(name, 1..=most);
         if let Some((width, height)) = &self.size {
             if self.scale.is_some() {
                 return Err(PyTypeError::new_err("size and scale exclude each other"));
@@ -67,7 +65,7 @@ impl Request<'_, '_> {
             return Err(PyValueError::new_err(format!("scale {scale}; it must be over 0")));
         }
         if let Some((x, y, width, height)) = &self.region {
-            let place = |place: &Integer<'_>| place.within("region", 0..=MAX_SIDE - 1);
+            let place = |place: &Integer<'_>| place.within("region", 0..=most - 1);
             let (x, y) = (place(x)?, place(y)?);
             let (width, height) = (side("region", width)?, side("region", height)?);
             options = options.with_region(Region { x, y, width, height });
