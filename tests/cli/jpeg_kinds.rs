@@ -89,7 +89,7 @@ fn what_is_not_read_is_told_in_plain_words() {
         (with(INTERLEAVED, frame + 4, &[12]), "other samples than those of 8 bits"),
         (with(INTERLEAVED, frame + 5, &[0, 0]), "whose height comes after its data"),
         (with(THIRDS, thirds + 14, &[0x21]), "JPEG with such sampling is not read"),
-        (INTERLEAVED[..frame + 6].to_vec(), "the file is damaged"),
+        (INTERLEAVED[..frame + 6].to_vec(), "the file is damaged: the data end too early"),
     ] {
         room.write("a.jpg", file);
         for options in [&[][..], &["--allow-partial"]] {

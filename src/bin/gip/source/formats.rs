@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{BufRead, Cursor, Seek};
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use image_gip::Limits;
 
@@ -24,20 +24,25 @@ pub(super) fn dimensions(
         // Chunks that are damaged do not matter here.
         return Ok(png::Decoder::new(file).read_header_info()?.size());
     }
-    let size = usual_decoder(format, &mut file, limits).map(|decoder| decoder.dimensions());
-    match size {
-        Ok(size) => Ok(size),
-        Err(error) if format == ImageFormat::Jpeg => {
-            let mut bytes = Vec::new();
-            file.rewind()?;
-            file.read_to_end(&mut bytes)?;
-            jpeg::dimensions(&bytes).ok_or_else(|| match jpeg::survey(&bytes).unread() {
-                Some(reason) => anyhow!(reason),
-                None => error.into(),
-            })
+    let error = match usual_decoder(format, &mut file, limits) {
+        Ok(decoder) => return Ok(decoder.dimensions()),
+        Err(error) => error,
+    };
+    let mut bytes = Vec::new();
+    file.rewind()?;
+    file.read_to_end(&mut bytes)?;
+    let mut damage = damage(format, &bytes);
+    if format == ImageFormat::Jpeg {
+        if let Some(size) = jpeg::dimensions(&bytes) {
+            return Ok(size);
         }
-        Err(error) => Err(error.into()),
+        let jpeg = jpeg::survey(&bytes);
+        if let Some(reason) = jpeg.unread() {
+            bail!(reason);
+        }
+        damage = damage.or(jpeg.damage());
     }
+    Err(damage.map_or(error.into(), |damage| Fault::Damage(damage).into()))
 }
 
 pub(super) fn read(

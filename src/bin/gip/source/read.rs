@@ -48,7 +48,8 @@ impl Reading {
             Format::Image(format) => formats::dimensions(format, file, &self.limits),
             Format::Tiff => tiff::dimensions(file),
         };
-        let size = size.map_err(|error| fault::plain(error, format, &self.limits, false))?;
+        let size =
+            size.map_err(|error| fault::plain(error, format, &self.limits, self.allow_partial))?;
         check_size(&self.limits, size)?;
         Ok(size)
     }
