@@ -17,4 +17,5 @@ mod orientation;
 #[path = "../pictures/mod.rs"]
 mod pictures;
 mod room;
+mod square;
 mod tiff;

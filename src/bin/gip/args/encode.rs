@@ -20,12 +20,13 @@ use super::values::{ThreadCount, number};
 /// become RGB.
 ///
 /// Colours: an ICC profile is kept, if it is one of gray or RGB. What a PNG says by cICP, or by gAMA and
-/// cHRM, becomes a profile, or sRGB if it is only a gamma; so does the Adobe RGB of a camera's Exif. What cannot be kept, such as PQ and HLG,
-/// is told.
+/// cHRM, becomes a profile, or sRGB if it is only a gamma; so does the Adobe RGB of a camera's Exif. What cannot
+/// be kept, such as PQ and HLG, is told.
 ///
 /// The picture is stored upright: an Exif orientation is applied to the pixels, and reset in Exif and XMP. ICC
 /// profile, Exif and XMP are stored; of the tags of a TIFF those of description, artist, copyright, camera, dates
-/// and resolution, as Exif. Texts of PNG and IPTC are not read. More is in docs/metadata.md.
+/// and resolution, as Exif. Texts of PNG and IPTC are not read, nor are other resolutions, but pixels that are not
+/// square are told. More is in docs/metadata.md.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,

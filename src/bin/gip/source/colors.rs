@@ -1,9 +1,7 @@
 //! What files say about their colours beside an ICC profile.
 
-use std::io::Cursor;
 use std::ops::RangeInclusive;
 
-use exr::meta::header::Header;
 use image::DynamicImage;
 use image_gip::Metadata;
 use moxcms::{
@@ -13,7 +11,7 @@ use moxcms::{
 use png::{CodingIndependentCodePoints, Info, SourceChromaticities};
 
 use super::light;
-use super::stored::{Stored, left_out};
+use super::stored::Stored;
 
 /// The gamma that stands for sRGB, and how far others that do may be from it.
 const SRGB_GAMMA: f64 = 0.454_55;
@@ -29,15 +27,10 @@ const SAME_CHROMATICITY: f64 = 0.002;
 /// x and y of sRGB's white, red, green and blue.
 const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
 
-/// The channels of OpenEXR that are taken, but for alpha.
-const COLORS: [&str; 3] = ["R", "G", "B"];
-
 /// Applies the chunks of a PNG, of which the first of cICP, iCCP, sRGB, and gAMA with cHRM counts (PNG,
 /// third edition, 4.3). A gamma alone is turned to that of sRGB, and what has other colours gets a
 /// profile.
-pub(super) fn of_png(file: &[u8], stored: &mut Stored) {
-    let Ok(reader) = png::Decoder::new(Cursor::new(file)).read_info() else { return };
-    let info = reader.info();
+pub(super) fn of_png(info: &Info<'_>, stored: &mut Stored) {
     let is_gray =
         matches!(stored.image, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_))
             || matches!(stored.image, DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_));
@@ -136,12 +129,7 @@ fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stor
     let is_srgb_gamma = gamma.is_none_or(|gamma| (gamma / SRGB_GAMMA - 1.0).abs() < SAME_GAMMA);
     let chromaticities = info.chrm_chunk.filter(|_| !is_gray).map(points);
     let chromaticities = chromaticities.filter(|points| invalid("cHRM", is_color_space(points)));
-    let others = chromaticities.filter(|points| {
-        let pairs = points.iter().zip(SRGB);
-        pairs.into_iter().any(|(&(x, y), (u, v))| {
-            (x - u).abs() > SAME_CHROMATICITY || (y - v).abs() > SAME_CHROMATICITY
-        })
-    });
+    let others = chromaticities.filter(|points| !is_srgb(points));
     match (others, gamma) {
         (None, Some(gamma)) if !is_srgb_gamma => {
             light::from_power(&mut stored.image, 1.0 / gamma);
@@ -172,6 +160,13 @@ fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stor
             }
         }
     }
+}
+
+/// Whether chromaticities of white, red, green and blue are those of sRGB.
+pub(super) fn is_srgb(points: &[(f64, f64); 4]) -> bool {
+    points.iter().zip(SRGB).all(|(&(x, y), (u, v))| {
+        (x - u).abs() <= SAME_CHROMATICITY && (y - v).abs() <= SAME_CHROMATICITY
+    })
 }
 
 /// Whether red, green and blue make a triangle that the white, which is the first, is in.
@@ -211,40 +206,4 @@ pub(super) fn of_exif(metadata: &mut Metadata) {
     if metadata.icc_profile.is_none() && metadata.is_adobe_rgb() {
         metadata.icc_profile = ColorProfile::new_adobe_rgb().encode().ok();
     }
-}
-
-/// What of an OpenEXR file's channels and colours is lost.
-pub(super) fn lost_of_exr(file: &[u8]) -> Vec<String> {
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false);
-    let headers = meta.map(|meta| meta.headers).unwrap_or_default();
-    // As in `image`, the first that has these is taken.
-    let count = |header: &Header, names: &[&str]| {
-        let channels = header.channels.list.iter();
-        channels.filter(|channel| names.iter().any(|name| channel.name.eq(name))).count()
-    };
-    let Some(header) = headers.iter().find(|header| !header.deep && count(header, &COLORS) == 3)
-    else {
-        return Vec::new();
-    };
-    let all = header.channels.list.len();
-    let extra = all - 3 - count(header, &["A"]);
-    let primaries = header.shared_attributes.chromaticities.filter(|found| {
-        let points = [found.white, found.red, found.green, found.blue];
-        points.into_iter().zip(SRGB).any(|(exr::math::Vec2(x, y), (u, v))| {
-            (f64::from(x) - u).abs() > SAME_CHROMATICITY
-                || (f64::from(y) - v).abs() > SAME_CHROMATICITY
-        })
-    });
-    let primaries = primaries.map(|_| {
-        "its primaries (chromaticities) cannot be kept, and are taken as sRGB's".to_owned()
-    });
-    left_out(extra, all).into_iter().chain(primaries).collect()
-}
-
-/// What of a Radiance file's colours is lost.
-pub(super) fn lost_of_hdr(file: &[u8]) -> Option<String> {
-    let decoder = image::codecs::hdr::HdrDecoder::new(Cursor::new(file)).ok()?;
-    let attributes = decoder.metadata().custom_attributes;
-    let (_, primaries) = attributes.iter().find(|(name, _)| name == "PRIMARIES")?;
-    Some(format!("its primaries ({}) cannot be kept, and are taken as sRGB's", primaries.trim()))
 }

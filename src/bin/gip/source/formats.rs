@@ -10,7 +10,9 @@ use image_gip::Limits;
 use super::fault::{self, Fault, SHORT};
 use super::frames::{self, Others};
 use super::stored::{Stored, partly};
-use super::{clipping, colors, ico, jpeg, light, metadata, png_chunks, screen, webp};
+use super::{
+    clipping, colors, exr, hdr, ico, jpeg, light, metadata, png_chunks, screen, square, webp,
+};
 use crate::limits::check_size;
 use crate::picture::DAMAGED_PROFILE;
 
@@ -77,7 +79,8 @@ pub(super) fn read(
     let (metadata, loss) = metadata::read(&mut decoder, file)?;
     // The decoders of `image` know nothing of the prefix that was removed from Exif.
     let orientation = metadata.orientation();
-    let others = Others::of(format, file);
+    let png = (format == ImageFormat::Png).then(|| png_chunks::info(file)).flatten();
+    let others = Others::of(format, file, png.as_ref());
     warnings.extend(others.warning.or_else(|| ico::warning(icon?)));
     warnings.extend(loss.map(|loss| loss.to_string()));
     if metadata.icc_profile.is_none() && jpeg.as_ref().is_some_and(|jpeg| jpeg.has_profile) {
@@ -104,11 +107,21 @@ pub(super) fn read(
     let mut stored = Stored { image: light::encoded(image), orientation, metadata, warnings };
     match format {
         ImageFormat::Jpeg => colors::of_exif(&mut stored.metadata),
-        ImageFormat::Png => colors::of_png(file, &mut stored),
-        ImageFormat::OpenExr => stored.warnings.extend(colors::lost_of_exr(file)),
-        ImageFormat::Hdr => stored.warnings.extend(colors::lost_of_hdr(file)),
+        ImageFormat::OpenExr => stored.warnings.extend(exr::lost(file)),
+        ImageFormat::Hdr => stored.warnings.extend(hdr::lost(file)),
         _ => {}
     }
+    if let Some(png) = &png {
+        colors::of_png(png, &mut stored);
+    }
+    let density = match format {
+        ImageFormat::Png => png.as_ref().and_then(square::of_png),
+        ImageFormat::Jpeg => jpeg.as_ref().and_then(|jpeg| jpeg.density),
+        ImageFormat::Gif => square::of_gif(file),
+        ImageFormat::Bmp => square::of_bmp(file),
+        _ => None,
+    };
+    stored.warnings.extend(density.and_then(|density| square::warning(density, orientation)));
     Ok(stored)
 }
 

@@ -4,6 +4,7 @@ use std::io::Cursor;
 
 use image::ImageFormat;
 use image::codecs::pnm::{PnmDecoder, PnmHeader, PnmSubtype, SampleEncoding};
+use png::Info;
 
 use super::fault::{self, SHORT};
 
@@ -17,13 +18,13 @@ pub(super) struct Others {
 }
 
 impl Others {
-    pub(super) fn of(format: ImageFormat, file: &[u8]) -> Self {
+    /// `png`: the header, if it is a PNG.
+    pub(super) fn of(format: ImageFormat, file: &[u8], png: Option<&Info<'_>>) -> Self {
         let warning = match format {
             ImageFormat::Gif => return Self::after_first("frames", gif_frames(file)),
             ImageFormat::Pnm => return Self::after_first("pictures", pnm_pictures(file)),
-            ImageFormat::Png => png_warning(file),
+            ImageFormat::Png => png.and_then(png_warning),
             ImageFormat::WebP => webp_frames(file).and_then(|count| first_of(count, "frames")),
-            ImageFormat::OpenExr => exr_warning(file),
             _ => None,
         };
         Self { warning, damage: None }
@@ -56,10 +57,9 @@ fn gif_frames(file: &[u8]) -> (usize, Option<&'static str>) {
 }
 
 /// The picture that is read may be the first of the animation, or one beside it.
-fn png_warning(file: &[u8]) -> Option<String> {
-    let reader = png::Decoder::new(Cursor::new(file)).read_info().ok()?;
-    let count = reader.info().animation_control?.num_frames;
-    if reader.info().frame_control.is_some() {
+fn png_warning(info: &Info<'_>) -> Option<String> {
+    let count = info.animation_control?.num_frames;
+    if info.frame_control.is_some() {
         return first_of(count as usize, "frames");
     }
     Some(format!("the still picture is taken, and its animation of {count} frames is not"))
@@ -68,12 +68,6 @@ fn png_warning(file: &[u8]) -> Option<String> {
 fn webp_frames(file: &[u8]) -> Option<usize> {
     let decoder = image_webp::WebPDecoder::new(Cursor::new(file)).ok()?;
     decoder.is_animated().then(|| decoder.num_frames() as usize)
-}
-
-fn exr_warning(file: &[u8]) -> Option<String> {
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false).ok()?;
-    let count = meta.headers.len();
-    (count > 1).then(|| format!("only the first of its {count} layers that is RGB is taken"))
 }
 
 /// Pictures that follow each other. One of plain text is alone.

@@ -2,12 +2,14 @@
 
 mod clipping;
 mod colors;
+mod exr;
 mod extended_xmp;
 mod fault;
 mod format;
 mod formats;
 mod frames;
 mod gip;
+mod hdr;
 mod ico;
 mod jpeg;
 mod light;
@@ -15,6 +17,7 @@ mod metadata;
 mod png_chunks;
 mod read;
 mod screen;
+mod square;
 mod stored;
 mod tiff;
 mod webp;

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::io::Cursor;
 use std::ops::Range;
 
+use png::Info;
+
 /// Bytes of the signature, and of length, name and checksum of a chunk.
 const SIGNATURE: usize = 8;
 const AROUND: usize = 12;
@@ -14,8 +16,8 @@ const BEFORE: &[u8] =
 const AFTER: &[u8] = b"\0\0\0\x01IDAT";
 
 /// Chunks that the picture can do without, and whose meaning does not depend on others.
-const OPTIONAL: [&[u8]; 8] =
-    [b"cHRM", b"cICP", b"cLLI", b"eXIf", b"gAMA", b"iCCP", b"mDCV", b"sRGB"];
+const OPTIONAL: [&[u8]; 9] =
+    [b"cHRM", b"cICP", b"cLLI", b"eXIf", b"gAMA", b"iCCP", b"mDCV", b"pHYs", b"sRGB"];
 
 /// The file without those [`OPTIONAL`] chunks before the samples that cannot be read, and a warning of
 /// each. The library ignores some of them without a word, and takes others for an error.
@@ -56,6 +58,12 @@ pub(super) fn is_cut(file: &[u8]) -> bool {
     !chunks(file).any(|range| file[range][4..8] == *b"IEND")
 }
 
+/// What the chunks before the samples say; `None` if they are damaged.
+pub(super) fn info(file: &[u8]) -> Option<Info<'static>> {
+    let reader = png::Decoder::new(Cursor::new(file)).read_info().ok()?;
+    Some(reader.info().clone())
+}
+
 /// Where each chunk is that is whole.
 fn chunks(file: &[u8]) -> impl Iterator<Item = Range<usize>> {
     let mut at = SIGNATURE;
@@ -70,14 +78,14 @@ fn chunks(file: &[u8]) -> impl Iterator<Item = Range<usize>> {
 /// Whether the library gets from a chunk what it is for.
 fn is_readable(name: &[u8], chunk: &[u8]) -> bool {
     let file = [BEFORE, chunk, AFTER].concat();
-    let Ok(reader) = png::Decoder::new(Cursor::new(file)).read_info() else { return false };
-    let info = reader.info();
+    let Some(info) = info(&file) else { return false };
     match name {
         b"cICP" => info.coding_independent_code_points.is_some(),
         b"iCCP" => info.icc_profile.is_some(),
         b"sRGB" => info.srgb.is_some(),
         b"gAMA" => info.gama_chunk.is_some(),
         b"cHRM" => info.chrm_chunk.is_some(),
+        b"pHYs" => info.pixel_dims.is_some(),
         b"eXIf" => info.exif_metadata.is_some(),
         // What nothing is made of.
         _ => true,

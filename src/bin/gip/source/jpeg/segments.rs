@@ -98,6 +98,10 @@ impl Segments {
             }
             0xE0 => {
                 survey.is_jfif |= payload.starts_with(b"JFIF\0");
+                if let [b'J', b'F', b'I', b'F', 0, _, _, _, x1, x0, y1, y0, ..] = *payload {
+                    let number = |high, low| u16::from_be_bytes([high, low]).into();
+                    survey.density = Some((number(x1, x0), number(y1, y0)));
+                }
                 true
             }
             0xE2 => {

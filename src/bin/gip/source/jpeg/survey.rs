@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::bits::Damage;
+use crate::source::square::Density;
 
 /// The last marker.
 const END: &[u8] = &[0xFF, 0xD9];
@@ -20,6 +21,8 @@ pub(crate) struct Survey {
     /// Where a segment begins that the file ends in.
     pub(super) cut: Option<usize>,
     pub(super) is_jfif: bool,
+    /// Pixels per unit that JFIF gives.
+    pub(crate) density: Option<Density>,
     /// The colour transform that Adobe's segment gives.
     pub(super) adobe: Option<u8>,
     /// The components' identifiers.

@@ -13,8 +13,8 @@ use crate::limits::check_size;
 use crate::picture::DAMAGED_PROFILE;
 use crate::source::fault::{Fault, SHORT};
 use crate::source::frames::Others;
-use crate::source::jpeg;
 use crate::source::stored::{Stored, left_out, partly};
+use crate::source::{jpeg, square};
 
 /// Width and height in pixels.
 pub(crate) fn dimensions(file: impl BufRead + Seek) -> Result<(u32, u32)> {
@@ -34,10 +34,12 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     let mut metadata = Metadata::default();
     metadata.icc_profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
     let has_profile = matches!(decoder.find_tag(Tag::IccProfile), Err(_) | Ok(Some(_)));
-    metadata.set_exif_of_tiff(file);
     metadata.xmp = decoder.get_tag_u8_vec(Tag::Unknown(700)).ok();
+    metadata.set_exif_of_tiff(file);
     let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?;
-    let orientation = orientation.and_then(|code| Orientation::from_exif(code.min(255) as u8));
+    let orientation = orientation
+        .and_then(|code| Orientation::from_exif(code.min(255) as u8))
+        .unwrap_or_default();
 
     let others = Others::after_first("pages", pages::pages(file));
     let mut warnings: Vec<_> = others.warning.into_iter().collect();
@@ -65,7 +67,7 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     } else if tags.has_colorimetry && metadata.icc_profile.is_none() {
         warnings.push("its white point, primaries or transfer function cannot be kept".into());
     }
+    warnings.extend(tags.density.and_then(|density| square::warning(density, orientation)));
     let image = colors::picture(samples, &tags).context("it has too few samples")?;
-    let orientation = orientation.unwrap_or_default();
     Ok(Stored { image, orientation, metadata, warnings })
 }

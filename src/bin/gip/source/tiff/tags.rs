@@ -4,7 +4,13 @@ use std::io::Cursor;
 
 use tiff::TiffResult;
 use tiff::decoder::Decoder;
+use tiff::decoder::ifd::Value;
 use tiff::tags::Tag;
+
+use crate::source::square::Density;
+
+const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
+const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
 /// What samples mean, as the tag `PhotometricInterpretation` says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +45,8 @@ pub(super) struct Tags {
     pub(super) luma: [f32; 3],
     /// Black and white of luma, then zero and full of each chroma, as samples of 8 bits.
     pub(super) range: [f32; 6],
+    /// Pixels per unit.
+    pub(super) density: Option<Density>,
     /// Whether colours are described by tags that are not taken into account.
     pub(super) has_colorimetry: bool,
 }
@@ -107,12 +115,11 @@ impl Tags {
             // Some programs leave out what the one more sample is.
             None => (samples == photometric.colors() + 1).then_some(Alpha::Unassociated),
         };
-        let mut floats = |tag, default: &[f32]| -> Vec<f32> {
-            let found = decoder.get_tag_f32_vec(Tag::Unknown(tag)).ok();
-            found.filter(|found| found.len() == default.len()).unwrap_or_else(|| default.to_vec())
-        };
-        let luma = floats(529, &[0.299, 0.587, 0.114]);
-        let range = floats(532, &[0.0, 255.0, 128.0, 255.0, 128.0, 255.0]);
+        let luma = numbers(decoder, YCBCR_COEFFICIENTS).unwrap_or([0.299, 0.587, 0.114]);
+        let range = numbers(decoder, REFERENCE_BLACK_WHITE);
+        let range = range.unwrap_or([0.0, 255.0, 128.0, 255.0, 128.0, 255.0]);
+        let density = [Tag::XResolution, Tag::YResolution].map(|tag| numbers(decoder, tag));
+        let density = density[0].zip(density[1]).map(|([across], [down])| (across, down));
         let subsampling = match many(decoder, Tag::ChromaSubsampling)?[..] {
             [across, down] => (across, down),
             _ => (2, 2),
@@ -129,9 +136,30 @@ impl Tags {
             is_jpeg: one(decoder, Tag::Compression, 1)? == 7,
             color_map: many(decoder, Tag::ColorMap)?,
             subsampling,
-            luma: luma.try_into().unwrap_or_default(),
-            range: range.try_into().unwrap_or_default(),
+            luma: luma.map(|weight| weight as f32),
+            range: range.map(|sample| sample as f32),
+            density,
             has_colorimetry,
         }))
     }
+}
+
+/// The numbers of a tag; `None` if it has not so many.
+fn numbers<const N: usize>(decoder: &mut Decoder<Cursor<&[u8]>>, tag: Tag) -> Option<[f64; N]> {
+    let list = match decoder.find_tag(tag).ok()?? {
+        Value::List(list) => list,
+        one => vec![one],
+    };
+    let number = |value| {
+        let number = match value {
+            Value::Rational(numerator, denominator) => {
+                f64::from(numerator) / f64::from(denominator)
+            }
+            Value::Float(number) => number.into(),
+            Value::Double(number) => number,
+            other => other.into_u32().ok()?.into(),
+        };
+        number.is_finite().then_some(number)
+    };
+    list.into_iter().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
 }
