@@ -1,6 +1,10 @@
 //! TIFF as other programs write it: palettes, floats, other colour models, alpha that was multiplied.
 
+use std::io::Cursor;
+
 use image::{DynamicImage, GenericImageView, ImageReader, Rgba};
+use tiff::encoder::{Rational, TiffEncoder, colortype};
+use tiff::tags::Tag;
 
 use super::room::{Room, text};
 
@@ -168,6 +172,70 @@ fn other_colour_models() {
     room.write("a.tif", file((4, 2), &tags, &[0; 12]));
     let error = room.fails(&["encode", "a.tif", "a.gip"]);
     assert!(error.contains("chroma"), "{error}");
+}
+
+#[test]
+fn weights_and_range_of_luma_and_chroma() {
+    let room = Room::new();
+    // As in ITU-R BT.709.
+    let samples = [[235, 128, 128], [16, 128, 128], [118, 128, 128], [63, 102, 240]].concat();
+    let pixels = colors(&[[255, 255, 255], [0, 0, 0], [119, 119, 119], [255, 0, 0]]);
+    let rationals = |numbers: &[u32], d| numbers.iter().map(|&n| Rational { n, d }).collect();
+    let weights: Vec<_> = rationals(&[2126, 7152, 722], 10_000);
+    let range: Vec<_> = rationals(&[16, 235, 128, 240, 128, 240], 1);
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file).expect("in memory");
+    let mut page = encoder.new_image::<colortype::YCbCr8>(4, 1).expect("in memory");
+    let tags = page.encoder();
+    tags.write_tag(Tag::ChromaSubsampling, &[1_u16, 1][..]).expect("in memory");
+    tags.write_tag(Tag::Unknown(529), &weights[..]).expect("in memory");
+    tags.write_tag(Tag::Unknown(532), &range[..]).expect("in memory");
+    page.write_data(&samples).expect("in memory");
+    assert_read(&room, &file.into_inner(), &pixels, 2);
+}
+
+#[test]
+fn a_profile_or_xmp_outside_of_the_file_is_told() {
+    let room = Room::new();
+    let mut profile = [7; 200];
+    profile[..4].copy_from_slice(&200_u32.to_be_bytes());
+    profile[16..20].copy_from_slice(b"GRAY");
+    for (tag, name, expected) in [
+        (Tag::IccProfile, "icc_profile", "its ICC profile is damaged and cannot be kept"),
+        (Tag::Unknown(700), "xmp", "the XMP is damaged and was dropped"),
+    ] {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).expect("in memory");
+        let mut page = encoder.new_image::<colortype::Gray8>(4, 1).expect("in memory");
+        page.encoder().write_tag(tag, &profile[..]).expect("in memory");
+        page.write_data(&[1, 2, 3, 4]).expect("in memory");
+        let file = file.into_inner();
+        let start = [tag.to_u16().to_le_bytes(), [1, 0], [200, 0], [0, 0]].concat();
+        let entry = file.windows(8).position(|bytes| bytes == start).expect("an entry");
+        let with = |at: usize, number: u32| {
+            let mut file = file.clone();
+            file[at..at + 4].copy_from_slice(&number.to_le_bytes());
+            file
+        };
+        let (length, offset) = (entry + 4, entry + 8);
+        for (file, is_kept) in [
+            (file.clone(), true),
+            (with(offset, file.len() as u32), false),
+            (with(offset, file.len() as u32 - 199), false),
+            (with(offset, u32::MAX), false),
+            (with(length, 1 << 20), false),
+            (with(length, u32::MAX), false),
+        ] {
+            room.write("a.tif", file);
+            let output = room.run(&["encode", "a.tif", "a.gip", "--effort", "1"]);
+            let printed = text(&output.stderr);
+            assert!(output.status.success(), "{printed}");
+            let warning = format!("warning: a.tif: {expected}\n");
+            assert_eq!(printed, if is_kept { "" } else { &warning });
+            let kept = room.json(&["info", "a.gip", "--json"])["metadata"][name].as_u64();
+            assert_eq!(kept, is_kept.then_some(200));
+        }
+    }
 }
 
 #[test]

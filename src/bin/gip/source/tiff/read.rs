@@ -3,8 +3,9 @@
 use std::io::{BufRead, Cursor, Seek};
 
 use anyhow::{Context, Result, bail};
-use image_gip::{Limits, Metadata, Orientation};
+use image_gip::{Limits, Metadata, MetadataLoss, Orientation};
 use tiff::decoder::Decoder;
+use tiff::decoder::ifd::Value;
 use tiff::tags::Tag;
 
 use super::tags::{Photometric, Tags};
@@ -15,6 +16,8 @@ use crate::source::fault::{Fault, SHORT};
 use crate::source::frames::Others;
 use crate::source::stored::{Stored, left_out, partly};
 use crate::source::{jpeg, square};
+
+const XMP: Tag = Tag::Unknown(700);
 
 /// Width and height in pixels.
 pub(crate) fn dimensions(file: impl BufRead + Seek) -> Result<(u32, u32)> {
@@ -32,9 +35,17 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
         bail!("YCbCr with fewer samples of chroma is read only from JPEG data");
     }
     let mut metadata = Metadata::default();
-    metadata.icc_profile = decoder.get_tag_u8_vec(Tag::IccProfile).ok();
-    let has_profile = matches!(decoder.find_tag(Tag::IccProfile), Err(_) | Ok(Some(_)));
-    metadata.xmp = decoder.get_tag_u8_vec(Tag::Unknown(700)).ok();
+    let mut lost = Vec::new();
+    let mut bytes = |tag, damaged: &str| {
+        let value =
+            decoder.find_tag(tag).and_then(|value| value.map(Value::into_u8_vec).transpose());
+        value.unwrap_or_else(|_| {
+            lost.push(damaged.to_owned());
+            None
+        })
+    };
+    metadata.icc_profile = bytes(Tag::IccProfile, DAMAGED_PROFILE);
+    metadata.xmp = bytes(XMP, &MetadataLoss::DamagedXmp.to_string());
     metadata.set_exif_of_tiff(file);
     let orientation = decoder.find_tag_unsigned::<u16>(Tag::Orientation)?;
     let orientation = orientation
@@ -43,9 +54,7 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
 
     let others = Others::after_first("pages", pages::pages(file));
     let mut warnings: Vec<_> = others.warning.into_iter().collect();
-    if has_profile && metadata.icc_profile.is_none() {
-        warnings.push(DAMAGED_PROFILE.to_owned());
-    }
+    warnings.extend(lost);
     warnings.extend(left_out(tags.extra_channels(), tags.samples));
     let mut damage = others.damage;
     if tags.is_jpeg {
