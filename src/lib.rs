@@ -13,8 +13,8 @@
 //! whose sum is a picture (the representation of GaussianImage++). It can be rendered at any size
 //! and in any part, at a cost that follows what is shown. Every prefix of the file that
 //! includes the header gives a picture, which every layer improves. The decoder's arithmetic is
-//! specified to the last bit, so the samples are the same on all machines. Until its first release,
-//! version 1 of the format may still be corrected; from then on it does not change.
+//! specified to the last bit, so the samples are the same on all machines. Version 1 of the format may
+//! change until its first release, and not after it.
 //!
 //! # Encode and decode
 //!

@@ -6,8 +6,8 @@ use common::entropy::Code;
 use common::{File, Ghdr, RGB, chunk, decode, of_chunks};
 use image_gip::Decoder;
 
-/// `buf_independent`: two layers so short that they are read at once, the first without its last word,
-/// the second with a wrong CRC. The second was what the decoder complained about.
+/// Of the target `buf_independent`: two layers so short that they are read at once, the first without its
+/// last word, the second with a wrong CRC. The error must be that of the first.
 #[test]
 fn what_is_wrong_with_the_first_layer_is_told_first() {
     let header = Ghdr { color: RGB, ..Ghdr::default() };

@@ -10,7 +10,7 @@ use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
 use crate::layers::plan;
 
-/// The version that this crate reads and writes. Version 0 was a draft.
+/// The version that this crate reads and writes.
 pub(crate) const VERSION: u8 = 1;
 /// Largest width and height of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;

@@ -507,7 +507,7 @@ fn wrong_usage_exits_with_2() {
         (&encode, &["--psnr", "-3"], "from 1 to 120"),
         (&encode, &["--psnr", "NaN"], "from 1 to 120"),
         (&encode, &["--psnr", "inf"], "from 1 to 120"),
-        (&encode, &["--bpp", "0"], "from 0.0001 to 1000"),
+        (&encode, &["--bpp", "0"], "from 0.000001 to 1000000"),
         (&encode, &["--quality", "101"], "from 0 to 100"),
         (&encode, &["--bytes", "0"], "1..=1073741824"),
         (&encode, &["--gaussians", "-5"], "1..=4194304"),

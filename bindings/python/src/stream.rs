@@ -143,8 +143,8 @@ impl StreamDecoder {
         objects::gaussians(py, stream.gaussians(), header.color.channels())
     }
 
-    /// How many Gaussians are enough for a preview of this size in pixels: one for 12 pixels, but at
-    /// least a sixth of all, and at most all. The first Gaussians of a file are the strongest.
+    /// How many Gaussians are enough for a preview of this size in pixels: a sixth of all where that is
+    /// one for every 16 pixels, and all of them otherwise. The first Gaussians of a file are the strongest.
     ///
     /// Raises:
     ///     ValueError: The header has not arrived yet, or a side is out of range.

@@ -2,11 +2,11 @@
 //
 //     npm run build && npm install --no-save sharp
 //     cargo build --release --manifest-path benchmarks/Cargo.toml
-//     node benchmarks/run.mjs [FOLDER] [COUNT]
+//     node benchmarks/run.mjs FOLDER [COUNT]
 //
-// FOLDER has pictures, by default ../../shared/data/kodak; the first COUNT (6) of them are encoded at 0.5
-// bits per pixel by the tool `gip` (the variable GIP, or ../../target/release/gip), and as WebP and AVIF
-// with the most bytes that are not more. All decoders take turns in one run.
+// The first COUNT (6) pictures of FOLDER are encoded at 0.5 bits per pixel by the tool `gip` (the variable
+// GIP, or ../../target/release/gip), and as WebP and AVIF with the most bytes that are not more. All
+// decoders take turns in one run.
 
 import { execFileSync, spawn } from 'node:child_process';
 import { existsSync, mkdirSync, readFileSync, readdirSync } from 'node:fs';
@@ -21,8 +21,8 @@ import { launch } from '../tests/browser.js';
 import { serve, slow } from '../tests/server.js';
 
 const root = fileURLToPath(new URL('..', import.meta.url));
-const folder = process.argv[2] ?? join(root, '../../shared/data/kodak');
-const count = Number(process.argv[3] ?? 6);
+const [folder, count = 6] = process.argv.slice(2);
+if (folder === undefined) throw new Error('usage: node benchmarks/run.mjs FOLDER [COUNT]');
 const rounds = 60;
 
 function printSizes() {

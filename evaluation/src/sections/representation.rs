@@ -133,9 +133,9 @@ fn large_pictures(large: &DataSet<'_>, store: &mut FitStore) -> Result<String> {
     let described: Vec<String> = described.collect();
     Ok(format!(
         "\n### Pictures of 2K\n\nCompared with: GaussianImage and GaussianImage++ on the same \
-         pictures, all else as above. The paper's larger pictures are those of DIV2K (100 for \
-         validation, 2,040 pixels on the longer side), which could not be had. These stand in for \
-         them: {}. Rows marked as printed are from the paper's table 1 for DIV2K, so of other \
+         pictures, all else as above. In place of DIV2K, the paper's larger pictures (100 for \
+         validation, 2,040 pixels on the longer side), which are for academic research alone, these \
+         are compared: {}. Rows marked as printed are from the paper's table 1 for DIV2K, so of other \
          pictures: only their differences from each other compare with ours.\n{}",
         described.join(", "),
         large.tables(store, counts)?,

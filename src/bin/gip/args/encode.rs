@@ -121,9 +121,9 @@ struct TargetArgs {
     #[arg(long, help_heading = "Targets", value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..=4_194_304))]
     gaussians: Option<u32>,
-    /// A file of at most B bits per pixel, from 0.0001 to 1000.
+    /// A file of at most B bits per pixel, from 0.000001 to 1000000.
     #[arg(long, help_heading = "Targets", value_name = "B",
-          value_parser = |text: &str| number(text, 0.0001, 1000.0))]
+          value_parser = |text: &str| number(text, 1e-6, 1e6))]
     bpp: Option<f64>,
     /// A file of at most N bytes, from 1 to 1073741824.
     #[arg(long, help_heading = "Targets", value_name = "N",
