@@ -11,6 +11,7 @@ use super::room::{Room, text};
 /// The tags that say how many bits a sample has, what samples mean, and how many a pixel has.
 const BITS: u16 = 258;
 const PHOTOMETRIC: u16 = 262;
+const FILL_ORDER: u16 = 266;
 const SAMPLES: u16 = 277;
 const COLOR_MAP: u16 = 320;
 const EXTRA_SAMPLES: u16 = 338;
@@ -92,6 +93,14 @@ fn gray_of_few_bits_or_inverted() {
         let tags: [(u16, &[u32]); 2] = [(BITS, &[bits]), (PHOTOMETRIC, &[photometric])];
         assert_read(&room, &file((4, 1), &tags, samples), &gray(expected), 0);
     }
+}
+
+#[test]
+fn the_first_pixel_may_be_in_the_lowest_bits() {
+    let room = Room::new();
+    let tags: [(u16, &[u32]); 3] = [(BITS, &[1]), (PHOTOMETRIC, &[1]), (FILL_ORDER, &[2])];
+    let file = file((10, 1), &tags, &[0b0000_0110, 0b10]);
+    assert_read(&room, &file, &gray(&[0, 255, 255, 0, 0, 0, 0, 0, 0, 255]), 0);
 }
 
 #[test]

@@ -37,8 +37,11 @@ pub(crate) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
     let mut metadata = Metadata::default();
     let mut lost = Vec::new();
     let mut bytes = |tag, damaged: &str| {
-        let value =
-            decoder.find_tag(tag).and_then(|value| value.map(Value::into_u8_vec).transpose());
+        let bytes = |value| match value {
+            Value::Ascii(text) => Ok(text.into_bytes()),
+            other => other.into_u8_vec(),
+        };
+        let value = decoder.find_tag(tag).and_then(|value| value.map(bytes).transpose());
         value.unwrap_or_else(|_| {
             lost.push(damaged.to_owned());
             None

@@ -7,7 +7,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
 
-use super::strips::strips;
+use super::strips::{reverse_bits, strips};
 use super::tags::Tags;
 use crate::limits::MemoryLimit;
 use crate::source::{clipping, fault};
@@ -34,6 +34,10 @@ pub(super) fn read(
 ) -> Result<(Samples, Option<&'static str>, Option<String>)> {
     let (limits, over) = (limits(max_memory, tags), MemoryLimit { allowed: max_memory });
     let mut file = without_colors(file).context("the directory of the page is damaged")?;
+    if tags.is_reversed && !tags.is_jpeg {
+        let strips = strips(&mut Decoder::new(Cursor::new(&file[..]))?)?;
+        reverse_bits(&mut file, &strips);
+    }
     let mut decoder = Decoder::new(Cursor::new(&file[..]))?.with_limits(limits.clone());
     let layout = decoder.image_buffer_layout()?;
     let mut decoded = DecodingResult::U8(Vec::new());

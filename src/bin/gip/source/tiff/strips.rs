@@ -26,3 +26,16 @@ pub(super) fn strips(decoder: &mut Decoder<Cursor<&[u8]>>) -> TiffResult<Vec<(u6
     let lengths = numbers([Tag::StripByteCounts, Tag::TileByteCounts])?;
     Ok(offsets.into_iter().zip(lengths).collect())
 }
+
+/// Reverses the bits of each byte of strips or tiles, but of no more bytes than the file has: those that share
+/// some are damaged, and could take long.
+pub(super) fn reverse_bits(file: &mut [u8], strips: &[(u64, u64)]) {
+    let mut left = file.len();
+    for &(start, length) in strips {
+        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        let Some(rest) = file.get_mut(start..) else { continue };
+        let length = usize::try_from(length).unwrap_or(usize::MAX).min(rest.len()).min(left);
+        rest[..length].iter_mut().for_each(|byte| *byte = byte.reverse_bits());
+        left -= length;
+    }
+}

@@ -38,6 +38,8 @@ pub(super) struct Tags {
     pub(super) alpha: Option<Alpha>,
     /// Whether the data of strips and tiles are JPEGs.
     pub(super) is_jpeg: bool,
+    /// Whether the first pixel is in the lowest bits of a byte.
+    pub(super) is_reversed: bool,
     pub(super) color_map: Vec<u16>,
     /// Pixels across and down that share their chroma.
     pub(super) subsampling: (u16, u16),
@@ -134,6 +136,7 @@ impl Tags {
             samples,
             alpha,
             is_jpeg: one(decoder, Tag::Compression, 1)? == 7,
+            is_reversed: one(decoder, Tag::FillOrder, 1)? == 2,
             color_map: many(decoder, Tag::ColorMap)?,
             subsampling,
             luma: luma.map(|weight| weight as f32),
