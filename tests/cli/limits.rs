@@ -46,6 +46,21 @@ fn a_picture_beyond_the_limits_is_refused_until_they_are_raised() {
 }
 
 #[test]
+fn a_png_of_any_size_is_refused_for_its_size() {
+    let room = Room::new();
+    room.save_picture("a.png", &pictures::picture((20, 16), ColorType::L8));
+    let mut file = room.read("a.png");
+    // Width and height, and the checksum of the header.
+    file[16..24].copy_from_slice(&[0x7F, 255, 255, 255].repeat(2));
+    let checksum = crc32fast::hash(&file[12..29]);
+    file[29..33].copy_from_slice(&checksum.to_be_bytes());
+    room.write("a.png", file);
+    let expected = "width: 2147483647 required, 65536 allowed";
+    assert!(room.fails(&["encode", "a.png", "a.gip"]).contains(expected));
+    assert!(room.batch(3, &["a.png", "--out", "out"]).1.contains(expected));
+}
+
+#[test]
 fn limits_may_be_lowered_too() {
     let room = Room::new();
     for source in ["a.png", "a.tif"] {

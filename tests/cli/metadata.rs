@@ -227,6 +227,23 @@ fn what_cannot_be_read_of_damaged_exif_is_told_where_it_is_filtered() {
 }
 
 #[test]
+fn exif_that_is_none_is_told() {
+    let room = Room::new();
+    let mut png = Vec::new();
+    let mut encoder = PngEncoder::new(&mut png);
+    encoder.set_exif_metadata(b"no Exif".to_vec()).expect("PNG has it");
+    let samples = pictures::picture(SIZE, ColorType::L8).into_bytes();
+    encoder.write_image(&samples, SIZE.0, SIZE.1, ColorType::L8.into()).expect("in memory");
+    for (name, file) in [("a.jpg", jpeg(Some(b"no Exif".to_vec()))), ("a.png", png)] {
+        room.write(name, file);
+        let output = room.run(&[&["encode", name, "a.gip"], &FAST[..]].concat());
+        assert!(output.status.success(), "{output:?}");
+        let expected = "the Exif is damaged, and what could not be read of it was dropped";
+        assert_eq!(text(&output.stderr), format!("warning: {name}: {expected}\n"));
+    }
+}
+
+#[test]
 fn extended_xmp_is_put_together_or_dropped_as_a_whole() {
     const GUID: &str = "0123456789ABCDEF0123456789ABCDEF";
     let room = Room::new();

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{BufRead, Cursor, Seek};
 
-use anyhow::{Result, bail};
+use anyhow::{Error, Result, bail};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use image_gip::Limits;
 
@@ -22,14 +22,13 @@ pub(super) fn dimensions(
     mut file: impl BufRead + Seek,
     limits: &Limits,
 ) -> Result<(u32, u32)> {
-    if format == ImageFormat::Png {
-        // Chunks that are damaged do not matter here.
-        return Ok(png::Decoder::new(file).read_header_info()?.size());
-    }
-    let error = match usual_decoder(format, &mut file, limits) {
-        Ok(decoder) => return Ok(decoder.dimensions()),
-        Err(error) => error,
+    let size = match format {
+        ImageFormat::Png => png_chunks::size(&mut file).map_err(Error::from),
+        _ => usual_decoder(format, &mut file, limits)
+            .map(|decoder| decoder.dimensions())
+            .map_err(Error::from),
     };
+    let Err(error) = size else { return size };
     let mut bytes = Vec::new();
     file.rewind()?;
     file.read_to_end(&mut bytes)?;
@@ -44,7 +43,7 @@ pub(super) fn dimensions(
         }
         damage = damage.or(jpeg.damage());
     }
-    Err(damage.map_or(error.into(), |damage| Fault::Damage(damage).into()))
+    Err(damage.map_or(error, |damage| Fault::Damage(damage).into()))
 }
 
 pub(super) fn read(
@@ -72,17 +71,23 @@ pub(super) fn read(
         _ => file,
     };
     let file = &file[..];
+    let png = (format == ImageFormat::Png).then(|| png_chunks::info(file)).flatten();
     let damage = damage.or_else(|| jpeg.as_ref()?.damage());
     let refused = |error| damage.map_or(error, |damage| Fault::Damage(damage).into());
+    if format == ImageFormat::Png
+        && let Ok(size) = png_chunks::size(Cursor::new(file))
+    {
+        // The decoder wants memory for rows at once, or finds the size too large for itself.
+        check_size(limits, size)?;
+    }
     let mut decoder = decoder(format, file, jpeg.as_ref(), limits).map_err(refused)?;
     check_size(limits, decoder.dimensions())?;
-    let (metadata, loss) = metadata::read(&mut decoder, file)?;
+    let (metadata, losses) = metadata::read(&mut decoder, file)?;
     // The decoders of `image` know nothing of the prefix that was removed from Exif.
     let orientation = metadata.orientation();
-    let png = (format == ImageFormat::Png).then(|| png_chunks::info(file)).flatten();
     let others = Others::of(format, file, png.as_ref());
     warnings.extend(others.warning.or_else(|| ico::warning(icon?)));
-    warnings.extend(loss.map(|loss| loss.to_string()));
+    warnings.extend(losses.iter().map(ToString::to_string));
     if metadata.icc_profile.is_none() && jpeg.as_ref().is_some_and(|jpeg| jpeg.has_profile) {
         warnings.push(DAMAGED_PROFILE.to_owned());
     }

@@ -5,17 +5,23 @@ use image_gip::{Metadata, MetadataLoss};
 
 use super::extended_xmp;
 
-/// Reads the metadata of a file before its pixels.
+/// Reads the metadata of a file before its pixels, and tells what of them is lost.
 pub(super) fn read(
     decoder: &mut impl ImageDecoder,
     file: &[u8],
-) -> ImageResult<(Metadata, Option<MetadataLoss>)> {
+) -> ImageResult<(Metadata, Vec<MetadataLoss>)> {
     let mut metadata = Metadata::default();
     metadata.icc_profile = decoder.icc_profile()?;
-    metadata.exif = decoder.exif_metadata()?.and_then(tiff_stream);
+    let exif = decoder.exif_metadata()?.filter(|exif| !exif.is_empty());
+    let has_exif = exif.is_some();
+    metadata.exif = exif.and_then(tiff_stream);
+    let is_damaged = has_exif && metadata.exif.is_none();
     metadata.xmp = decoder.xmp_metadata()?;
     let loss = metadata.join_xmp(|name| extended_xmp::find(file, name));
-    Ok((metadata, loss))
+    Ok((
+        metadata,
+        is_damaged.then_some(MetadataLoss::DamagedExif).into_iter().chain(loss).collect(),
+    ))
 }
 
 /// The TIFF stream of Exif metadata: some programs write the prefix of JPEG's Exif marker before

@@ -1,10 +1,10 @@
 //! What a PNG tells beside its picture in chunks that are damaged.
 
 use std::borrow::Cow;
-use std::io::Cursor;
+use std::io::{BufRead, Cursor, Seek};
 use std::ops::Range;
 
-use png::Info;
+use png::{DecodingError, Info};
 
 /// Bytes of the signature, and of length, name and checksum of a chunk.
 const SIGNATURE: usize = 8;
@@ -56,6 +56,11 @@ pub(super) fn without_damaged(file: &[u8]) -> (Cow<'_, [u8]>, Vec<String>) {
 /// Whether the file ends before its last chunk does.
 pub(super) fn is_cut(file: &[u8]) -> bool {
     !chunks(file).any(|range| file[range][4..8] == *b"IEND")
+}
+
+/// Width and height, whatever is damaged after the header.
+pub(super) fn size(file: impl BufRead + Seek) -> Result<(u32, u32), DecodingError> {
+    Ok(png::Decoder::new(file).read_header_info()?.size())
 }
 
 /// What the chunks before the samples say; `None` if they are damaged.
