@@ -284,6 +284,21 @@ fn dds_without_compression_is_refused_in_plain_words() {
 }
 
 #[test]
+fn a_file_that_is_something_else_than_its_name_says_is_told() {
+    let room = Room::new();
+    for (name, format) in [("a.jpg", "JPEG"), ("a.png", "PNG"), ("a.tif", "TIFF")] {
+        room.write(name, "<!DOCTYPE html><title>404 Not Found</title>");
+        let expected = format!("it does not begin like {format}, in spite of its name");
+        assert!(room.fails(&["encode", name, "a.gip"]).contains(&expected));
+        assert!(room.batch(3, &[name, "--out", "out"]).1.contains(&expected));
+    }
+    // A picture of another format is one all the same.
+    room.write("b.jpg", written(ImageFormat::Png));
+    room.write("b.png", written(ImageFormat::Png));
+    assert_eq!(room.ok(&["compare", "b.jpg", "b.png"]), "identical\n");
+}
+
+#[test]
 fn a_webp_has_as_many_bytes_as_it_says() {
     let room = Room::new();
     let file = written(ImageFormat::WebP);

@@ -16,9 +16,8 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// The format of the file with this name and these first bytes. A format without a signature is
-    /// recognized by its extension.
-    pub(super) fn of(path: &Path, start: &[u8]) -> Option<Self> {
+    /// The format of a file with these first bytes.
+    pub(super) fn by_signature(start: &[u8]) -> Option<Self> {
         if start.starts_with(b"\xC7GIP") {
             return Some(Self::Gip);
         }
@@ -26,13 +25,11 @@ impl Format {
         if start.starts_with(b"II+\0") || start.starts_with(b"MM\0+") {
             return Some(Self::Tiff);
         }
-        if let Ok(format) = image::guess_format(start) {
-            return Some(Self::from(format));
-        }
-        Self::by_name(path)
+        image::guess_format(start).ok().map(Self::from)
     }
 
-    fn by_name(path: &Path) -> Option<Self> {
+    /// The format that the extension of a name tells.
+    pub(super) fn by_name(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
         if extension.eq_ignore_ascii_case("gip") {
             return Some(Self::Gip);
@@ -67,6 +64,13 @@ impl Format {
                 _ => "picture",
             },
         }
+    }
+
+    /// Whether a file with these first bytes cannot be of this format, as it has none of its signatures. One
+    /// that ends in them may be. That of .gip is the decoder's concern.
+    pub(super) fn is_excluded(self, start: &[u8]) -> bool {
+        let has_signature = !matches!(self, Self::Gip | Self::Image(ImageFormat::Tga));
+        has_signature && start.len() >= START && Self::by_signature(start) != Some(self)
     }
 
     /// Whether there is a decoder. `image` denies the one that it has for DDS.

@@ -75,9 +75,13 @@ impl Reading {
 }
 
 fn format(path: &Path, start: &[u8]) -> Result<Format> {
-    let format = Format::of(path, start).context("the format is none of those that are read")?;
+    let format = Format::by_signature(start).or_else(|| Format::by_name(path));
+    let format = format.context("the format is none of those that are read")?;
     if !format.is_read() {
         bail!("{} is not read", format.name());
+    }
+    if format.is_excluded(start) {
+        bail!("it does not begin like {}, in spite of its name", format.name());
     }
     Ok(format)
 }
