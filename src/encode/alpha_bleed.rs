@@ -19,6 +19,7 @@ use super::source::{Source, SourceSamples};
 const LEAST_VISIBLE: f32 = 0.499;
 /// The weights of four cells in a row in the one of the next level that lies in their middle.
 const TAPS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
+// Constants: docs/tuning.md, "Not measured".
 /// The known share of what a cell is made from with which it is known: that of a cell beside an edge.
 const ENOUGH: f32 = 0.125;
 /// Rows that one task computes.

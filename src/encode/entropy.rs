@@ -19,6 +19,7 @@ use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
 
+// Constants: docs/tuning.md, "Not measured".
 /// How often a finished fit may be extended.
 const MAX_ROUNDS: u32 = 8;
 

@@ -47,6 +47,7 @@ pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
 /// By how much a quality may miss its target.
 pub(crate) const QUALITY_TOLERANCE: f64 = 1.0;
 
+// Constants: docs/tuning.md, "Not measured".
 /// The quality of [`Target::Auto`].
 const AUTO_QUALITY: f64 = 75.0;
 

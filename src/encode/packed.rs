@@ -12,6 +12,7 @@ use super::source::Source;
 use super::verify::Verified;
 use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
 
+// Constants: docs/tuning.md, "Not measured".
 /// How often a finished fit may be extended to meet its target.
 const MAX_ROUNDS: u32 = 8;
 /// How many times as many Gaussians more a decibel takes, somewhat more than it needs.

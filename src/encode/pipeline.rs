@@ -16,13 +16,13 @@ use super::shortfall::{Reached, Shortfall};
 use super::verify::{FilePsnr, Verified};
 use super::{entropy, packed, verify};
 
+// Constants: docs/tuning.md, "Search for a target".
 /// If the target is a size, and fewer pixels than this come to each Gaussian, the file is compared with one
-/// of fewer Gaussians: in a short run, more may bring nothing (kodim23, effort 1: 40.1 dB with 24 bits per
-/// pixel, 40.8 dB with 4).
+/// of fewer Gaussians: in a short run, more may bring nothing.
 const PIXELS_PER_GAUSSIAN_OF_LARGE: usize = 5;
 /// Pixels per Gaussian of the file that it is compared with.
 const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
-/// What twice the size must bring, in dB: on the way from 0.25 to 1 bit per pixel it brings 3.
+/// What twice the size must bring, in dB.
 const LEAST_GAIN: f64 = 0.5;
 /// Pixels per Gaussian and corrections of the number of Gaussians that the progress report assumes before
 /// they are known.

@@ -12,6 +12,7 @@ use crate::coding::entropy::{Lattice, MAX_CLASS, MOST_CODE, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
+// Constants: docs/tuning.md, "Rate model".
 /// The bits of a component ([`component_bits`]) on average over the Gaussians of a usual picture.
 pub(crate) const USUAL_COMPONENT_BITS: f64 = 2.2;
 /// The increase of log2 of [`bits_per_gaussian`] for one more bit per component.

@@ -21,6 +21,7 @@ pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
 /// The sensitivities of a block to squared errors on each scale.
 pub(crate) type BlockSensitivity = [f32; SCALES];
 
+// Constants: docs/tuning.md, "What a person sees".
 /// The mean sensitivity on each scale; they add up to 1.
 const BY_SCALE: [f64; SCALES] = [0.4, 0.35, 0.25];
 /// The sensitivity is the variance to the power of minus this.

@@ -71,6 +71,7 @@ pub enum Shortfall {
     },
 }
 
+// Constants: docs/tuning.md, "Not measured".
 /// Bytes that one more Gaussian may need.
 const BYTES_OF_GAUSSIAN: f64 = 24.0;
 

@@ -5,6 +5,7 @@ use super::progress::Observer;
 use crate::region::Region;
 use crate::render::{BAND_HEIGHT, Picture, RenderOptions};
 
+// Constants: docs/tuning.md, "Search for a target".
 /// Pixels of a strip per thread, unless [`BANDS`] bands have more. The size of a strip bounds the memory of a
 /// rendering to floats, and the time between two polls of the observer.
 const PIXELS: usize = 3 << 14;

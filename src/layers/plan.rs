@@ -2,6 +2,7 @@
 //! In both codings the strongest Gaussians come first, so that every prefix of a file gives a
 //! picture.
 
+// Constants: docs/tuning.md, "Layers and the decoder".
 /// In a small output, one Gaussian is enough for this many pixels.
 const PIXELS_PER_GAUSSIAN: u64 = 16;
 /// A preview has the Gaussians of the first layers, which are one in this many of the file's. With fewer, it

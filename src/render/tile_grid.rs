@@ -15,6 +15,7 @@ use crate::gaussian::Gaussian;
 use crate::region::Region;
 use crate::simd::{Backend, LANES};
 
+// Constants: docs/tuning.md, "Layers and the decoder".
 /// Width of a tile in pixels. Tiles of 16 pixels would take a quarter more kernel evaluations,
 /// because more of them would give a weight of 0.
 pub(crate) const TILE_WIDTH: usize = 8;

@@ -17,8 +17,8 @@ pub(crate) enum Budget {
     DistortionPerGaussian(f64),
 }
 
-/// The error is about proportional to the number of Gaussians to the power of -`POWER` (Kodak,
-/// 1,000 to 10,000 Gaussians).
+// Constants: docs/tuning.md, "Growth".
+/// The error is about proportional to the number of Gaussians to the power of -`POWER`.
 const POWER: f64 = 1.1;
 
 impl Budget {

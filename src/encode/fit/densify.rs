@@ -15,6 +15,7 @@ use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 use crate::render::tile_grid::TILE_HEIGHT;
 
+// Constants: docs/tuning.md, "Growth".
 /// Gaussians whose colour is below this magnitude in every channel, where a full sample is 1, are
 /// pruned: a 16th of the quantization step of 8 bits.
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
@@ -236,7 +237,7 @@ fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
 /// Where a tile has r times the mean distortion, and r is more than 1, each new Gaussian has 1/r of
 /// the area that it would have on average. Its variance is smaller by the square root of r: they
 /// overlap, but they converge, up to [`MOST_OVERLAP`]. A variance smaller by r itself is too small to grow
-/// in a short run (0.5 dB less at effort 2).
+/// in a short run.
 ///
 /// Of a tile with more than its due, only a part counts, so there may be fewer than `count`.
 fn spread(

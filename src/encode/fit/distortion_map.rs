@@ -11,7 +11,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 ///
 /// Residuals count as in the error that training minimizes: times the square root of the sensitivity. The
 /// planes have them times the sensitivity itself, which would leave next to nothing to places of low
-/// sensitivity.
+/// sensitivity (docs/tuning.md, "Growth").
 pub(super) fn of_tile(
     raster: &Raster,
     [left, top]: [usize; 2],

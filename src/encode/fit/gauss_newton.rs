@@ -16,6 +16,7 @@ use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;
 use crate::math;
 
+// Constants: docs/tuning.md, "Steps of training".
 /// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
 /// all of them would take the same step, and never come to rest.
 const FIRST_PACE: f32 = 0.4;

@@ -43,6 +43,7 @@ struct LsqQuantizer {
 
 /// The least scale, for values that are all equal.
 const MIN_SCALE: f32 = 1e-9;
+// Constants: docs/tuning.md, "Steps of training".
 /// How many wider ranges of colour are tried than three standard deviations.
 const WIDENINGS: u8 = 16;
 /// What an error counts that clipping makes: training corrects it by other Gaussians, as it cannot with

@@ -44,6 +44,7 @@ use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS};
 use crate::render::splat::Splat;
 
+// Constants: docs/tuning.md, "Iterations".
 /// The error after training as a share of the error during growth: training continues to lower the
 /// error when no more Gaussians are added.
 const FORESEEN: f64 = 0.75;

@@ -6,6 +6,7 @@ use glam::{Mat2, Mat3, Vec2, Vec3};
 
 use crate::gaussian::{Parameterization, inverse_cholesky};
 
+// Constants: docs/tuning.md, "Growth".
 /// Smallest standard deviation that is trained, in pixels: a narrower Gaussian can lie between the
 /// centres of pixels, where it has no effect and no gradient.
 pub(crate) const MIN_DEVIATION: f32 = 0.4;

@@ -7,8 +7,9 @@ use super::pass::SplatGradient;
 use crate::encode::rate_model::{LAMBDA, step_for};
 use crate::gaussian::Gaussian;
 
-/// The weight of the term, as a share of lambda. It is tuned: at full weight, training loses more
-/// quality than it saves bits.
+// Constants: docs/tuning.md, "Steps of training".
+/// The weight of the term, as a share of lambda: at full weight, training loses more quality than it saves
+/// bits.
 const WEIGHT: f32 = 0.55;
 /// Components of a Gaussian's geometry: two of position, three of shape.
 const GEOMETRY: usize = 5;

@@ -244,7 +244,8 @@ impl Training {
     /// by importance. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
-        // In a short run there is no time to be careful, and little to correct.
+        // Constants: docs/tuning.md, "Growth" and "Steps of training". In a short run there is no time to
+        // be careful, and little to correct.
         let (end, culled) = if iterations < 50 { (0.7, 0.8) } else { (0.6, 0.7) };
         let hurry = 1.0 / iterations.max(30) as f32;
         Self {

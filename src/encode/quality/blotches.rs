@@ -11,6 +11,7 @@ use super::light::{COLUMNS, Samples};
 use super::pyramid::Shown;
 use super::smooth::{AREA, Weights, read};
 
+// Constants: docs/tuning.md, "What a person sees".
 /// Side of the blocks whose means count.
 const BLOCK: usize = 8;
 const BLOCKS: usize = COLUMNS / BLOCK;

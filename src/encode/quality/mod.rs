@@ -35,6 +35,7 @@ use scales::Scales;
 pub(crate) use smooth::Gradients;
 use smooth::SmoothAreas;
 
+// Constants: docs/tuning.md, "What a person sees".
 /// The highest quality that is aimed at. People see no difference from 90 on.
 pub(crate) const MOST_QUALITY: f64 = 97.0;
 
@@ -231,8 +232,7 @@ fn dissimilarity_at(wanted: f64) -> f64 {
 }
 
 /// About how many Gaussians a picture needs for a quality, given the means of the eye's sensitivity to it
-/// on the finest and on the coarsest scale. It is a fit to photographs with 110 and 320 iterations, good to a factor of
-/// 1.3 on average: texture, and above all fine texture, takes Gaussians.
+/// on the finest and on the coarsest scale: texture, and above all fine texture, takes Gaussians.
 pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) -> usize {
     let dissimilarity = dissimilarity_at(wanted.min(MOST_QUALITY));
     let density = 0.5 * dissimilarity.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);

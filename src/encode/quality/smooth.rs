@@ -7,6 +7,7 @@ use super::light::{COLUMNS, Samples};
 use super::pyramid::Shown;
 use crate::encode::source::Source;
 
+// Constants: docs/tuning.md, "What a person sees".
 /// Side in pixels of the areas that are smooth as a whole, or not.
 pub(super) const AREA: usize = 32;
 const AREAS: usize = COLUMNS / AREA;

@@ -15,9 +15,9 @@ use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
 
+// Constants: docs/tuning.md, "Search for a target".
 /// A penalty for decoding time, in bits per Gaussian on average; each Gaussian has a share that is
-/// proportional to the number of tiles that it touches. It lowers the number of touched tiles by 2 to
-/// 4 % at the same PSNR.
+/// proportional to the number of tiles that it touches.
 const DECODING_TIME_BITS: f32 = 4.0;
 
 /// Work to round a Gaussian, to make one from its code, and to tell the bits of a code.

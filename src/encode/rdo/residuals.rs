@@ -21,6 +21,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 const MOST_OF_ONE_TASK: usize = 1 << 13;
 /// Rows of such a window that one task goes through.
 pub(super) const ROWS_PER_TASK: usize = 32;
+// Constants: docs/tuning.md, "Not measured".
 /// The margin of a window around its Gaussian, for candidates that are larger or elsewhere: a
 /// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);

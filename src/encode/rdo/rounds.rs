@@ -10,6 +10,7 @@ use core::ops::Range;
 
 use rayon::prelude::*;
 
+// Constants: docs/tuning.md, "Not measured".
 /// The least height of a band in rows, unless the picture is lower.
 const LEAST_HEIGHT: usize = 32;
 

@@ -2,6 +2,7 @@
 
 use crate::encode::options::Target;
 
+// Constants: docs/tuning.md, "Search for a target".
 /// The share of a target size that is aimed at.
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 /// By how many dB the PSNR that is aimed at exceeds the target.

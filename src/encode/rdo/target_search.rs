@@ -14,6 +14,7 @@ use crate::encode::rate_model;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
 
+// Constants: docs/tuning.md, "Search for a target".
 /// Most steps that are tried: by rounding alone, and with passes of coordinate descent.
 const MOST_ROUNDING_TRIES: u32 = 8;
 const MOST_TRIES: u32 = 4;
@@ -51,8 +52,7 @@ const MOST_HALVINGS: u32 = 8;
 /// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
 
-/// The fall of the size in the first pass, as a base-2 logarithm, given the share of Gaussians that are
-/// weak (24 photographs, efforts 1 and 2: good to 0.02).
+/// The fall of the size in the first pass, as a base-2 logarithm, given the share of weak Gaussians.
 fn settling_of_rounded(weak: f64) -> f64 {
     (0.02 + 1.9 * weak).min(0.1).max(1.15 * weak)
 }

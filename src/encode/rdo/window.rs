@@ -15,6 +15,7 @@ use crate::encode::mul_add::MulAdd;
 use crate::encode::raster::Raster;
 use crate::gaussian::Gaussian;
 
+// Constants: docs/tuning.md, "Search for a target".
 /// The residuals of a window of up to so many pixels are kept without the Gaussian. Those of a wider
 /// one would take as much memory as all others, and are computed again.
 const MOST_KEPT: usize = 1 << 15;
