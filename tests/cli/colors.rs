@@ -208,3 +208,50 @@ fn colours_that_cannot_be_kept_are_told() {
     let other = [&radiance[..line], primaries, &radiance[line..]].concat();
     assert!(carried(&room, "a.hdr", &other).1.contains("its primaries (.7 .3"));
 }
+
+#[test]
+fn colours_of_bmp_are_kept_as_a_profile_or_told() {
+    let room = Room::new();
+    let mut plain = Cursor::new(Vec::new());
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    picture.write_to(&mut plain, ImageFormat::Bmp).expect("in memory");
+    let plain = plain.into_inner();
+    let place = |at: usize| u32::from_le_bytes(*plain[at..].first_chunk().expect("a header"));
+    let (header, samples) = (place(14) as usize, &plain[place(10) as usize..]);
+    let profile = ColorProfile::new_adobe_rgb().encode().expect("valid");
+    // Kind, primaries, gammas, intent, place and length of the profile.
+    let file = |kind: &[u8; 4], primaries: [f64; 9], gamma: f64, length: usize| {
+        let fixed = |value: f64, bits: i32| ((value * 2_f64.powi(bits)) as u32).to_le_bytes();
+        let mut file = plain[..14 + header.min(40)].to_vec();
+        file.resize(14 + 56, 0);
+        file.extend(kind);
+        file.extend(primaries.map(|value| fixed(value, 30)).concat());
+        file.extend([fixed(gamma, 16); 3].concat());
+        for number in [4, 124 + samples.len(), length, 0] {
+            file.extend((number as u32).to_le_bytes());
+        }
+        file[10..14].copy_from_slice(&(14 + 124_u32).to_le_bytes());
+        file[14..18].copy_from_slice(&124_u32.to_le_bytes());
+        [file, samples.to_vec(), profile.clone()].concat()
+    };
+    let srgb = [0.64, 0.33, 0.03, 0.3, 0.6, 0.1, 0.15, 0.06, 0.79];
+    let adobe = [0.64, 0.33, 0.03, 0.21, 0.71, 0.08, 0.15, 0.06, 0.79];
+    for (file, is_kept, expected) in [
+        (file(b"DEBM", [0.0; 9], 0.0, profile.len()), true, ""),
+        (file(b"DEBM", [0.0; 9], 0.0, profile.len() + 1), false, "its ICC profile is damaged"),
+        (file(b"KNIL", [0.0; 9], 0.0, 9), false, "its ICC profile is in another file"),
+        (file(b" niW", adobe, 1.0, 0), false, ""),
+        (file(b"BGRs", [0.0; 9], 0.0, 0), false, ""),
+        (file(&[0; 4], [0.0; 9], 0.0, 0), false, ""),
+        (file(&[0; 4], srgb, 2.2, 0), false, ""),
+        (file(&[0; 4], adobe, 2.2, 0), false, "its primaries and gammas cannot be kept"),
+        (file(&[0; 4], srgb, 1.0, 0), false, "its primaries and gammas cannot be kept"),
+    ] {
+        let (profile, printed) = carried(&room, "a.bmp", &file);
+        assert_eq!(profile.is_some(), is_kept, "{printed}");
+        assert!(
+            printed.contains(expected) && printed.is_empty() == expected.is_empty(),
+            "{printed}"
+        );
+    }
+}

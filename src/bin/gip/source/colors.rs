@@ -25,7 +25,7 @@ const LEAST_SHARE: f64 = 0.001;
 /// How far chromaticities of sRGB may be from the standard's.
 const SAME_CHROMATICITY: f64 = 0.002;
 /// x and y of sRGB's white, red, green and blue.
-const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
+pub(super) const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
 
 /// Applies the chunks of a PNG, of which the first of cICP, iCCP, sRGB, and gAMA with cHRM counts (PNG,
 /// third edition, 4.3). A gamma alone is turned to that of sRGB, and what has other colours gets a

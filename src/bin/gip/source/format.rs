@@ -25,6 +25,10 @@ impl Format {
         if start.starts_with(b"II+\0") || start.starts_with(b"MM\0+") {
             return Some(Self::Tiff);
         }
+        // Nor the other one of Radiance, which its decoder refuses.
+        if start.starts_with(b"#?RGBE") {
+            return Some(Self::Image(ImageFormat::Hdr));
+        }
         image::guess_format(start).ok().map(Self::from)
     }
 

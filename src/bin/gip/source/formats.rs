@@ -11,7 +11,7 @@ use super::fault::{self, Fault, SHORT};
 use super::frames::{self, Others};
 use super::stored::{Stored, partly};
 use super::{
-    clipping, colors, exr, hdr, ico, jpeg, light, metadata, png_chunks, screen, square, webp,
+    bmp, clipping, colors, exr, hdr, ico, jpeg, light, metadata, png_chunks, screen, square, webp,
 };
 use crate::limits::check_size;
 use crate::picture::DAMAGED_PROFILE;
@@ -112,6 +112,7 @@ pub(super) fn read(
     let mut stored = Stored { image: light::encoded(image), orientation, metadata, warnings };
     match format {
         ImageFormat::Jpeg => colors::of_exif(&mut stored.metadata),
+        ImageFormat::Bmp => bmp::colors(file, &mut stored),
         ImageFormat::OpenExr => stored.warnings.extend(exr::lost(file)),
         ImageFormat::Hdr => stored.warnings.extend(hdr::lost(file)),
         _ => {}
@@ -123,7 +124,7 @@ pub(super) fn read(
         ImageFormat::Png => png.as_ref().and_then(square::of_png),
         ImageFormat::Jpeg => jpeg.as_ref().and_then(|jpeg| jpeg.density),
         ImageFormat::Gif => square::of_gif(file),
-        ImageFormat::Bmp => square::of_bmp(file),
+        ImageFormat::Bmp => bmp::density(file),
         _ => None,
     };
     stored.warnings.extend(density.and_then(|density| square::warning(density, orientation)));

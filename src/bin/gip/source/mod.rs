@@ -1,5 +1,6 @@
 //! Reading pictures of any format, and telling what of them cannot be kept.
 
+mod bmp;
 mod clipping;
 mod colors;
 mod exr;

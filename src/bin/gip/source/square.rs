@@ -8,12 +8,8 @@ pub(super) type Density = (f64, f64);
 /// By how much, relative to the other side, pixels that are meant to be square differ: files have densities
 /// in whole numbers.
 const SAME: f64 = 0.01;
-/// Where GIF and BMP have the ratio and the densities, and where BMP has the length of its header.
+/// Where GIF has the ratio.
 const GIF_RATIO: usize = 12;
-const BMP_DENSITY: usize = 38;
-const BMP_HEADER: usize = 14;
-/// The least length of a header of BMP with densities.
-const BMP_INFO: u32 = 40;
 
 /// What is said of pixels that are not square, of a picture that is turned like this. Densities that are no
 /// positive numbers mean nothing.
@@ -38,11 +34,4 @@ pub(super) fn of_png(info: &png::Info<'_>) -> Option<Density> {
 pub(super) fn of_gif(file: &[u8]) -> Option<Density> {
     let ratio = *file.get(GIF_RATIO)?;
     (ratio != 0).then(|| (64.0, f64::from(ratio) + 15.0))
-}
-
-pub(super) fn of_bmp(file: &[u8]) -> Option<Density> {
-    let number = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?));
-    let has_density = number(BMP_HEADER)? >= BMP_INFO;
-    let density = |at: usize| Some(f64::from(number(at)?.cast_signed()));
-    has_density.then(|| Some((density(BMP_DENSITY)?, density(BMP_DENSITY + 4)?)))?
 }
