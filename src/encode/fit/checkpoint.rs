@@ -7,7 +7,7 @@ use super::lsq::LsqQuantizers;
 use super::row::Row;
 use super::training_tile::RenderingError;
 
-// Constants: docs/tuning.md, "Not measured".
+// Constants: docs/tuning.md, "Steps of training".
 /// The distortion of a setback, as a multiple of the least one: of the picture, and of the tiles that
 /// are to blame: half a decibel. Short runs get over smaller ones, and sooner without a pause.
 const SETBACK: f64 = 1.12;

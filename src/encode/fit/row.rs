@@ -9,7 +9,7 @@ use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 /// are 0.
 pub(crate) type Row = [f32; MAX_COMPONENTS];
 
-// Constants: docs/tuning.md, "Not measured".
+// Constants: docs/tuning.md, "Growth".
 /// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
 /// depends on rounding errors.
 pub(super) const MAX_COLOR: f32 = 8.0;

@@ -3,7 +3,7 @@
 use super::training::Training;
 use crate::encode::options::Precision;
 
-// Constants: docs/tuning.md, "Not measured".
+// Constants: docs/tuning.md, "Growth".
 /// Iterations between two culls of the surplus.
 const CULL_INTERVAL: u32 = 10;
 

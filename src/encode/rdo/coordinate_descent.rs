@@ -20,7 +20,7 @@ use crate::kernel::QUARTIC_RADIUS;
 /// Work to find the window of a Gaussian.
 const WORK: f64 = 200.0;
 
-// Constants: docs/tuning.md, "Not measured".
+// Constants: docs/tuning.md, "Search for a target".
 /// The trust region of the quadratic model: the largest change of each component of the geometry in
 /// a step to the model's minimum.
 const TRUST_REGION: f32 = 0.5;
