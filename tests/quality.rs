@@ -210,6 +210,20 @@ fn ordered_dither_has_its_quality() {
 }
 
 #[test]
+fn a_small_checkerboard_has_its_quality() {
+    // Its fit has long Gaussians, some of them with centres beside the picture.
+    for side in [128, 160] {
+        let pixel = |at: u32| ((at % side + at / side) % 2 * 255) as u8;
+        let samples: Vec<u8> = (0..side * side).map(pixel).collect();
+        let source = Source::new_u8(side, side, ColorModel::Gray, &samples).expect("sizes agree");
+        let encoded = Encoder::new().with_effort(1).encode(&source).expect("it encodes");
+        let quality = encoded.report.quality;
+        println!("{side}: quality {quality}, {} bytes", encoded.bytes.len());
+        assert!((73.0..77.0).contains(&quality), "{side}: {quality}");
+    }
+}
+
+#[test]
 fn noise_does_not_hide_clouds() {
     let size = [256, 160];
     for strength in [0.5, 3.0] {

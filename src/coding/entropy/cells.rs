@@ -87,6 +87,11 @@ impl CenterGrid {
 
 #[cfg(feature = "encode")]
 impl CenterGrid {
+    /// By how many pixels, at least, the grid exceeds the picture on every side.
+    pub(crate) fn margin(&self) -> f32 {
+        (self.root / UNITS_PER_PIXEL) as f32
+    }
+
     /// log2 of the position interval in units, from 1 up to the side of a root.
     pub(super) fn interval_bits(&self, fraction_bits: i32) -> u32 {
         let bits = UNITS_PER_PIXEL.ilog2() as i32 - fraction_bits;

@@ -244,7 +244,8 @@ impl Code {
 
 #[cfg(feature = "encode")]
 impl Lattice {
-    /// The code of a precision class that is nearest to a Gaussian.
+    /// The code of a precision class that is nearest to a Gaussian, or of a lower class if the slant is so
+    /// large that it has no code in this one.
     ///
     /// Where possible, a component compensates for the rounding errors of those before it: what
     /// matters is the covariance and the centre, not each component by itself.
@@ -264,6 +265,9 @@ impl Lattice {
         // With L (I + D) for the rounded Cholesky factor, this slant makes D21 zero.
         let Shape { size, cholesky: [c11, _, c22] } = self.shape(&code);
         let slant = l21 / l22 * (1.0 + (c11 / l11).ln() - (c22 / l22).ln());
+        if class > 0 && slant.abs() > MOST_CODE * self.slant * scale {
+            return self.code(gaussian, class - 1, grid, model);
+        }
         code.slant = nearest(slant, self.slant * scale) as i32;
         code.center = self.placed(&code, gaussian.center, grid);
         let axes = to_axes(gaussian.color, model);
@@ -364,6 +368,21 @@ pub(crate) fn to_axes(color: [f32; 4], model: ColorModel) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "encode")]
+    #[test]
+    fn a_steep_gaussian_keeps_its_direction() {
+        let lattice = Lattice::new([1.1, 0.8, 0.9, 1.7], vec![0.01]);
+        let grid = CenterGrid::new(400, 300);
+        for slant in [1.0_f32, 300.0, -470.0, 3000.0] {
+            let cholesky = [0.57 * slant.abs(), 0.57 * slant, 0.57];
+            let gaussian =
+                Gaussian { center: [113.9, 41.9], cholesky, color: [1.9, 0.0, 0.0, 0.0] };
+            let code = lattice.code(&gaussian, MAX_CLASS, &grid, ColorModel::Gray);
+            let [l11, l21, _] = lattice.shape(&code).cholesky;
+            assert!((l21 / l11 - slant.signum()).abs() < 0.01, "{slant}: {code:?}");
+        }
+    }
 
     #[test]
     fn the_table_has_the_values_that_are_computed_without_it() {

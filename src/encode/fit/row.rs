@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use super::parameterization;
+use crate::coding::entropy::CenterGrid;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 
 /// The components of a Gaussian in the order of the file: centre, shape, colour. Absent channels
@@ -13,6 +14,10 @@ pub(crate) type Row = [f32; MAX_COMPONENTS];
 /// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
 /// depends on rounding errors.
 pub(super) const MAX_COLOR: f32 = 8.0;
+
+/// Pixels by which rounding may move a centre outwards: where a Gaussian is steep, an error along x
+/// moves it along y.
+const MOST_ROUNDING: f32 = 1.0;
 
 /// The shape components of a row.
 #[inline]
@@ -55,10 +60,12 @@ impl RowBounds {
     }
 
     /// The ranges of x and y of a centre. Farther outside, it would widen the range over which positions
-    /// are quantized, for a Gaussian of which little is visible.
+    /// are quantized, for a Gaussian of which little is visible; and it would leave the grid of the entropy
+    /// coding, which moves a centre inwards, and a long Gaussian with it.
     #[inline]
     pub(super) fn center_ranges(self) -> [(f32, f32); 2] {
-        let margin = 8.0 + 0.05 * self.size;
+        let grid = CenterGrid::new(self.size.x as u32, self.size.y as u32);
+        let margin = (8.0 + 0.05 * self.size).min(Vec2::splat(grid.margin() - MOST_ROUNDING));
         [(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)]
     }
 
@@ -70,6 +77,31 @@ impl RowBounds {
         }
         for value in &mut row[5..] {
             *value = value.clamp(-MAX_COLOR, MAX_COLOR);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn centers_have_codes_even_where_a_gaussian_is_steep() {
+        for side in [1, 8, 96, 128, 129, 200, 256, 257, 480, 512, 513, 768, 3000, 65_536_u32] {
+            let grid = CenterGrid::new(side, 8);
+            let bounds = RowBounds {
+                parameterization: Parameterization::Cholesky,
+                channels: 1,
+                size: Vec2::new(side as f32, 8.0),
+            };
+            let mut rows = [[-1e6; MAX_COMPONENTS], [1e6; MAX_COMPONENTS]];
+            for (row, outwards) in rows.iter_mut().zip([-0.9, 0.9]) {
+                bounds.clamp_position_and_color(row);
+                let rounded = [row[0], row[1]].map(|coordinate| coordinate + outwards);
+                let coded = grid.center(grid.units(rounded));
+                let is_near = |(a, b): (&f32, &f32)| (a - b).abs() < 0.01;
+                assert!(rounded.iter().zip(&coded).all(is_near), "{side}: {rounded:?} {coded:?}");
+            }
         }
     }
 }
