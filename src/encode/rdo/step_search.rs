@@ -42,10 +42,14 @@ impl Aim {
         target.bytes(pixels).map(|bytes| Self::Size { most: AIMED_SHARE_OF_SIZE * bytes as f64 })
     }
 
-    /// How badly a file with this deviation misses its target: 0 if it meets the target.
-    pub(crate) fn miss(self, deviation: f64) -> f64 {
+    /// How badly a file with this deviation misses its target: 0 if it meets the target. `weak` is the share
+    /// of its Gaussians that hardly show, which a file that is too large is shortened by.
+    pub(crate) fn miss(self, deviation: f64, weak: f64) -> f64 {
         let (below, above) = match self {
-            Self::Size { .. } => TOLERANCE_OF_SIZE,
+            Self::Size { .. } => {
+                let (below, above) = TOLERANCE_OF_SIZE;
+                (below, weak.clamp(WELL_SHORTENED.1, above))
+            }
             Self::Psnr(_) => (-0.009, 0.006),
             // At a quality of 75, a third of a point; less at a higher one.
             Self::Quality(_) => (-0.03, 0.03),
@@ -173,17 +177,20 @@ mod tests {
         for deviation in (-60..60).map(|step| f64::from(step) * 1e-3) {
             let bytes = AIMED_SHARE_OF_SIZE * 5000.0 * deviation.exp2();
             // A file that is a little too large is shortened.
-            if size.miss(deviation) == 0.0 {
+            if size.miss(deviation, 0.1) == 0.0 {
                 assert!((SIZE_TOLERANCE * 5000.0..1.03 * 5000.0).contains(&bytes), "{bytes}");
             }
             let reached = 30.0 + AIMED_PSNR_EXCESS - deviation * 10.0 * 2_f64.log10();
-            if psnr.miss(deviation) == 0.0 {
+            if psnr.miss(deviation, 0.0) == 0.0 {
                 assert!((30.0..30.0 + PSNR_TOLERANCE).contains(&reached), "{reached}");
             }
         }
+        // What shows is not removed.
+        assert!(size.miss(0.03, 0.01) > 0.0);
         for aim in [size, psnr] {
-            assert_eq!(aim.miss(0.0), 0.0);
-            assert!(aim.miss(-1.0) > aim.miss(-0.5) && aim.miss(0.5) > aim.miss(-5.0));
+            assert_eq!(aim.miss(0.0, 0.0), 0.0);
+            assert!(aim.miss(-1.0, 0.0) > aim.miss(-0.5, 0.0));
+            assert!(aim.miss(0.5, 0.0) > aim.miss(-5.0, 0.0));
         }
     }
 

@@ -52,6 +52,12 @@ const MOST_HALVINGS: u32 = 8;
 /// How often a file that exceeds its PSNR is tried with fewer Gaussians.
 const MOST_TRIMMINGS: u32 = 32;
 
+/// The share of weak Gaussians.
+fn weak_share(coded: &CodedLayers) -> f64 {
+    let weak = coded.codes.iter().filter(|code| code.strength() <= WEAK).count();
+    weak as f64 / coded.codes.len().max(1) as f64
+}
+
 /// The fall of the size in the first pass, as a base-2 logarithm, given the share of weak Gaussians.
 fn settling_of_rounded(weak: f64) -> f64 {
     (0.02 + 1.9 * weak).min(0.1).max(1.15 * weak)
@@ -116,7 +122,7 @@ impl<'a> TargetSearch<'a> {
         if let Some(bytes) = target.bytes(self.raster.pixels()) {
             return Ok((self.shortened(coded, bytes, observer)?, 0.0));
         }
-        if aim.miss(deviation) > 0.0 {
+        if aim.miss(deviation, weak_share(&coded.coded)) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
             let mut finer = step;
             for change in FINER {
@@ -163,19 +169,20 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(Optimized, f64, f64), EncodeError> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
-        let mut best: Option<(Optimized, f64)> = None;
+        let mut best: Option<(Optimized, f64, f64)> = None;
         for _ in 0..MOST_TRIES {
             let (optimized, deviation, expected) = self.tried(gaussians, &search, aim, observer)?;
-            if best.as_ref().is_none_or(|(_, least)| aim.miss(deviation) < aim.miss(*least)) {
-                best = Some((optimized, deviation));
+            let miss = aim.miss(deviation, weak_share(&optimized.coded));
+            if best.as_ref().is_none_or(|&(.., least)| miss < least) {
+                best = Some((optimized, deviation, miss));
             }
-            if aim.miss(deviation) == 0.0 || search.is_exhausted(expected) {
+            if miss == 0.0 || search.is_exhausted(expected) {
                 break;
             }
             search.tell(expected);
             observer.expect(self.work.one_more_try());
         }
-        let (optimized, deviation) = best.expect("at least one was tried");
+        let (optimized, deviation, _) = best.expect("at least one was tried");
         Ok((optimized, deviation, search.at))
     }
 
@@ -200,7 +207,7 @@ impl<'a> TargetSearch<'a> {
             let can_be_rounded = matches!(aim, Aim::Size { .. }) && pass < MOST_ROUNDED_PASSES;
             let can_change = is_within_lambda || can_be_rounded;
             let is_enough = pass >= self.work.passes
-                && (aim.miss(deviation) == 0.0
+                && (aim.miss(deviation, weak_share(&optimized.coded)) == 0.0
                     || pass >= MOST_PASSES
                     || lambda.abs() == MOST_LAMBDA_CHANGE
                     // A target that is out of reach gets no more passes than an encoding without
@@ -250,9 +257,8 @@ impl<'a> TargetSearch<'a> {
         }
         for _ in 0..MOST_ROUNDING_TRIES {
             let coded = self.codes.rounded(gaussians, search.at, observer)?;
-            let weak = coded.codes.iter().filter(|code| code.strength() <= WEAK).count();
-            let share = weak as f64 / coded.codes.len().max(1) as f64;
-            let fall = settling_of_rounded(share) + settling(1) - settling(self.work.passes);
+            let fall =
+                settling_of_rounded(weak_share(&coded)) + settling(1) - settling(self.work.passes);
             let deviation = self.deviation(&coded, aim, observer)? - fall - aim.middle();
             if deviation.abs() < CLOSE_OF_ROUNDED {
                 return Ok((search.at - deviation / aim.by_step()).max(finest));
@@ -359,7 +365,7 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64), EncodeError> {
         let Optimized { mut coded, mut by_use } = optimized;
-        if deviation > 0.0 || aim.miss(deviation) == 0.0 {
+        if deviation > 0.0 || aim.miss(deviation, 0.0) == 0.0 {
             return Ok((coded, deviation));
         }
         // Those from `end` on cannot be spared, and likely not many more at a time.
@@ -379,7 +385,7 @@ impl<'a> TargetSearch<'a> {
             } else {
                 end -= 1;
             }
-            if end == 0 || aim.miss(deviation) == 0.0 {
+            if end == 0 || aim.miss(deviation, 0.0) == 0.0 {
                 break;
             }
         }
