@@ -393,6 +393,26 @@ fn one_bright_pixel_is_found() {
 }
 
 #[test]
+fn line_art_makes_use_of_its_size() {
+    // A wave, black on white.
+    let side = 96;
+    let pixel = |at: u32| {
+        let (x, y) = ((at % side) as f32, (at / side) as f32);
+        let height = (0.37 * x + 0.2 * y).sin() * 40.0 + side as f32 / 2.0;
+        if (height - y).abs() < 1.0 { 0 } else { 255 }
+    };
+    let samples: Vec<u8> = (0..side * side).map(pixel).collect();
+    let source = Source::new_u8(side, side, ColorModel::Gray, &samples).expect("sizes agree");
+    let psnr = [0.8, 1.6].map(|bits| {
+        let encoder = quick(Target::BitsPerPixel(bits)).with_effort(2);
+        let encoded = encoder.encode(&source).expect("it encodes");
+        println!("{bits}: {} bytes, {} dB", encoded.bytes.len(), encoded.report.psnr);
+        encoded.report.psnr
+    });
+    assert!(psnr[1] > psnr[0].max(50.0), "{psnr:?}");
+}
+
+#[test]
 fn a_small_number_of_gaussians_is_used() {
     // Far more colours than Gaussians: they make hardly anything of the picture.
     let colors = noise(24 * 16 * 3);

@@ -24,6 +24,9 @@ const PIXELS_PER_GAUSSIAN_OF_LARGE: usize = 5;
 const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
 /// What twice the size must bring, in dB.
 const LEAST_GAIN: f64 = 0.5;
+/// How often a file may get more Gaussians, and what they must bring each time, in dB.
+const MOST_EXTENSIONS: u32 = 4;
+const LEAST_GAIN_OF_MORE: f64 = 0.1;
 /// Pixels per Gaussian and corrections of the number of Gaussians that the progress report assumes before
 /// they are known.
 const USUAL_PIXELS: usize = 100;
@@ -47,9 +50,48 @@ pub(crate) struct Outcome {
 pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
     verify::check_limits(job)?;
     let judge = Judge::new(job.source);
-    let mut outcome = encode_for_target(job, &judge, Work::default(), observer)?;
+    let outcome = encode_for_target(job, &judge, None, Work::default(), observer)?;
+    let Some(most_bytes) = job.target.bytes(job.pixels()) else { return Ok(outcome) };
+    let outcome = with_more(outcome, most_bytes, job, &judge, observer)?;
+    with_fewer(outcome, most_bytes, job, &judge, observer)
+}
+
+/// A file with as many more Gaussians as its size has room for, as long as they make it better: of line
+/// art, which needs fewer Gaussians than a photograph and finer steps, training does not foresee how many
+/// have room.
+fn with_more(
+    mut outcome: Outcome,
+    most_bytes: u64,
+    job: &Job<'_>,
+    judge: &Judge<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Outcome, EncodeError> {
+    for _ in 0..MOST_EXTENSIONS {
+        let Some(Shortfall::SizeUnused { bytes, gaussians }) = outcome.shortfall else { break };
+        let room = most_bytes as f64 / bytes as f64;
+        let count = (room * f64::from(gaussians)).ceil() as usize;
+        // The packed coding knows beforehand how many have room.
+        if job.precision != Precision::Entropy || count > job.pixels() {
+            break;
+        }
+        let larger = encode_for_target(job, judge, Some(count), outcome.work, observer)?;
+        if larger.distortion.psnr < outcome.distortion.psnr + LEAST_GAIN_OF_MORE {
+            return Ok(Outcome { work: larger.work, ..outcome });
+        }
+        outcome = larger;
+    }
+    Ok(outcome)
+}
+
+/// A file, or one with fewer Gaussians where these show about as good a picture.
+fn with_fewer(
+    mut outcome: Outcome,
+    most_bytes: u64,
+    job: &Job<'_>,
+    judge: &Judge<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Outcome, EncodeError> {
     let pixels = job.pixels();
-    let Some(most_bytes) = job.target.bytes(pixels) else { return Ok(outcome) };
     loop {
         let gaussians = outcome.gaussians as usize;
         let is_large = gaussians > pixels / PIXELS_PER_GAUSSIAN_OF_LARGE;
@@ -64,7 +106,7 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
         }
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
         let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
-        let modest = encode_for_target(&modest_job, &judge, outcome.work, observer)?;
+        let modest = encode_for_target(&modest_job, judge, None, outcome.work, observer)?;
         let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
         let gain = outcome.distortion.psnr - modest.distortion.psnr;
         let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
@@ -77,11 +119,12 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
     }
 }
 
-/// Fits the source, codes the Gaussians for the target, and decodes the file to tell what it shows.
-/// `work` was done before.
+/// Fits the source with `count` Gaussians, or as many as the target asks for, codes them for the target, and
+/// decodes the file to tell what it shows. `work` was done before.
 fn encode_for_target(
     job: &Job<'_>,
     judge: &Judge<'_>,
+    count: Option<usize>,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
@@ -94,7 +137,10 @@ fn encode_for_target(
 
     let (within_reach, room) = within_reach(job, &layout, observer)?;
     let job = &Job { target: within_reach, ..*job };
-    let budget = budget(job, room, &raster, observer)?;
+    let budget = match count {
+        Some(count) => Budget::Count(count),
+        None => budget(job, room, &raster, observer)?,
+    };
     let expected = match budget {
         Budget::Count(count) => count,
         Budget::Bits { .. } => budget.wanted(0, rate_model::USUAL_COMPONENT_BITS, job.pixels()),
