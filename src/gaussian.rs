@@ -1,9 +1,15 @@
 //! One Gaussian, and the parameterizations in which its shape is stored (spec, section 8).
 
+use core::ops::Range;
+
 use crate::math;
 
-/// Most components of a stored Gaussian: two of position, three of shape, four of colour.
-pub(crate) const MAX_COMPONENTS: usize = 9;
+/// The components of a stored Gaussian that are its centre, and those that are its shape. The others
+/// are its colour (spec, section 8.1).
+pub(crate) const CENTER: Range<usize> = 0..2;
+pub(crate) const SHAPE: Range<usize> = CENTER.end..5;
+/// Most components of a stored Gaussian: those of one with four channels.
+pub(crate) const MAX_COMPONENTS: usize = component_count(4);
 /// Smallest diagonal entry of the Cholesky factor of a Gaussian that is drawn, in pixels.
 pub(crate) const MIN_DIAGONAL: f32 = 1.0 / 4096.0;
 /// Largest magnitude of a coordinate, and of an entry of the Cholesky factor, of a Gaussian that is
@@ -74,13 +80,16 @@ impl Gaussian {
     #[inline]
     pub(crate) fn from_components(values: &[f32], parameterization: Parameterization) -> Self {
         let mut color = [0.0; 4];
-        color[..values.len() - 5].copy_from_slice(&values[5..]);
-        Self {
-            center: [values[0], values[1]],
-            cholesky: parameterization.to_cholesky([values[2], values[3], values[4]]),
-            color,
-        }
+        let (&[x, y, a, b, c], channels) =
+            values.split_first_chunk().expect("all have a centre and a shape");
+        color[..channels.len()].copy_from_slice(channels);
+        Self { center: [x, y], cholesky: parameterization.to_cholesky([a, b, c]), color }
     }
+}
+
+/// How many components a stored Gaussian has with so many channels.
+pub(crate) const fn component_count(channels: usize) -> usize {
+    SHAPE.end + channels
 }
 
 /// The inverse (i11, w, i22) of a Cholesky factor, with which q = (i11 dx)^2 + (w dx + i22 dy)^2.

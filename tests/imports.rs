@@ -1,6 +1,6 @@
 //! Which file imports from which: no circles, and no stage of the encoder that knows a later one.
 //!
-//! A path counts as an import of the file of the deepest module on it: `crate::encode::fit::adam::Row`
+//! A path counts as an import of the file of the deepest module on it: `crate::encode::fit::adam::State`
 //! of `encode/fit/adam.rs`, but a path to an item that `encode/fit/mod.rs` re-exports of that file.
 //! Paths count wherever they stand, in `use`, in code and in macros. `mod x;` does not count, nor do
 //! comments, nor does what is compiled for tests only.

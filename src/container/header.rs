@@ -6,7 +6,7 @@ use byteorder::{ByteOrder, LittleEndian};
 use crate::chunk::ChunkType;
 use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
-use crate::gaussian::Parameterization;
+use crate::gaussian::{Parameterization, component_count};
 use crate::kernel::Kernel;
 use crate::layers::plan;
 
@@ -176,7 +176,7 @@ impl Header {
     /// channel.
     #[must_use]
     pub fn components(&self) -> usize {
-        5 + self.color.channels()
+        component_count(self.color.channels())
     }
 
     /// How many Gaussians are enough for a preview of this size in pixels: the first sixth, which are the

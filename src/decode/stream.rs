@@ -11,7 +11,7 @@ use crate::coding::entropy::{Lattice, LatticeSteps};
 use crate::coding::packed::Quantizer;
 use crate::container::{Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
-use crate::gaussian::Gaussian;
+use crate::gaussian::{CENTER, Gaussian, SHAPE};
 use crate::limits::Limits;
 use crate::orientation::Orientation;
 use crate::render::Picture;
@@ -101,9 +101,9 @@ impl StreamDecoder {
             bits * self.gaussians().len() as f64
         };
         Some(AttributeBits {
-            position: statistics.position + bits_of(0..2),
-            shape: statistics.shape + bits_of(2..5),
-            color: statistics.color + bits_of(5..quantizers.len().max(5)),
+            position: statistics.position + bits_of(CENTER),
+            shape: statistics.shape + bits_of(SHAPE),
+            color: statistics.color + bits_of(SHAPE.end..quantizers.len().max(SHAPE.end)),
             ..statistics
         })
     }

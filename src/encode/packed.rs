@@ -11,6 +11,7 @@ use super::quality::Judge;
 use super::source::Source;
 use super::verify::Verified;
 use crate::coding::packed::{PackedCodes, Quantizer, UniformQuantizer};
+use crate::gaussian::component_count;
 
 // Constants: docs/tuning.md, "Not measured".
 /// How often a finished fit may be extended to meet its target.
@@ -74,18 +75,15 @@ pub(crate) fn finish(
 
 /// Quantizers of the depths that a file will have.
 fn quantizers(job: &Job<'_>) -> Vec<Quantizer> {
-    let depths = &job.training.quantization;
-    let packed = |bits| Quantizer::Linear(UniformQuantizer { bits, scale: 1.0, offset: 0.0 });
-    (0..5 + job.source.color().channels())
-        .map(|component| match (job.precision, component) {
-            (Precision::Float, _) => Quantizer::Float,
-            (_, 0 | 1) if depths.center.is_some() => Quantizer::Float,
-            (_, 5..) if depths.color.is_some() => Quantizer::Float,
-            (_, 0 | 1) => packed(depths.position_bits),
-            (_, 2..5) => packed(depths.shape_bits),
-            (_, _) => packed(depths.color_bits),
-        })
-        .collect()
+    let depths = job.training.quantization.depths().to_array();
+    let quantizer = |depth: Option<u8>| match depth {
+        Some(bits) if job.precision == Precision::Packed => {
+            Quantizer::Linear(UniformQuantizer { bits, scale: 1.0, offset: 0.0 })
+        }
+        _ => Quantizer::Float,
+    };
+    let count = component_count(job.source.color().channels());
+    depths.into_iter().take(count).map(quantizer).collect()
 }
 
 /// Adds to a fit what pruning left it short of a size that holds so many Gaussians.

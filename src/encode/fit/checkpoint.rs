@@ -3,8 +3,8 @@
 //! Steps are taken by all Gaussians at the same time, and each knows only its own curvature. Where many
 //! overlap they may go too far together, and farther with every step.
 
+use super::components::Components;
 use super::lsq::LsqQuantizers;
-use super::row::Row;
 use super::training_tile::RenderingError;
 
 // Constants: docs/tuning.md, "Steps of training".
@@ -18,7 +18,7 @@ const NEGLIGIBLE: f64 = 1e-10;
 #[derive(Clone, Debug)]
 pub(super) struct Checkpoint {
     pub(super) error: RenderingError,
-    pub(super) rows: Vec<Row>,
+    pub(super) values: Vec<Components>,
     pub(super) quantizers: Option<LsqQuantizers>,
     /// The distortion of every tile, row by row.
     tiles: Vec<f32>,
@@ -30,8 +30,8 @@ impl Checkpoint {
     /// Without Gaussians, and worse than any state.
     pub(super) fn new() -> Self {
         let error = RenderingError { squared: f64::INFINITY, distortion: f64::INFINITY };
-        let (rows, tiles) = (Vec::new(), Vec::new());
-        Self { error, rows, quantizers: None, tiles, was_returned_to: false }
+        let (values, tiles) = (Vec::new(), Vec::new());
+        Self { error, values, quantizers: None, tiles, was_returned_to: false }
     }
 
     /// Becomes a copy of a state.
@@ -39,12 +39,12 @@ impl Checkpoint {
         &mut self,
         error: RenderingError,
         tiles: &[f32],
-        rows: &[Row],
+        values: &[Components],
         quantizers: Option<&LsqQuantizers>,
     ) {
         self.error = error;
         copy(&mut self.tiles, tiles);
-        copy(&mut self.rows, rows);
+        copy(&mut self.values, values);
         self.quantizers = quantizers.cloned();
         self.was_returned_to = false;
     }
@@ -78,7 +78,6 @@ fn copy<T: Copy>(items: &mut Vec<T>, from: &[T]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::MAX_COMPONENTS;
 
     fn error(distortion: f64) -> RenderingError {
         RenderingError { squared: 1.0, distortion }
@@ -88,7 +87,7 @@ mod tests {
     fn what_is_much_worse_is_a_setback() {
         let mut best = Checkpoint::new();
         assert!(!best.is_lost(error(1e9), 1));
-        best.set(error(100.0), &[50.0, 30.0, 20.0], &[[0.5; MAX_COMPONENTS]], None);
+        best.set(error(100.0), &[50.0, 30.0, 20.0], &[Components::ZERO], None);
         assert!([99.0, 110.0].iter().all(|&distortion| !best.is_lost(error(distortion), 1)));
         assert!([114.0, f64::NAN].iter().all(|&distortion| best.is_lost(error(distortion), 1)));
         // Where all is exact, rounding errors are no setback.

@@ -2,17 +2,15 @@
 //! section "Distortion Driven Densification"; the variance of their shapes: section "Content Aware
 //! Gaussian Filters").
 
-use glam::Vec3;
-
+use super::components::{Bounds, Components};
 use super::distortion_map;
 use super::parameterization;
 use super::pass::Rendered;
-use super::row::{Row, RowBounds};
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
-use crate::gaussian::{MAX_COMPONENTS, Parameterization};
+use crate::gaussian::Parameterization;
 use crate::render::tile_grid::TILE_HEIGHT;
 
 // Constants: docs/tuning.md, "Growth".
@@ -70,7 +68,7 @@ pub(crate) struct Densifier<'a> {
     pub(crate) filter: GaussianFilter,
     /// The last pass over the picture, which measured the distortion.
     pub(crate) pass: Rendered<'a>,
-    pub(crate) bounds: RowBounds,
+    pub(crate) bounds: Bounds,
     /// Number of Gaussians before, without those that new ones replace.
     pub(crate) count: usize,
 }
@@ -86,7 +84,7 @@ impl Densifier<'_> {
         count: usize,
         rng: &mut fastrand::Rng,
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<Row>, EncodeError> {
+    ) -> Result<Vec<Components>, EncodeError> {
         let raster = self.pass.raster;
         let positions = match self.options.placement {
             Placement::Top => {
@@ -107,12 +105,12 @@ impl Densifier<'_> {
             .filter
             .variance(raster.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        let mut rows = Vec::with_capacity(positions.len());
+        let mut new = Vec::with_capacity(positions.len());
         for positions in positions.chunks(PART) {
             observer.poll()?;
-            rows.extend(positions.iter().map(|at| self.new_gaussian(at, variance, rng)));
+            new.extend(positions.iter().map(|at| self.new_gaussian(at, variance, rng)));
         }
-        Ok(rows)
+        Ok(new)
     }
 
     /// Sets the negative residuals at positions.
@@ -157,12 +155,14 @@ impl Densifier<'_> {
     }
 
     /// A new Gaussian, where `variance` is the filter's.
-    fn new_gaussian(&self, position: &NewPosition, variance: f32, rng: &mut fastrand::Rng) -> Row {
+    fn new_gaussian(
+        &self,
+        position: &NewPosition,
+        variance: f32,
+        rng: &mut fastrand::Rng,
+    ) -> Components {
         let variance = variance * position.variance_share;
         let (x, y) = self.pixel(position);
-        let mut row = [0.0; MAX_COMPONENTS];
-        row[0] = x as f32 + 0.5;
-        row[1] = y as f32 + 0.5;
         let parameterization = self.bounds.parameterization;
         let shape = match self.options.shape {
             NewShape::Point => parameterization::from_cholesky(
@@ -171,9 +171,8 @@ impl Densifier<'_> {
             ),
             NewShape::Random => random_shape(parameterization, variance, rng),
         };
-        row[2..5].copy_from_slice(&shape.to_array());
-        row[5..].copy_from_slice(&self.color(position));
-        self.bounds.clamped(row)
+        let center = [x as f32 + 0.5, y as f32 + 0.5];
+        self.bounds.clamped(Components { center, shape, color: self.color(position) })
     }
 
     /// Numbers of columns and rows of tiles.
@@ -330,19 +329,19 @@ fn random_shape(
     parameterization: Parameterization,
     variance: f32,
     rng: &mut fastrand::Rng,
-) -> Vec3 {
+) -> [f32; 3] {
     loop {
-        let mut shape = Vec3::new(rng.f32(), rng.f32(), rng.f32());
+        let mut shape = [(); 3].map(|()| rng.f32());
         for (value, positive) in
-            shape.as_mut().iter_mut().zip(parameterization::is_logarithmic(parameterization))
+            shape.iter_mut().zip(parameterization::is_logarithmic(parameterization))
         {
             *value += if positive { 0.5 } else { 0.0 };
         }
         if parameterization == Parameterization::RotationScale {
-            shape.z *= core::f32::consts::TAU;
+            shape[2] *= core::f32::consts::TAU;
         }
         let wide = parameterization::widened(parameterization, shape, variance);
-        if wide.is_finite() {
+        if wide.iter().all(|value| value.is_finite()) {
             return wide;
         }
     }

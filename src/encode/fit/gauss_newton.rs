@@ -9,8 +9,8 @@ pub(super) mod blocks;
 
 use glam::{Vec2, Vec3};
 
+use super::components::{Bounds, Components, Slope};
 use super::parameterization::OwnFrame;
-use super::row::{Row, RowBounds, Slope, shape_of};
 use super::training::GaussNewton;
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::gaussian::MAX_COMPONENTS;
@@ -31,7 +31,7 @@ const MOST_PACE: f32 = 3.0;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
     /// Moving average of the gradient.
-    mean: Row,
+    mean: Components,
     /// The factor on steps.
     pace: f32,
     /// The sum of the weights in the moving average, for the bias correction: 0 before the first step.
@@ -39,8 +39,7 @@ pub(super) struct State {
 }
 
 impl State {
-    pub(super) const NEW: Self =
-        Self { mean: [0.0; MAX_COMPONENTS], pace: FIRST_PACE, weight: 0.0 };
+    pub(super) const NEW: Self = Self { mean: Components::ZERO, pace: FIRST_PACE, weight: 0.0 };
 
     /// Makes the next steps smaller after a setback, without waiting for the gradient to turn round.
     pub(super) fn slow_down(&mut self) {
@@ -52,41 +51,36 @@ impl State {
 /// the centre, the logarithms of size and ratio, the slant, and the colour.
 #[inline]
 pub(super) fn step(
-    row: &mut Row,
+    components: &mut Components,
     state: &mut State,
     slope: &Slope,
     options: &GaussNewton,
-    bounds: RowBounds,
+    bounds: Bounds,
     factor: f32,
 ) {
-    let frame = OwnFrame::new(bounds.parameterization, shape_of(row));
-    let mut gradient = slope.gradient;
-    let center = frame.center.transpose() * Vec2::from_slice(&gradient);
-    let mut shape = frame.shape.transpose() * shape_of(&gradient);
+    let Components { center, shape, color } = *components;
+    let frame = OwnFrame::new(bounds.parameterization, shape);
+    let mut by_shape = frame.shape.transpose() * Vec3::from(slope.gradient.shape);
     // The colour falls as the size grows.
-    let colors = row[5..].iter().zip(&gradient[5..]);
-    shape.x -= colors.map(|(color, gradient)| color * gradient).sum::<f32>();
-    gradient[..2].copy_from_slice(&center.to_array());
-    gradient[2..5].copy_from_slice(&shape.to_array());
+    let colors = color.iter().zip(&slope.gradient.color);
+    by_shape.x -= colors.map(|(color, gradient)| color * gradient).sum::<f32>();
+    let by_center = frame.center.transpose() * Vec2::from(slope.gradient.center);
+    let (by_center, by_shape) = (by_center.to_array(), by_shape.to_array());
+    let gradient = Components { center: by_center, shape: by_shape, ..slope.gradient }.to_array();
 
     let area = frame.center.determinant() * slope.sensitivity;
-    let squared_color = row[5..].iter().map(|color| color * color).sum::<f32>();
+    let squared_color = color.iter().map(|color| color * color).sum::<f32>();
     let squared_strength = (squared_color + options.damping * options.damping) * area;
-    let curvatures: Row = [
-        POSITION * squared_strength,
-        POSITION * squared_strength,
-        SIZE * squared_strength,
-        RATIO * squared_strength,
-        SLANT * squared_strength,
-        COLOR * area,
-        COLOR * area,
-        COLOR * area,
-        COLOR * area,
-    ];
+    let curvatures = Components {
+        center: [POSITION * squared_strength; 2],
+        shape: [SIZE, RATIO, SLANT].map(|curvature| curvature * squared_strength),
+        color: [COLOR * area; 4],
+    }
+    .to_array();
     let momentum = options.momentum;
-    let agreement: f32 = (0..MAX_COMPONENTS)
-        .map(|index| state.mean[index] * gradient[index] / curvatures[index])
-        .sum();
+    let mut mean = state.mean.to_array();
+    let agreement: f32 =
+        (0..MAX_COMPONENTS).map(|index| mean[index] * gradient[index] / curvatures[index]).sum();
     // Before the first step there is nothing to agree with.
     if state.weight > 0.0 {
         let change = if agreement < 0.0 { SLOWER } else { FASTER };
@@ -96,28 +90,26 @@ pub(super) fn step(
     let rate = state.pace * (options.rate * factor) / state.weight;
     let mut steps = [0.0; MAX_COMPONENTS];
     for index in 0..MAX_COMPONENTS {
-        let mean = &mut state.mean[index];
+        let mean = &mut mean[index];
         *mean = momentum * *mean + (1.0 - momentum) * gradient[index];
         steps[index] = rate * *mean / curvatures[index];
     }
     let trusted = |step: f32| step.clamp(-options.trust_region, options.trust_region);
-    let center = frame.center * Vec2::from_slice(&steps).map(trusted);
-    let by_shape = shape_of(&steps).map(trusted);
-    let shape: Vec3 = shape_of(row) - frame.shape * by_shape;
-    row[0] -= center.x;
-    row[1] -= center.y;
-    row[2..5].copy_from_slice(&shape.to_array());
+    state.mean = Components::from_array(mean);
+    let steps = Components::from_array(steps);
+    let center = Vec2::from(center) - frame.center * Vec2::from(steps.center).map(trusted);
+    let by_shape = Vec3::from(steps.shape).map(trusted);
+    let shape: Vec3 = Vec3::from(shape) - frame.shape * by_shape;
     let faded = math::exp(by_shape.x);
-    for (value, step) in row[5..].iter_mut().zip(&steps[5..]) {
-        *value = *value * faded - step;
-    }
-    *row = bounds.clamped(*row);
+    let color = core::array::from_fn(|channel| color[channel] * faded - steps.color[channel]);
+    let (center, shape) = (center.to_array(), shape.to_array());
+    *components = bounds.clamped(Components { center, shape, color });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::{Gaussian, Parameterization};
+    use crate::gaussian::{Gaussian, Parameterization, component_count};
 
     const OPTIONS: GaussNewton =
         GaussNewton { rate: 1.0, momentum: 0.7, damping: 1e-3, trust_region: 0.2 };
@@ -126,15 +118,14 @@ mod tests {
     const SIDE: i32 = 96;
     const DENSITY: f32 = 2.0;
 
-    fn bounds(parameterization: Parameterization) -> RowBounds {
+    fn bounds(parameterization: Parameterization) -> Bounds {
         let length = SIDE as f32 / DENSITY;
-        RowBounds { parameterization, channels: CHANNELS, size: Vec2::splat(length) }
+        Bounds { parameterization, channels: CHANNELS, size: Vec2::splat(length) }
     }
 
-    /// The quartic kernel of a row at all pixels.
-    fn rendering(row: &Row, parameterization: Parameterization) -> Vec<f64> {
-        let Gaussian { center, cholesky, color } =
-            Gaussian::from_components(&row[..5 + CHANNELS], parameterization);
+    /// The quartic kernel of a Gaussian at all pixels.
+    fn rendering(components: &Components, parameterization: Parameterization) -> Vec<f64> {
+        let Gaussian { center, cholesky, color } = components.gaussian(parameterization);
         let [l11, l21, l22] = cholesky.map(f64::from);
         let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
         pixels
@@ -148,23 +139,27 @@ mod tests {
     }
 
     /// Half of the squared error per unit of area.
-    fn loss(row: &Row, source: &[f64], parameterization: Parameterization) -> f64 {
-        let rendering = rendering(row, parameterization);
+    fn loss(components: &Components, source: &[f64], parameterization: Parameterization) -> f64 {
+        let rendering = rendering(components, parameterization);
         let squares = rendering.iter().zip(source).map(|(value, source)| (value - source).powi(2));
         0.5 * squares.sum::<f64>() / f64::from(DENSITY * DENSITY)
     }
 
-    fn gradient(row: &Row, source: &[f64], parameterization: Parameterization) -> Row {
+    fn gradient(
+        components: &Components,
+        source: &[f64],
+        parameterization: Parameterization,
+    ) -> Components {
         let mut gradient = [0.0; MAX_COMPONENTS];
-        for (index, value) in gradient.iter_mut().enumerate().take(5 + CHANNELS) {
+        for (index, value) in gradient.iter_mut().enumerate().take(component_count(CHANNELS)) {
             let at = |step: f32| {
-                let mut row = *row;
-                row[index] += step;
-                loss(&row, source, parameterization)
+                let mut moved = components.to_array();
+                moved[index] += step;
+                loss(&Components::from_array(moved), source, parameterization)
             };
             *value = ((at(1e-2) - at(-1e-2)) / 2e-2) as f32;
         }
-        gradient
+        Components::from_array(gradient)
     }
 
     #[test]
@@ -175,34 +170,36 @@ mod tests {
                     parameterization,
                     [l11, l21, l22],
                 );
-                [center[0], center[1], shape.x, shape.y, shape.z, color, 0.0, 0.0, 0.0]
+                Components { center, shape, color: [color, 0.0, 0.0, 0.0] }
             };
             let optimum = from([5.0, -2.0, 3.0], [24.0, 22.0], 0.5);
             let source = rendering(&optimum, parameterization);
-            let mut row = from([4.0, 0.0, 4.0], [25.5, 21.0], 0.1);
-            let before = loss(&row, &source, parameterization);
+            let mut found = from([4.0, 0.0, 4.0], [25.5, 21.0], 0.1);
+            let before = loss(&found, &source, parameterization);
             let mut state = State::NEW;
             for _ in 0..40 {
-                let gradient = gradient(&row, &source, parameterization);
+                let gradient = gradient(&found, &source, parameterization);
                 let slope = Slope { gradient, sensitivity: 1.0 };
-                step(&mut row, &mut state, &slope, &OPTIONS, bounds(parameterization), 1.0);
+                step(&mut found, &mut state, &slope, &OPTIONS, bounds(parameterization), 1.0);
             }
-            let after = loss(&row, &source, parameterization);
-            assert!(after < 1e-3 * before, "{parameterization:?}: {before}, {after}, {row:?}");
-            assert!(row.iter().zip(optimum).all(|(a, b)| (a - b).abs() < 0.1), "{row:?}");
+            let after = loss(&found, &source, parameterization);
+            assert!(after < 1e-3 * before, "{parameterization:?}: {before}, {after}, {found:?}");
+            let mut pairs = found.to_array().into_iter().zip(optimum.to_array());
+            assert!(pairs.all(|(a, b)| (a - b).abs() < 0.1), "{found:?}");
         }
     }
 
     #[test]
     fn the_pace_rises_with_agreement_and_falls_with_contradiction() {
-        let mut row = [24.0, 24.0, 3.0, 0.0, 3.0, 0.5, 0.0, 0.0, 0.0];
+        let color = [0.5, 0.0, 0.0, 0.0];
+        let mut values = Components { center: [24.0; 2], shape: [3.0, 0.0, 3.0], color };
         let mut state = State::NEW;
         let mut paced = |by_color: f32| {
-            let mut gradient = [0.0; MAX_COMPONENTS];
-            gradient[5] = by_color;
+            let mut gradient = Components::ZERO;
+            gradient.color[0] = by_color;
             let slope = Slope { gradient, sensitivity: 1.0 };
             let bounds = bounds(Parameterization::Cholesky);
-            step(&mut row, &mut state, &slope, &OPTIONS, bounds, 0.01);
+            step(&mut values, &mut state, &slope, &OPTIONS, bounds, 0.01);
             state.pace
         };
         let paces = [1.0, 1.0, 1.0, -9.0, 9.0].map(&mut paced);

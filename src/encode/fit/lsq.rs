@@ -5,23 +5,24 @@
 //! Training renders exactly what the file will hold: the values pass through the same quantizers
 //! that the file stores, and are decoded by the same function that the decoder calls.
 
-use core::ops::Range;
 use std::sync::Arc;
 
+use super::components::{Bounds, Components};
 use super::parameterization;
-use super::row::{Row, RowBounds};
 use super::training;
 use super::vector_quantizer::VectorQuantizer;
 use crate::coding::packed::{MAX_PARAMETER, Quantizer, UniformQuantizer};
-use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::gaussian::{MAX_COMPONENTS, Parameterization, component_count};
 
 /// The quantizers of all components during training.
 #[derive(Clone, Debug)]
 pub(crate) struct LsqQuantizers {
-    components: Vec<LsqQuantizer>,
-    /// What takes the place of LSQ+, and at which components.
-    replacements: Vec<(Range<usize>, Arc<dyn VectorQuantizer>)>,
-    parameterization: Parameterization,
+    /// There is none where something else takes the place of LSQ+.
+    components: Vec<Option<LsqQuantizer>>,
+    /// What takes the place of LSQ+.
+    center: Option<Arc<dyn VectorQuantizer>>,
+    color: Option<Arc<dyn VectorQuantizer>>,
+    bounds: Bounds,
     /// Steps of Adam so far.
     age: i32,
 }
@@ -30,11 +31,10 @@ pub(crate) struct LsqQuantizers {
 #[derive(Clone, Copy, Debug)]
 struct LsqQuantizer {
     quantizer: UniformQuantizer,
-    /// Whether another quantizer takes its place.
-    is_replaced: bool,
     /// For a logarithmic quantizer, the logarithm of the least value.
     min_logarithm: Option<f32>,
-    /// Whether the offset is kept a multiple of the scale, so that a code stands for exactly 0.
+    /// Whether the offset is kept a multiple of the scale, so that a code stands for exactly 0, as an
+    /// off-diagonal entry of a covariance needs it.
     has_zero: bool,
     /// Adam's moving averages of the gradients by scale and offset, and of their squares.
     mean: [f32; 2],
@@ -54,127 +54,141 @@ const CLIPPED: f64 = 0.2;
 pub(crate) type QuantizerGradients = [[f32; 2]; MAX_COMPONENTS];
 
 impl LsqQuantizers {
-    /// Quantizers whose ranges cover `rows`, except for outliers of colour.
-    pub(crate) fn new(rows: &[Row], bounds: RowBounds, options: &training::Quantization) -> Self {
+    /// Quantizers whose ranges cover `values`, except for outliers of colour.
+    pub(crate) fn new(
+        values: &[Components],
+        bounds: Bounds,
+        options: &training::Quantization,
+    ) -> Self {
+        let is_covariance = bounds.parameterization == Parameterization::Covariance;
         let is_logarithmic = parameterization::is_logarithmic(bounds.parameterization);
         // A variance is the square of a deviation.
-        let power = if bounds.parameterization == Parameterization::Covariance { 2.0 } else { 1.0 };
+        let power = if is_covariance { 2.0 } else { 1.0 };
         let min_logarithm = power * parameterization::MIN_DEVIATION.ln();
-        let others = [(0..2, &options.center), (5..5 + bounds.channels, &options.color)];
-        let replacements: Vec<_> = (others.into_iter())
-            .filter_map(|(range, other)| Some((range, other.clone()?)))
-            .collect();
-        let area = |row: &Row| {
-            let [l11, _, l22] =
-                Gaussian::from_components(&row[..], bounds.parameterization).cholesky;
+        let logarithms = is_logarithmic.map(|is| is.then_some(min_logarithm));
+        let no = Components::by_attribute(false, false, false);
+        let min_logarithms =
+            Components { shape: logarithms, ..Components::by_attribute(None, None, None) }
+                .to_array();
+        let has_zero = Components { shape: [false, is_covariance, false], ..no }.to_array();
+        let may_clip = Components { color: [true; 4], ..no }.to_array();
+        let depths = options.depths().to_array();
+        let area = |components: &Components| {
+            let [l11, _, l22] = components.gaussian(bounds.parameterization).cholesky;
             f64::from(l11 * l22)
         };
-        let areas: Vec<f64> = rows.iter().map(area).collect();
-        let components = (0..5 + bounds.channels).map(|index| {
-            let (bits, min_logarithm, has_zero) = match index {
-                0 | 1 => (options.position_bits, None, false),
-                2..5 => {
-                    let has_zero =
-                        bounds.parameterization == Parameterization::Covariance && index == 3;
-                    let min_logarithm = is_logarithmic[index - 2].then_some(min_logarithm);
-                    (options.shape_bits, min_logarithm, has_zero)
-                }
-                _ => (options.color_bits, None, false),
-            };
-            let values = rows.iter().map(|row| to_uniform(row[index], min_logarithm));
-            let (low, high) = match index {
-                ..5 => range(values),
-                _ => least_error_range(&values.zip(areas.iter().copied()), bits),
+        let areas: Vec<f64> = values.iter().map(area).collect();
+        let components = (0..component_count(bounds.channels)).map(|index| {
+            let (bits, min_logarithm) = (depths[index]?, min_logarithms[index]);
+            let values = values.iter().map(|values| values.to_array()[index]);
+            let values = values.map(|value| to_uniform(value, min_logarithm));
+            let range = if may_clip[index] {
+                least_error_range(&values.zip(areas.iter().copied()), bits)
+            } else {
+                range(values)
             };
             let mut component = LsqQuantizer {
-                quantizer: covering((low, high), bits),
-                is_replaced: replacements.iter().any(|(range, _)| range.contains(&index)),
+                quantizer: covering(range, bits),
                 min_logarithm,
-                has_zero,
+                has_zero: has_zero[index],
                 mean: [0.0; 2],
                 square: [0.0; 2],
             };
             component.clamp();
-            component
+            Some(component)
         });
         let mut quantizers = Self {
             components: components.collect(),
-            replacements,
-            parameterization: bounds.parameterization,
+            center: options.center.clone(),
+            color: options.color.clone(),
+            bounds,
             age: 0,
         };
-        quantizers.adapt(rows);
+        quantizers.adapt(values);
         quantizers
     }
 
     /// The quantizers as the file stores them.
     pub(crate) fn stored(&self) -> Vec<Quantizer> {
-        self.components.iter().map(LsqQuantizer::stored).collect()
+        self.components.iter().map(stored).collect()
     }
 
     /// The codes of a Gaussian. If rounding makes a covariance invalid, the code of its
     /// off-diagonal entry moves towards that of 0 until the covariance is valid.
-    pub(crate) fn codes(&self, row: &Row) -> [u32; MAX_COMPONENTS] {
+    pub(crate) fn codes(&self, values: &Components) -> Components<u32> {
+        let mut values = *values;
+        if let Some(quantizer) = &self.center {
+            quantizer.quantize(&mut values.center);
+        }
+        if let Some(quantizer) = &self.color {
+            quantizer.quantize(&mut values.color[..self.bounds.channels]);
+        }
         let mut codes = [0; MAX_COMPONENTS];
-        for ((code, &value), component) in codes.iter_mut().zip(row).zip(&self.components) {
-            *code = component.quantizer.code(to_uniform(value, component.min_logarithm));
+        for ((code, value), component) in
+            codes.iter_mut().zip(values.to_array()).zip(&self.components)
+        {
+            *code = component.as_ref().map_or(value.to_bits(), |component| component.code(value));
         }
-        for (range, quantizer) in &self.replacements {
-            let mut values = *row;
-            quantizer.quantize(&mut values[range.clone()]);
-            for index in range.clone() {
-                codes[index] = values[index].to_bits();
-            }
-        }
-        if self.parameterization == Parameterization::Covariance && !self.is_drawable(&codes) {
+        let mut codes = Components::from_array(codes);
+        let off_diagonal = self.components.iter().flatten().find(|component| component.has_zero);
+        if let Some(off_diagonal) = off_diagonal
+            && !self.is_drawable(&codes)
+        {
             // An off-diagonal entry of 0 is always valid: bisect between its code and the rounded
             // one.
-            let mut valid = self.components[3].quantizer.code(0.0);
-            let mut invalid = codes[3];
+            let mut valid = off_diagonal.code(0.0);
+            let mut invalid = codes.shape[1];
             while valid.abs_diff(invalid) > 1 {
-                codes[3] = u32::midpoint(valid, invalid);
+                codes.shape[1] = u32::midpoint(valid, invalid);
                 if self.is_drawable(&codes) {
-                    valid = codes[3];
+                    valid = codes.shape[1];
                 } else {
-                    invalid = codes[3];
+                    invalid = codes.shape[1];
                 }
             }
-            codes[3] = valid;
+            codes.shape[1] = valid;
         }
         codes
     }
 
     /// The values that the codes of a Gaussian stand for, computed as the decoder does.
-    pub(crate) fn decoded(&self, codes: &[u32; MAX_COMPONENTS]) -> Row {
-        let mut row = [0.0; MAX_COMPONENTS];
-        for ((value, &code), component) in row.iter_mut().zip(codes).zip(&self.components) {
-            *value = component.stored().value(code);
+    pub(crate) fn decoded(&self, codes: &Components<u32>) -> Components {
+        let mut values = [0.0; MAX_COMPONENTS];
+        for ((value, code), component) in
+            values.iter_mut().zip(codes.to_array()).zip(&self.components)
+        {
+            *value = stored(component).value(code);
         }
-        row
+        Components::from_array(values)
     }
 
     /// The backward pass through the quantizers of a Gaussian, with the straight-through estimator.
     ///
-    /// `row` holds the trained values and `decoded` the decoded ones. `gradient` is by the decoded
-    /// values before and by the trained ones after. Returns the gradients by scales and offsets.
+    /// `trained` are the trained values and `decoded` the decoded ones. `by_value` is the gradient by
+    /// the decoded values before and by the trained ones after. Returns the gradients by scales and
+    /// offsets.
     pub(crate) fn backward(
         &self,
-        row: &Row,
-        decoded: &Row,
-        gradient: &mut Row,
+        trained: &Components,
+        decoded: &Components,
+        by_value: &mut Components,
     ) -> QuantizerGradients {
-        let mut by_quantizer = [[0.0; 2]; MAX_COMPONENTS];
-        for (range, quantizer) in &self.replacements {
-            quantizer.add_gradient(&row[range.clone()], &mut gradient[range.clone()]);
+        if let Some(quantizer) = &self.center {
+            quantizer.add_gradient(&trained.center, &mut by_value.center);
         }
+        if let Some(quantizer) = &self.color {
+            let channels = ..self.bounds.channels;
+            quantizer.add_gradient(&trained.color[channels], &mut by_value.color[channels]);
+        }
+        let mut by_quantizer = [[0.0; 2]; MAX_COMPONENTS];
+        let mut gradient = by_value.to_array();
+        let [trained, decoded] = [trained, decoded].map(|values| values.to_array());
         for (index, component) in self.components.iter().enumerate() {
-            if component.is_replaced {
-                continue;
-            }
+            let Some(component) = component else { continue };
             let UniformQuantizer { scale, offset, .. } = component.quantizer;
             let max = component.quantizer.max_code() as f32;
             // The code before it is clamped and rounded.
-            let code = (to_uniform(row[index], component.min_logarithm) - offset) / scale;
+            let code = (to_uniform(trained[index], component.min_logarithm) - offset) / scale;
             let mut by_uniform = gradient[index];
             if component.min_logarithm.is_some() {
                 by_uniform *= decoded[index];
@@ -187,47 +201,54 @@ impl LsqQuantizers {
                 [by_uniform * (code.round_ties_even() - code), 0.0]
             };
             gradient[index] = if (0.0..=max).contains(&code) {
-                by_uniform / if component.min_logarithm.is_some() { row[index] } else { 1.0 }
+                by_uniform / if component.min_logarithm.is_some() { trained[index] } else { 1.0 }
             } else {
                 0.0
             };
         }
+        *by_value = Components::from_array(gradient);
         by_quantizer
     }
 
     /// Takes one step of Adam on scales and offsets, against gradients summed over the Gaussians
-    /// whose values are now `rows`.
-    pub(crate) fn step(&mut self, gradients: &QuantizerGradients, rows: &[Row], rate: f32) {
+    /// which now have these values.
+    pub(crate) fn step(
+        &mut self,
+        gradients: &QuantizerGradients,
+        values: &[Components],
+        rate: f32,
+    ) {
         self.age += 1;
         let unbias = [1.0 - 0.9_f32.powi(self.age), 1.0 - 0.999_f32.powi(self.age)];
         for (component, gradient) in self.components.iter_mut().zip(gradients) {
-            component.step(gradient, rows.len(), rate, unbias);
+            if let Some(component) = component {
+                component.step(gradient, values.len(), rate, unbias);
+            }
         }
-        self.adapt(rows);
+        self.adapt(values);
     }
 
-    fn adapt(&mut self, rows: &[Row]) {
-        for (range, quantizer) in &mut self.replacements {
-            let values: Vec<&[f32]> = rows.iter().map(|row| &row[range.clone()]).collect();
-            *quantizer = quantizer.adapted(&values);
+    fn adapt(&mut self, values: &[Components]) {
+        if let Some(quantizer) = &mut self.center {
+            let centers: Vec<&[f32]> = values.iter().map(|values| &values.center[..]).collect();
+            *quantizer = quantizer.adapted(&centers);
+        }
+        if let Some(quantizer) = &mut self.color {
+            let channels = ..self.bounds.channels;
+            let colors: Vec<&[f32]> = values.iter().map(|values| &values.color[channels]).collect();
+            *quantizer = quantizer.adapted(&colors);
         }
     }
 
     /// Whether codes stand for a valid Gaussian.
-    fn is_drawable(&self, codes: &[u32; MAX_COMPONENTS]) -> bool {
-        let row = self.decoded(codes);
-        Gaussian::from_components(&row[..self.components.len()], self.parameterization)
-            .is_drawable()
+    fn is_drawable(&self, codes: &Components<u32>) -> bool {
+        self.decoded(codes).gaussian(self.bounds.parameterization).is_drawable()
     }
 }
 
 impl LsqQuantizer {
-    fn stored(&self) -> Quantizer {
-        match self.min_logarithm {
-            _ if self.is_replaced => Quantizer::Float,
-            Some(_) => Quantizer::Log(self.quantizer),
-            None => Quantizer::Linear(self.quantizer),
-        }
+    fn code(&self, value: f32) -> u32 {
+        self.quantizer.code(to_uniform(value, self.min_logarithm))
     }
 
     fn step(&mut self, gradient: &[f32; 2], count: usize, rate: f32, unbias: [f32; 2]) {
@@ -262,6 +283,15 @@ impl LsqQuantizer {
             let zero = (-*offset / *scale).round().clamp(0.0, self.quantizer.max_code() as f32);
             self.quantizer.offset = -zero * self.quantizer.scale;
         }
+    }
+}
+
+/// What the file stores: floats where something else takes the place of LSQ+.
+fn stored(component: &Option<LsqQuantizer>) -> Quantizer {
+    match component {
+        None => Quantizer::Float,
+        Some(LsqQuantizer { quantizer, min_logarithm: Some(_), .. }) => Quantizer::Log(*quantizer),
+        Some(LsqQuantizer { quantizer, .. }) => Quantizer::Linear(*quantizer),
     }
 }
 
@@ -330,18 +360,25 @@ mod tests {
 
     use super::*;
     use crate::encode::fit::training::Training;
+    use crate::gaussian::SHAPE;
     use crate::testing::config;
+
+    impl LsqQuantizers {
+        fn lsq(&self) -> impl Iterator<Item = &LsqQuantizer> {
+            self.components.iter().flatten()
+        }
+    }
 
     const PARAMETERIZATIONS: [Parameterization; 3] =
         [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
-    fn bounds(parameterization: Parameterization) -> RowBounds {
-        RowBounds { parameterization, channels: 3, size: Vec2::new(300.0, 200.0) }
+    fn bounds(parameterization: Parameterization) -> Bounds {
+        Bounds { parameterization, channels: 3, size: Vec2::new(300.0, 200.0) }
     }
 
     /// Valid Gaussians, from tiny ones to ones as large as the picture, some of them very
     /// elongated.
-    fn rows(parameterization: Parameterization, count: usize, seed: u64) -> Vec<Row> {
+    fn values(parameterization: Parameterization, count: usize, seed: u64) -> Vec<Components> {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut number = move |low: f32, high: f32| low + (high - low) * rng.f32();
         (0..count)
@@ -349,16 +386,11 @@ mod tests {
                 let (s1, s2) = (number(-1.5, 5.0).exp(), number(-1.5, 2.0).exp());
                 let factor =
                     Parameterization::RotationScale.to_cholesky([s1, s2, number(-3.0, 3.0)]);
-                let mut row = [0.0; MAX_COMPONENTS];
-                row[0] = number(-5.0, 305.0);
-                row[1] = number(-5.0, 205.0);
-                row[2..5].copy_from_slice(
-                    &parameterization::from_cholesky(parameterization, factor).to_array(),
-                );
-                for value in &mut row[5..8] {
-                    *value = number(-0.5, 1.0);
-                }
-                bounds(parameterization).clamped(row)
+                let center = [number(-5.0, 305.0), number(-5.0, 205.0)];
+                let shape = parameterization::from_cholesky(parameterization, factor);
+                let [c0, c1, c2] = [(); 3].map(|()| number(-0.5, 1.0));
+                let color = [c0, c1, c2, 0.0];
+                bounds(parameterization).clamped(Components { center, shape, color })
             })
             .collect()
     }
@@ -369,19 +401,19 @@ mod tests {
         #[test]
         fn no_gaussian_is_lost_by_rounding(seed: u64, shape_bits in 2_u8..=12, drift in -30..30) {
             for parameterization in PARAMETERIZATIONS {
-                let rows = rows(parameterization, 50, seed);
+                let values = values(parameterization, 50, seed);
                 let mut options = Training::fast(1).quantization;
                 options.shape_bits = shape_bits;
-                let mut quantizers = LsqQuantizers::new(&rows, bounds(parameterization), &options);
+                let mut quantizers = LsqQuantizers::new(&values, bounds(parameterization), &options);
                 // Training moves scales and offsets.
                 let gradient = [[f32::from(drift as i8), -f32::from(drift as i8)]; MAX_COMPONENTS];
                 for _ in 0..5 {
-                    quantizers.step(&gradient, &rows, 0.05);
+                    quantizers.step(&gradient, &values, 0.05);
                 }
-                for row in &rows {
-                    let codes = quantizers.codes(row);
-                    prop_assert!(quantizers.is_drawable(&codes), "{parameterization:?}: {row:?}");
-                    for (code, component) in codes.iter().zip(&quantizers.components) {
+                for values in &values {
+                    let codes = quantizers.codes(values);
+                    prop_assert!(quantizers.is_drawable(&codes), "{parameterization:?}: {values:?}");
+                    for (code, component) in codes.to_array().iter().zip(quantizers.lsq()) {
                         prop_assert!(*code <= component.quantizer.max_code());
                     }
                 }
@@ -390,15 +422,18 @@ mod tests {
 
         #[test]
         fn the_rounding_error_is_at_most_half_a_step(seed: u64) {
-            let rows = rows(Parameterization::Cholesky, 40, seed);
+            let values = values(Parameterization::Cholesky, 40, seed);
             let options = Training::fast(1).quantization;
-            let quantizers = LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
-            for row in &rows {
-                let decoded = quantizers.decoded(&quantizers.codes(row));
+            let quantizers =
+                LsqQuantizers::new(&values, bounds(Parameterization::Cholesky), &options);
+            for values in &values {
+                let decoded = quantizers.decoded(&quantizers.codes(values));
                 // The ranges of position and shape are covered; outliers of colour are clipped.
-                for (index, component) in quantizers.components.iter().enumerate().take(5) {
-                    let uniform = |row: &Row| to_uniform(row[index], component.min_logarithm);
-                    let error = uniform(&decoded) - uniform(row);
+                for (index, component) in quantizers.lsq().take(SHAPE.end).enumerate() {
+                    let uniform = |values: &Components| {
+                        to_uniform(values.to_array()[index], component.min_logarithm)
+                    };
+                    let error = uniform(&decoded) - uniform(values);
                     prop_assert!(error.abs() <= 0.501 * component.quantizer.scale + 1e-5);
                 }
             }
@@ -407,30 +442,32 @@ mod tests {
 
     #[test]
     fn gradients_by_scale_and_offset_are_those_of_lsq_plus() {
-        let rows = rows(Parameterization::Cholesky, 30, 7);
+        let values = values(Parameterization::Cholesky, 30, 7);
         let options = Training::fast(1).quantization;
-        let quantizers = LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
+        let quantizers = LsqQuantizers::new(&values, bounds(Parameterization::Cholesky), &options);
         // A colour inside, below and above the range.
-        let UniformQuantizer { scale, offset, .. } = quantizers.components[5].quantizer;
-        let max = quantizers.components[5].quantizer.max_code() as f32;
+        let of_color = quantizers.lsq().nth(SHAPE.end).expect("it is quantized").quantizer;
+        let UniformQuantizer { scale, offset, .. } = of_color;
+        let max = of_color.max_code() as f32;
         for (position, by_scale, by_offset, by_value) in
             [(3.25, -0.25, 0.0, 1.0), (-2.0, 0.0, 1.0, 0.0), (max + 2.0, max, 1.0, 0.0)]
         {
-            let mut row = rows[0];
-            row[5] = offset + position * scale;
-            let decoded = quantizers.decoded(&quantizers.codes(&row));
-            let mut gradient = [0.0; MAX_COMPONENTS];
-            gradient[5] = 2.0;
-            let by_quantizer = quantizers.backward(&row, &decoded, &mut gradient);
-            assert!((by_quantizer[5][0] - 2.0 * by_scale).abs() < 1e-3, "scale at {position}");
-            assert_eq!(by_quantizer[5][1], 2.0 * by_offset, "offset at {position}");
-            assert_eq!(gradient[5], 2.0 * by_value, "value at {position}");
+            let mut trained = values[0];
+            trained.color[0] = offset + position * scale;
+            let decoded = quantizers.decoded(&quantizers.codes(&trained));
+            let mut gradient = Components::ZERO;
+            gradient.color[0] = 2.0;
+            let by_quantizer = quantizers.backward(&trained, &decoded, &mut gradient);
+            let by_quantizer = by_quantizer[SHAPE.end];
+            assert!((by_quantizer[0] - 2.0 * by_scale).abs() < 1e-3, "scale at {position}");
+            assert_eq!(by_quantizer[1], 2.0 * by_offset, "offset at {position}");
+            assert_eq!(gradient.color[0], 2.0 * by_value, "value at {position}");
         }
         // A logarithmic quantizer passes the gradient as if nothing were rounded in the logarithm.
-        let decoded = quantizers.decoded(&quantizers.codes(&rows[0]));
-        let mut gradient = [1.0; MAX_COMPONENTS];
-        quantizers.backward(&rows[0], &decoded, &mut gradient);
-        assert!((gradient[2] - decoded[2] / rows[0][2]).abs() < 1e-5);
+        let decoded = quantizers.decoded(&quantizers.codes(&values[0]));
+        let mut gradient = Components::by_attribute(1.0, 1.0, 1.0);
+        quantizers.backward(&values[0], &decoded, &mut gradient);
+        assert!((gradient.shape[0] - decoded.shape[0] / values[0].shape[0]).abs() < 1e-5);
     }
 
     /// Rounds to multiples of a step that each adaptation halves, and pulls values down.
@@ -454,30 +491,32 @@ mod tests {
 
     #[test]
     fn another_quantizer_takes_the_place_of_lsq_plus() {
-        let rows = rows(Parameterization::Cholesky, 9, 5);
+        let values = values(Parameterization::Cholesky, 9, 5);
         let mut options = Training::fast(1).quantization;
         options.color = Some(Arc::new(Halving(1.0)));
         let mut quantizers =
-            LsqQuantizers::new(&rows, bounds(Parameterization::Cholesky), &options);
-        assert_eq!(quantizers.stored()[5..], [Quantizer::Float; 3]);
-        let row = [30.0, 20.0, 2.0, 0.0, 2.0, 0.3125, -0.5625, 0.9375, 0.0];
-        assert_eq!(quantizers.decoded(&quantizers.codes(&row))[5..], [0.5, -0.5, 1.0, 0.0]);
-        let decoded = quantizers.decoded(&quantizers.codes(&row));
-        let mut gradient = [1.0; MAX_COMPONENTS];
-        let by_quantizer = quantizers.backward(&row, &decoded, &mut gradient);
-        assert_eq!(gradient[5..8], [1.3125, 0.4375, 1.9375]);
-        quantizers.step(&by_quantizer, &rows, 1e-3);
-        assert_eq!(quantizers.decoded(&quantizers.codes(&row))[5..], [0.25, -0.5, 1.0, 0.0]);
+            LsqQuantizers::new(&values, bounds(Parameterization::Cholesky), &options);
+        assert_eq!(quantizers.stored()[SHAPE.end..], [Quantizer::Float; 3]);
+        let color = [0.3125, -0.5625, 0.9375, 0.0];
+        let trained = Components { center: [30.0, 20.0], shape: [2.0, 0.0, 2.0], color };
+        let decoded = quantizers.decoded(&quantizers.codes(&trained));
+        assert_eq!(decoded.color, [0.5, -0.5, 1.0, 0.0]);
+        let mut gradient = Components::by_attribute(1.0, 1.0, 1.0);
+        let by_quantizer = quantizers.backward(&trained, &decoded, &mut gradient);
+        assert_eq!(gradient.color[..3], [1.3125, 0.4375, 1.9375]);
+        quantizers.step(&by_quantizer, &values, 1e-3);
+        let decoded = quantizers.decoded(&quantizers.codes(&trained));
+        assert_eq!(decoded.color, [0.25, -0.5, 1.0, 0.0]);
     }
 
     #[test]
     fn equal_values_are_kept_exactly() {
-        let row = rows(Parameterization::Cholesky, 1, 3)[0];
+        let trained = values(Parameterization::Cholesky, 1, 3)[0];
         let options = Training::fast(1).quantization;
         let quantizers =
-            LsqQuantizers::new(&[row; 9], bounds(Parameterization::Cholesky), &options);
-        let decoded = quantizers.decoded(&quantizers.codes(&row));
-        for (decoded, value) in decoded.iter().zip(row) {
+            LsqQuantizers::new(&[trained; 9], bounds(Parameterization::Cholesky), &options);
+        let decoded = quantizers.decoded(&quantizers.codes(&trained));
+        for (decoded, value) in decoded.to_array().iter().zip(trained.to_array()) {
             assert!((decoded - value).abs() <= 1e-6 * value.abs());
         }
         for quantizer in

@@ -4,6 +4,7 @@ mod adam;
 mod bins;
 pub(crate) mod budget;
 mod checkpoint;
+mod components;
 mod densify;
 mod distortion_map;
 mod gauss_newton;
@@ -12,7 +13,6 @@ mod parameterization;
 mod parameters;
 mod pass;
 mod rate_term;
-mod row;
 mod schedule;
 mod state;
 pub(crate) mod training;
@@ -24,12 +24,12 @@ use glam::Vec2;
 use bins::reset;
 use budget::Budget;
 use checkpoint::Checkpoint;
+use components::{Bounds, Components, Slope};
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
 use parameters::Parameters;
 use pass::{Pass, Rendered};
 use rate_term::RateTerm;
-use row::{Row, RowBounds, Slope, shape_of};
 use schedule::TrainingSchedule;
 use training::{Portion, Training};
 use training_tile::RenderingError;
@@ -41,7 +41,7 @@ use super::raster::Raster;
 use super::rate_model;
 use super::workload::Workload;
 use crate::coding::packed::{PackedCodes, Quantizer};
-use crate::gaussian::{Gaussian, MAX_COMPONENTS};
+use crate::gaussian::{Gaussian, component_count};
 use crate::render::splat::Splat;
 
 // Constants: docs/tuning.md, "Iterations".
@@ -75,7 +75,7 @@ pub(crate) struct Fit<'a> {
     budget: Budget,
     precision: Precision,
     base: [f32; 4],
-    bounds: RowBounds,
+    bounds: Bounds,
     parameters: Parameters,
     /// The quantizers, once quantization-aware training has started.
     quantizers: Option<LsqQuantizers>,
@@ -112,7 +112,7 @@ impl<'a> Fit<'a> {
             budget,
             precision,
             base,
-            bounds: RowBounds {
+            bounds: Bounds {
                 parameterization: training.parameterization,
                 channels: raster.channels,
                 size: Vec2::new(raster.width as f32, raster.height as f32),
@@ -197,7 +197,7 @@ impl<'a> Fit<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         if let Some(best) = self.best.take() {
-            self.parameters.replace(best.rows);
+            self.parameters.replace(best.values);
         }
         let was_quantized = self.quantizers.take().is_some();
         self.invalidate();
@@ -224,26 +224,23 @@ impl<'a> Fit<'a> {
     /// floats.
     pub(crate) fn fitted(&self) -> PackedCodes {
         let empty = Checkpoint::new();
-        let Checkpoint { rows, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
+        let Checkpoint { values, quantizers, .. } = self.best.as_ref().unwrap_or(&empty);
         match quantizers {
             Some(quantizers) => PackedCodes {
                 quantizers: quantizers.stored(),
-                codes: rows.iter().map(|row| quantizers.codes(row)).collect(),
+                codes: values.iter().map(|values| quantizers.codes(values).to_array()).collect(),
             },
             None => PackedCodes {
-                quantizers: vec![Quantizer::Float; 5 + self.raster.channels],
-                codes: rows.iter().map(|row| row.map(f32::to_bits)).collect(),
+                quantizers: vec![Quantizer::Float; component_count(self.raster.channels)],
+                codes: values.iter().map(|values| values.to_array().map(f32::to_bits)).collect(),
             },
         }
     }
 
     /// The best Gaussians so far, without quantization.
     pub(crate) fn gaussians(&self) -> Vec<Gaussian> {
-        let rows = self.best.as_ref().map_or(&[][..], |best| &best.rows);
-        let components = 5 + self.raster.channels;
-        let gaussian =
-            |row: &Row| Gaussian::from_components(&row[..components], self.bounds.parameterization);
-        rows.iter().map(gaussian).collect()
+        let values = self.best.as_ref().map_or(&[][..], |best| &best.values);
+        values.iter().map(|values| values.gaussian(self.bounds.parameterization)).collect()
     }
 
     /// The error of the best Gaussians so far.
@@ -291,9 +288,8 @@ impl<'a> Fit<'a> {
             return rate_model::USUAL_COMPONENT_BITS;
         }
         let step = rate_model::color_step(rate_model::step_for(distortion, self.len()));
-        let bits = |row: &Row| {
-            let gaussian = Gaussian::from_components(&row[..], self.bounds.parameterization);
-            rate_model::component_bits(&gaussian, step)
+        let bits = |values: &Components| {
+            rate_model::component_bits(&values.gaussian(self.bounds.parameterization), step)
         };
         self.parameters.values.iter().map(bits).sum::<f64>() / self.len() as f64
     }
@@ -367,12 +363,11 @@ impl<'a> Fit<'a> {
     fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         reset(&mut self.splats, self.parameters.len(), Splat::NOWHERE);
-        let rows = self.parameters.values.chunks(CHUNK);
-        let chunks = rows.zip(self.splats.chunks_mut(CHUNK));
-        observer.map(WORK * CHUNK as f64, chunks, |(rows, splats)| {
-            for (row, splat) in rows.iter().zip(splats) {
-                let row = decoded(quantizers.as_ref(), row);
-                let gaussian = Gaussian::from_components(&row[..], parameterization);
+        let chunks = self.parameters.values.chunks(CHUNK);
+        let chunks = chunks.zip(self.splats.chunks_mut(CHUNK));
+        observer.map(WORK * CHUNK as f64, chunks, |(values, splats)| {
+            for (values, splat) in values.iter().zip(splats) {
+                let gaussian = decoded(quantizers.as_ref(), values).gaussian(parameterization);
                 *splat = Splat::new(&gaussian).unwrap_or(Splat::NOWHERE);
             }
         })?;
@@ -405,9 +400,8 @@ impl<'a> Fit<'a> {
                 splats,
                 observer,
                 #[inline(always)]
-                |index, row| {
-                    let [x, y, l11, l21, l22, ..] = *row;
-                    let sensitivity = raster.sensitivity_under([x, y], [l11, l21, l22]);
+                |index, values| {
+                    let sensitivity = raster.sensitivity_under(values.center, values.shape);
                     (pass.gradient(index, channels), sensitivity)
                 },
             )?;
@@ -417,22 +411,17 @@ impl<'a> Fit<'a> {
             }
         }
         let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(self.bounds, factor, observer, |index, row, sum| {
-                let decoded = decoded(quantizers, row);
-                let gaussian =
-                    Gaussian::from_components(&decoded[..5 + channels], parameterization);
+            self.parameters.step(self.bounds, factor, observer, |index, values, sum| {
+                let decoded = decoded(quantizers, values);
+                let gaussian = decoded.gaussian(parameterization);
                 let mut by_splat = pass.gradient(index, channels);
                 if let Some(rate_term) = rate_term {
                     by_splat += rate_term.gradient(&gaussian);
                 }
-                let (center, shape) =
-                    by_splat.geometry.gradients(parameterization, shape_of(&decoded));
-                let mut gradient = [0.0; MAX_COMPONENTS];
-                gradient[..2].copy_from_slice(&center.to_array());
-                gradient[2..5].copy_from_slice(&shape.to_array());
-                gradient[5..].copy_from_slice(&by_splat.color);
+                let (center, shape) = by_splat.geometry.gradients(parameterization, decoded.shape);
+                let mut gradient = Components { center, shape, color: by_splat.color };
                 if let Some(quantizers) = quantizers {
-                    add(sum, &quantizers.backward(row, &decoded, &mut gradient));
+                    add(sum, &quantizers.backward(values, &decoded, &mut gradient));
                 }
                 let sensitivity = raster.sensitivity_under(gaussian.center, gaussian.cholesky);
                 Slope { gradient, sensitivity }
@@ -472,11 +461,11 @@ impl<'a> Fit<'a> {
             bounds: self.bounds,
             count: self.parameters.len() - replaced,
         };
-        let rows = densifier.new_gaussians(count + replaced, &mut self.rng, observer)?;
+        let new = densifier.new_gaussians(count + replaced, &mut self.rng, observer)?;
         observer.poll()?;
-        self.cull(rows.len() * replaced / (count + replaced), observer)?;
+        self.cull(new.len() * replaced / (count + replaced), observer)?;
         self.free_bins();
-        self.parameters.extend(&rows);
+        self.parameters.extend(&new);
         self.parameters.sort(observer)?;
         self.invalidate();
         Ok(())
@@ -499,14 +488,14 @@ impl<'a> Fit<'a> {
         let parameterization = self.bounds.parameterization;
         let chunks = self.parameters.values.chunks(CHUNK).enumerate();
         // In the order of importance, and of equal ones in that of the Gaussians.
-        let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, rows)| {
-            let key = |(index, row): (usize, &Row)| {
-                let gaussian = Gaussian::from_components(&row[..], parameterization);
+        let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, values)| {
+            let key = |(index, values): (usize, &Components)| {
+                let gaussian = values.gaussian(parameterization);
                 let Gaussian { center, cholesky, .. } = gaussian;
                 let sensitivity = self.raster.sensitivity_under(center, cholesky);
                 u64::from(ordered(gaussian.importance() * sensitivity)) << 32 | index as u64
             };
-            (chunk * CHUNK..).zip(rows).map(key).collect::<Vec<u64>>()
+            (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
         })?;
         let mut keys = keys.concat();
         observer.poll()?;
@@ -528,8 +517,7 @@ impl<'a> Fit<'a> {
         let parameterization = self.bounds.parameterization;
         let quantizers = self.quantizers.as_ref();
         let is_visible = |index: usize| {
-            let row = decoded(quantizers, &values[index]);
-            let gaussian = Gaussian::from_components(&row[..], parameterization);
+            let gaussian = decoded(quantizers, &values[index]).gaussian(parameterization);
             let has_color = gaussian.color.iter().any(|color| color.abs() >= MIN_COLOR);
             let is_inside = self.pass.touches(index);
             gaussian.is_drawable() && has_color && is_inside
@@ -544,8 +532,8 @@ impl<'a> Fit<'a> {
 
     /// Starts quantization-aware training (paper, section "Compression Framework").
     fn start_quantization(&mut self) {
-        for row in &mut self.parameters.values {
-            *row = self.bounds.clamped(*row);
+        for values in &mut self.parameters.values {
+            *values = self.bounds.clamped(*values);
         }
         self.float_error = self.error.squared;
         self.quantizers = Some(LsqQuantizers::new(
@@ -578,8 +566,8 @@ impl<'a> Fit<'a> {
     fn keep_if_best(&mut self) {
         let best = self.best.get_or_insert_with(Checkpoint::new);
         if self.error.distortion < best.error.distortion {
-            let (tiles, rows) = (self.pass.tile_distortions(), &self.parameters.values);
-            best.set(self.error, tiles, rows, self.quantizers.as_ref());
+            let (tiles, values) = (self.pass.tile_distortions(), &self.parameters.values);
+            best.set(self.error, tiles, values, self.quantizers.as_ref());
         }
     }
 
@@ -588,9 +576,9 @@ impl<'a> Fit<'a> {
     fn return_to_best(&mut self) {
         let Some(best) = &mut self.best else { return };
         let blamed = best.blamed(self.pass.tile_distortions());
-        self.parameters.values.copy_from_slice(&best.rows);
+        self.parameters.values.copy_from_slice(&best.values);
         let pass = &self.pass;
-        self.parameters.slow_down(|row| blamed[pass.tile_near([row[0], row[1]])]);
+        self.parameters.slow_down(|values| blamed[pass.tile_near(values.center)]);
         self.binned_for = 0;
         self.has_splats = false;
     }
@@ -603,18 +591,18 @@ impl<'a> Fit<'a> {
 
     /// Size in bytes.
     fn memory(&self) -> usize {
-        let best = self.best.as_ref().map_or(0, |best| best.rows.capacity());
+        let best = self.best.as_ref().map_or(0, |best| best.values.capacity());
         self.raster.memory()
             + self.pass.memory()
             + self.parameters.memory()
-            + best * size_of::<Row>()
+            + best * size_of::<Components>()
             + self.splats.capacity() * size_of::<Splat>()
     }
 }
 
-/// The values that a decoder would read for a trained row.
-fn decoded(quantizers: Option<&LsqQuantizers>, row: &Row) -> Row {
-    quantizers.map_or(*row, |quantizers| quantizers.decoded(&quantizers.codes(row)))
+/// The values that a decoder would read for trained ones.
+fn decoded(quantizers: Option<&LsqQuantizers>, values: &Components) -> Components {
+    quantizers.map_or(*values, |quantizers| quantizers.decoded(&quantizers.codes(values)))
 }
 
 /// A number that is larger for larger values, in the order of [`f32::total_cmp`].

@@ -32,9 +32,9 @@ impl GeometrySums {
     pub(crate) fn gradients(
         &self,
         parameterization: Parameterization,
-        values: Vec3,
-    ) -> (Vec2, Vec3) {
-        let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values.into()));
+        values: [f32; 3],
+    ) -> ([f32; 2], [f32; 3]) {
+        let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values));
         // glam builds matrices from columns.
         let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
         let [xx, xy, yy] = self.second;
@@ -43,31 +43,31 @@ impl GeometrySums {
         let by_factor = m.transpose() * (m * moments * m.transpose());
         let shape = match parameterization {
             Parameterization::Cholesky => {
-                Vec3::new(by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y)
+                [by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y]
             }
             Parameterization::Covariance => {
                 let by_covariance = by_factor * m * 0.5;
                 // xy stands for both off-diagonal entries.
-                Vec3::new(
+                [
                     by_covariance.x_axis.x,
                     by_covariance.x_axis.y + by_covariance.y_axis.x,
                     by_covariance.y_axis.y,
-                )
+                ]
             }
             Parameterization::RotationScale => {
                 let by_covariance = by_factor * m * 0.5;
-                let (axis1, axis2) = axes(values.z);
+                let [s1, s2, angle] = values;
+                let (axis1, axis2) = axes(angle);
                 // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
                 let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
-                Vec3::new(
-                    2.0 * values.x * along(axis1, axis1),
-                    2.0 * values.y * along(axis2, axis2),
-                    (values.x * values.x - values.y * values.y)
-                        * (along(axis1, axis2) + along(axis2, axis1)),
-                )
+                [
+                    2.0 * s1 * along(axis1, axis1),
+                    2.0 * s2 * along(axis2, axis2),
+                    (s1 * s1 - s2 * s2) * (along(axis1, axis2) + along(axis2, axis1)),
+                ]
             }
         };
-        (center, shape)
+        (center.to_array(), shape)
     }
 }
 
@@ -85,8 +85,9 @@ pub(crate) struct OwnFrame {
 
 impl OwnFrame {
     #[inline]
-    pub(crate) fn new(parameterization: Parameterization, values: Vec3) -> Self {
-        let [l11, l21, l22] = parameterization.to_cholesky(values.into());
+    pub(crate) fn new(parameterization: Parameterization, values: [f32; 3]) -> Self {
+        let [l11, l21, l22] = parameterization.to_cholesky(values);
+        let values = Vec3::from(values);
         let center = Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22));
         // The derivatives of the covariance (xx, xy, yy): L (D + D^T) L^T.
         let by_ratio = 2.0 * Vec3::new(l11 * l11, l11 * l21, l21 * l21 - l22 * l22);
@@ -121,23 +122,30 @@ impl OwnFrame {
 }
 
 /// The shape values of a Cholesky factor.
-pub(crate) fn from_cholesky(parameterization: Parameterization, [l11, l21, l22]: [f32; 3]) -> Vec3 {
+pub(crate) fn from_cholesky(
+    parameterization: Parameterization,
+    [l11, l21, l22]: [f32; 3],
+) -> [f32; 3] {
     let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
     match parameterization {
-        Parameterization::Cholesky => Vec3::new(l11, l21, l22),
-        Parameterization::Covariance => Vec3::new(xx, xy, yy),
+        Parameterization::Cholesky => [l11, l21, l22],
+        Parameterization::Covariance => [xx, xy, yy],
         Parameterization::RotationScale => {
             let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
             let s1 = (mean + half.hypot(xy)).sqrt();
             // Computed from the determinant, the smaller deviation does not suffer cancellation.
-            Vec3::new(s1, l11 * l22 / s1, 0.5 * xy.atan2(half))
+            [s1, l11 * l22 / s1, 0.5 * xy.atan2(half)]
         }
     }
 }
 
 /// The shape values of the covariance that `values` stand for, plus `variance` times the identity.
-pub(crate) fn widened(parameterization: Parameterization, values: Vec3, variance: f32) -> Vec3 {
-    let [l11, l21, l22] = parameterization.to_cholesky(values.into());
+pub(crate) fn widened(
+    parameterization: Parameterization,
+    values: [f32; 3],
+    variance: f32,
+) -> [f32; 3] {
+    let [l11, l21, l22] = parameterization.to_cholesky(values);
     let xx = l11 * l11 + variance;
     let wide11 = xx.sqrt();
     let wide21 = l11 * l21 / wide11;
@@ -148,36 +156,37 @@ pub(crate) fn widened(parameterization: Parameterization, values: Vec3, variance
 /// Shape values clamped so that they are a covariance with standard deviations from about
 /// [`MIN_DEVIATION`] to about `max`. Values that are not finite become a round Gaussian.
 #[inline]
-pub(crate) fn clamped(parameterization: Parameterization, values: Vec3, max: f32) -> Vec3 {
-    if !values.is_finite() {
+pub(crate) fn clamped(parameterization: Parameterization, values: [f32; 3], max: f32) -> [f32; 3] {
+    if !values.iter().all(|value| value.is_finite()) {
         return from_cholesky(parameterization, [1.0, 0.0, 1.0]);
     }
+    let [a, b, c] = values;
     match parameterization {
         Parameterization::Cholesky => {
-            let l11 = values.x.clamp(MIN_DEVIATION, max);
-            let l21 = values.y.clamp(-max, max);
+            let l11 = a.clamp(MIN_DEVIATION, max);
+            let l21 = b.clamp(-max, max);
             // The smaller deviation is l11 l22 divided by the larger one, and that is about the
             // length of (l11, l21).
             let least = MIN_DEVIATION * ((l11 * l11 + l21 * l21).sqrt() / l11).max(1.0);
-            Vec3::new(l11, l21, values.z.clamp(MIN_DEVIATION, max).max(least))
+            [l11, l21, c.clamp(MIN_DEVIATION, max).max(least)]
         }
         Parameterization::Covariance => {
-            let xx = values.x.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
-            let yy = values.z.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
+            let xx = a.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
+            let yy = c.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
             // Conditional variances stay above the least variance, and so far above 0 that rounding
             // errors of the determinant do not matter.
             let square = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0);
             let max_xy = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
-            Vec3::new(xx, values.y.clamp(-max_xy, max_xy), yy)
+            [xx, b.clamp(-max_xy, max_xy), yy]
         }
         Parameterization::RotationScale => {
             // Half a turn leaves the ellipse as it is. The remainder of a division is exact, so
             // angles of any magnitude can be reduced.
             let half_turn = core::f32::consts::PI;
-            let rest = values.z % half_turn;
+            let rest = c % half_turn;
             let angle =
                 if rest.abs() > 0.5 * half_turn { rest - half_turn.copysign(rest) } else { rest };
-            Vec3::new(values.x.clamp(MIN_DEVIATION, max), values.y.clamp(MIN_DEVIATION, max), angle)
+            [a.clamp(MIN_DEVIATION, max), b.clamp(MIN_DEVIATION, max), angle]
         }
     }
 }
@@ -208,8 +217,8 @@ mod tests {
     const PARAMETERIZATIONS: [Parameterization; 3] =
         [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
-    fn covariance(parameterization: Parameterization, values: Vec3) -> [f32; 3] {
-        let cholesky = parameterization.to_cholesky(values.into());
+    fn covariance(parameterization: Parameterization, values: [f32; 3]) -> [f32; 3] {
+        let cholesky = parameterization.to_cholesky(values);
         Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] }.covariance()
     }
 
@@ -220,7 +229,7 @@ mod tests {
         fn every_parameterization_keeps_the_covariance(
             l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
         ) {
-            let expected = covariance(Parameterization::Cholesky, Vec3::new(l11, l21, l22));
+            let expected = covariance(Parameterization::Cholesky, [l11, l21, l22]);
             for parameterization in PARAMETERIZATIONS {
                 let values = from_cholesky(parameterization, [l11, l21, l22]);
                 let found = covariance(parameterization, values);
@@ -237,7 +246,7 @@ mod tests {
             l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
             variance in 0.0_f32..300.0,
         ) {
-            let [xx, xy, yy] = covariance(Parameterization::Cholesky, Vec3::new(l11, l21, l22));
+            let [xx, xy, yy] = covariance(Parameterization::Cholesky, [l11, l21, l22]);
             for parameterization in PARAMETERIZATIONS {
                 let values = from_cholesky(parameterization, [l11, l21, l22]);
                 let wide = widened(parameterization, values, variance);
@@ -252,8 +261,8 @@ mod tests {
         #[test]
         fn clamped_shapes_are_valid(values in prop::array::uniform3(any::<f32>())) {
             for parameterization in PARAMETERIZATIONS {
-                let clamped = clamped(parameterization, Vec3::from(values), 4096.0);
-                let cholesky = parameterization.to_cholesky(clamped.into());
+                let clamped = clamped(parameterization, values, 4096.0);
+                let cholesky = parameterization.to_cholesky(clamped);
                 let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
                 prop_assert!(
                     gaussian.is_drawable(),
@@ -284,7 +293,7 @@ mod tests {
                     let (d11, d21, d22) = (step * d11, step * d21, step * d22);
                     let changed =
                         [l11 * (1.0 + d11), l21 * (1.0 + d11) + l22 * d21, l22 * (1.0 + d22)];
-                    from_cholesky(parameterization, changed)
+                    Vec3::from(from_cholesky(parameterization, changed))
                 };
                 let expected = (at(STEP) - at(-STEP)) / (2.0 * STEP);
                 let found = frame.shape.col(column);

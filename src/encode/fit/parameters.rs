@@ -3,10 +3,10 @@
 use fearless_simd::Level;
 use rayon::prelude::*;
 
+use super::components::{Bounds, Components, Slope};
 use super::gauss_newton::blocks::BlockStep;
 use super::pass::SplatGradient;
 use super::rate_term::RateTerm;
-use super::row::{Row, RowBounds, Slope};
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
@@ -26,7 +26,7 @@ const WORK_TO_SORT: f64 = 3.0;
 /// Trained values with their optimizer.
 #[derive(Debug)]
 pub(crate) struct Parameters {
-    pub(crate) values: Vec<Row>,
+    pub(crate) values: Vec<Components>,
     states: States,
 }
 
@@ -41,21 +41,21 @@ impl Parameters {
     }
 
     /// Adds Gaussians, and allocates no memory for more.
-    pub(crate) fn extend(&mut self, rows: &[Row]) {
-        self.values.reserve_exact(rows.len());
-        self.values.extend_from_slice(rows);
+    pub(crate) fn extend(&mut self, values: &[Components]) {
+        self.values.reserve_exact(values.len());
+        self.values.extend_from_slice(values);
         self.states.extend(self.values.len());
     }
 
     /// Replaces all Gaussians by those of `values`; the optimizer starts again.
-    pub(crate) fn replace(&mut self, values: Vec<Row>) {
+    pub(crate) fn replace(&mut self, values: Vec<Components>) {
         self.states.clear();
         self.states.extend(values.len());
         self.values = values;
     }
 
-    /// Lets the Gaussians for whose row `is_slow` is true take smaller steps.
-    pub(crate) fn slow_down(&mut self, is_slow: impl Fn(&Row) -> bool) {
+    /// Lets the Gaussians for whose values `is_slow` is true take smaller steps.
+    pub(crate) fn slow_down(&mut self, is_slow: impl Fn(&Components) -> bool) {
         self.states.slow_down(|index| is_slow(&self.values[index]));
     }
 
@@ -73,11 +73,12 @@ impl Parameters {
     pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let chunks = self.values.chunks(CHUNK).enumerate();
         // A key with the index below it is compared at once.
-        let keys = observer.map(WORK_TO_SORT * CHUNK as f64, chunks, |(chunk, rows)| {
-            let key = |(index, row): (usize, &Row)| {
-                u64::from(spread(row[0]) | spread(row[1]) << 1) << 32 | index as u64
+        let keys = observer.map(WORK_TO_SORT * CHUNK as f64, chunks, |(chunk, values)| {
+            let key = |(index, components): (usize, &Components)| {
+                let [x, y] = components.center;
+                u64::from(spread(x) | spread(y) << 1) << 32 | index as u64
             };
-            (chunk * CHUNK..).zip(rows).map(key).collect::<Vec<u64>>()
+            (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
         })?;
         let mut keys = keys.concat();
         keys.par_sort_unstable();
@@ -90,7 +91,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// Takes one step against the gradients, which `slope` returns for an index and its row.
+    /// Takes one step against the gradients, which `slope` returns for an index and its values.
     /// `factor` scales all learning rates. `slope` may also add to a sum; there is one for every
     /// [`CHUNK`] Gaussians, and all of them are returned in order.
     ///
@@ -98,40 +99,40 @@ impl Parameters {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn step<Sum: Default + Send>(
         &mut self,
-        bounds: RowBounds,
+        bounds: Bounds,
         factor: f32,
         observer: &mut Observer<'_>,
-        slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Send + Sync,
+        slope: impl Fn(usize, &Components, &mut Sum) -> Slope + Send + Sync,
     ) -> Result<Vec<Sum>, EncodeError> {
         let values = &mut self.values;
         match &mut self.states {
             States::Adam(options, states) => {
-                step_all(values, states, observer, slope, |row, state, slope| {
-                    adam::step(row, state, slope, options, bounds, factor);
+                step_all(values, states, observer, slope, |components, state, slope| {
+                    adam::step(components, state, slope, options, bounds, factor);
                 })
             }
             States::GaussNewton(options, states) => {
-                step_all(values, states, observer, slope, |row, state, slope| {
-                    gauss_newton::step(row, state, slope, options, bounds, factor);
+                step_all(values, states, observer, slope, |components, state, slope| {
+                    gauss_newton::step(components, state, slope, options, bounds, factor);
                 })
             }
         }
     }
 
     /// Takes the steps of [`Self::step`] in blocks, if there is code for that. `slope` returns, for an
-    /// index and its row, the gradient of the pass and how much a squared error counts there. `splats`,
+    /// index and its values, the gradient of the pass and how much a squared error counts there. `splats`,
     /// unless it is empty, becomes those of the new values. Returns whether the steps were taken.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn step_in_blocks(
         &mut self,
-        bounds: RowBounds,
+        bounds: Bounds,
         factor: f32,
         rate_term: Option<RateTerm>,
         mut splats: &mut [Splat],
         observer: &mut Observer<'_>,
-        slope: impl Fn(usize, &Row) -> (SplatGradient, f32) + Send + Sync,
+        slope: impl Fn(usize, &Components) -> (SplatGradient, f32) + Send + Sync,
     ) -> Result<bool, EncodeError> {
         let (States::GaussNewton(options, states), Parameterization::Cholesky) =
             (&mut self.states, bounds.parameterization)
@@ -141,19 +142,19 @@ impl Parameters {
         let step = BlockStep { options, bounds, factor, rate_term };
         let level = Level::new();
         let chunks = self.values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
-        let chunks = chunks.map(|(chunk, (rows, states))| {
-            let count = splats.len().min(rows.len());
+        let chunks = chunks.map(|(chunk, (values, states))| {
+            let count = splats.len().min(values.len());
             let splats = splats.split_off_mut(..count).expect("there are so many");
-            (chunk * CHUNK, rows, states, splats)
+            (chunk * CHUNK, values, states, splats)
         });
-        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(first, rows, states, splats)| {
+        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(first, values, states, splats)| {
             step.run(
                 level,
-                rows,
+                values,
                 states,
                 splats,
                 #[inline(always)]
-                |index, row| slope(first + index, row),
+                |index, components| slope(first + index, components),
             );
         })?;
         Ok(true)
@@ -161,7 +162,7 @@ impl Parameters {
 
     /// Size in bytes.
     pub(crate) fn memory(&self) -> usize {
-        self.values.capacity() * size_of::<Row>() + self.states.memory()
+        self.values.capacity() * size_of::<Components>() + self.states.memory()
     }
 }
 
@@ -177,21 +178,21 @@ fn spread(value: f32) -> u32 {
 
 /// Takes a step for every Gaussian, and returns the sums in order.
 fn step_all<State: Send, Sum: Default + Send>(
-    values: &mut [Row],
+    values: &mut [Components],
     states: &mut [State],
     observer: &mut Observer<'_>,
-    slope: impl Fn(usize, &Row, &mut Sum) -> Slope + Send + Sync,
-    step: impl Fn(&mut Row, &mut State, &Slope) + Send + Sync,
+    slope: impl Fn(usize, &Components, &mut Sum) -> Slope + Send + Sync,
+    step: impl Fn(&mut Components, &mut State, &Slope) + Send + Sync,
 ) -> Result<Vec<Sum>, EncodeError> {
     let chunks = values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
     observer.map(WORK * CHUNK as f64, chunks, |(chunk, (values, states))| {
         let mut sum = Sum::default();
-        let rows = values.iter_mut().zip(states);
-        for (index, (row, state)) in (chunk * CHUNK..).zip(rows) {
-            let slope = slope(index, row, &mut sum);
+        let each = values.iter_mut().zip(states);
+        for (index, (components, state)) in (chunk * CHUNK..).zip(each) {
+            let slope = slope(index, components, &mut sum);
             // A Gaussian whose gradient is not finite stays as it is until it is pruned.
-            if slope.gradient.iter().all(|value| value.is_finite()) {
-                step(row, state, &slope);
+            if slope.gradient.to_array().iter().all(|value| value.is_finite()) {
+                step(components, state, &slope);
             }
         }
         sum

@@ -153,9 +153,10 @@ impl Pass {
                 last += second[0];
             }
         }
+        let [x, y, xx, xy, yy, c0, c1, c2] = sum;
         SplatGradient {
-            geometry: GeometrySums { first: [sum[0], sum[1]], second: [sum[2], sum[3], sum[4]] },
-            color: [sum[5], sum[6], sum[7], last],
+            geometry: GeometrySums { first: [x, y], second: [xx, xy, yy] },
+            color: [c0, c1, c2, last],
         }
     }
 

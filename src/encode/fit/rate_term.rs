@@ -5,14 +5,12 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use super::parameterization::GeometrySums;
 use super::pass::SplatGradient;
 use crate::encode::rate_model::{LAMBDA, step_for};
-use crate::gaussian::Gaussian;
+use crate::gaussian::{Gaussian, component_count};
 
 // Constants: docs/tuning.md, "Steps of training".
 /// The weight of the term, as a share of lambda: at full weight, training loses more quality than it saves
 /// bits.
 const WEIGHT: f32 = 0.55;
-/// Components of a Gaussian's geometry: two of position, three of shape.
-const GEOMETRY: usize = 5;
 
 /// The rate term. A Gaussian of strength s, in steps of colour, with the Cholesky factor L and the area
 /// A = l11 l22 is taken to cost these bits, up to a constant:
@@ -39,7 +37,7 @@ impl RateTerm {
         let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
         Self {
             squared_step,
-            components: (GEOMETRY + channels) as f32,
+            components: component_count(channels) as f32,
             weight: 0.5 * WEIGHT * LAMBDA * squared_step * core::f32::consts::LOG2_E,
         }
     }
@@ -117,10 +115,10 @@ mod tests {
             let cholesky = [l11, l21, l22];
             let gaussian = Gaussian { center: [3.0, 4.0], cholesky, color: [c0, c1, c2, 0.0] };
             let SplatGradient { geometry, color } = rate_term.gradient(&gaussian);
-            let (center, shape) = geometry.gradients(Parameterization::Cholesky, cholesky.into());
-            assert_eq!(center.to_array(), [0.0; 2]);
+            let (center, shape) = geometry.gradients(Parameterization::Cholesky, cholesky);
+            assert_eq!(center, [0.0; 2]);
             assert_eq!(color[3], 0.0);
-            let found = [shape.x, shape.y, shape.z, color[0], color[1], color[2]];
+            let found = [shape[0], shape[1], shape[2], color[0], color[1], color[2]];
             let lambda = f64::from(WEIGHT * LAMBDA) * squared_step;
             for (index, found) in found.into_iter().enumerate() {
                 let at = |offset: f64| {

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::components::Components;
 use super::vector_quantizer::VectorQuantizer;
 use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
@@ -236,6 +237,15 @@ pub struct Quantization {
     pub center: Option<Arc<dyn VectorQuantizer>>,
     /// What quantizes the colour in place of LSQ+ (paper: nothing).
     pub color: Option<Arc<dyn VectorQuantizer>>,
+}
+
+impl Quantization {
+    /// The bit depths of all components; none of those that something else quantizes than LSQ+.
+    pub(crate) fn depths(&self) -> Components<Option<u8>> {
+        let center = self.center.is_none().then_some(self.position_bits);
+        let color = self.color.is_none().then_some(self.color_bits);
+        Components::by_attribute(center, Some(self.shape_bits), color)
+    }
 }
 
 impl Training {

@@ -13,18 +13,19 @@ use crate::encode::raster::{
     FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers, visible,
 };
 use crate::encode::sensitivity::Sensitivity;
+use crate::gaussian::component_count;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Gradient sums of a splat in a row of tiles: five of the geometry, then one per channel. With
-/// four channels, the last one is in a second slot.
+/// Gradient sums of a splat in a row of tiles, one for each component: five of the geometry, then one per
+/// channel. With four channels, the last one is in a second slot.
 pub(super) type Slot = [f32; 8];
 
 /// Slots that the sums of one span take.
 pub(super) const fn slots_per_span(channels: usize) -> usize {
-    (5 + channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
+    component_count(channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
 }
 
 /// What the backward pass needs to know of a splat at each pixel of a tile.

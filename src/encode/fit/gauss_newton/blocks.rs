@@ -11,10 +11,10 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{FASTER, LEAST_PACE, MOST_PACE, SLOWER, State};
 use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
+use crate::encode::fit::components::{Bounds, Components, MAX_COLOR};
 use crate::encode::fit::parameterization::MIN_DEVIATION;
 use crate::encode::fit::pass::SplatGradient;
 use crate::encode::fit::rate_term::RateTerm;
-use crate::encode::fit::row::{MAX_COLOR, Row, RowBounds};
 use crate::encode::fit::training::GaussNewton;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::render::simd_kernel;
@@ -22,109 +22,104 @@ use crate::render::splat::Splat;
 use crate::simd::LANES;
 
 /// The reciprocals of the curvatures for a strength or an area of 1.
-const RECIPROCALS: Row = [
-    1.0 / POSITION,
-    1.0 / POSITION,
-    1.0 / SIZE,
-    1.0 / RATIO,
-    1.0 / SLANT,
-    1.0 / COLOR,
-    1.0 / COLOR,
-    1.0 / COLOR,
-    1.0 / COLOR,
-];
+const RECIPROCALS: Components = Components {
+    center: [1.0 / POSITION; 2],
+    shape: [1.0 / SIZE, 1.0 / RATIO, 1.0 / SLANT],
+    color: [1.0 / COLOR; 4],
+};
 
 /// What the steps of all Gaussians have in common.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::encode::fit) struct BlockStep<'a> {
     pub(in crate::encode::fit) options: &'a GaussNewton,
     /// The parameterization is that by Cholesky factors.
-    pub(in crate::encode::fit) bounds: RowBounds,
+    pub(in crate::encode::fit) bounds: Bounds,
     /// The factor on the learning rate.
     pub(in crate::encode::fit) factor: f32,
     pub(in crate::encode::fit) rate_term: Option<RateTerm>,
 }
 
 impl BlockStep<'_> {
-    /// One step for each of `rows`. `slope` returns, for an index and its row, the gradient of the pass
-    /// and how much a squared error counts there. `splats`, if there are as many as rows, become those
-    /// of the new rows.
+    /// One step for each Gaussian. `slope` returns, for an index and its values, the gradient of the pass
+    /// and how much a squared error counts there. `splats`, if there are as many, become those of the
+    /// new values.
     pub(in crate::encode::fit) fn run(
         &self,
         level: Level,
-        rows: &mut [Row],
+        values: &mut [Components],
         states: &mut [State],
         splats: &mut [Splat],
-        slope: impl Fn(usize, &Row) -> (SplatGradient, f32),
+        slope: impl Fn(usize, &Components) -> (SplatGradient, f32),
     ) {
         dispatch!(level, simd => {
-            let (blocks, rest) = rows.as_chunks_mut::<LANES>();
+            let (blocks, rest) = values.as_chunks_mut::<LANES>();
             let (state_blocks, rest_states) = states.as_chunks_mut::<LANES>();
             for block in 0..blocks.len() {
-                let rows = &mut blocks[block];
+                let values = &mut blocks[block];
                 let mut slopes = [(SplatGradient::default(), 1.0); LANES];
                 for lane in 0..LANES {
-                    slopes[lane] = slope(block * LANES + lane, &rows[lane]);
+                    slopes[lane] = slope(block * LANES + lane, &values[lane]);
                 }
-                let made = self.step(simd, rows, &mut state_blocks[block], &slopes);
+                let made = self.step(simd, values, &mut state_blocks[block], &slopes);
                 write(splats, block * LANES, &made);
             }
             if let Some(&any) = rest.first() {
-                let mut rows = [any; LANES];
+                let mut values = [any; LANES];
                 let mut states = [State::NEW; LANES];
                 let mut slopes = [(SplatGradient::default(), 1.0); LANES];
                 for lane in 0..rest.len() {
-                    rows[lane] = rest[lane];
+                    values[lane] = rest[lane];
                     states[lane] = rest_states[lane];
-                    slopes[lane] = slope(blocks.len() * LANES + lane, &rows[lane]);
+                    slopes[lane] = slope(blocks.len() * LANES + lane, &values[lane]);
                 }
-                let made = self.step(simd, &mut rows, &mut states, &slopes);
+                let made = self.step(simd, &mut values, &mut states, &slopes);
                 write(splats, blocks.len() * LANES, &made);
-                rest.copy_from_slice(&rows[..rest.len()]);
+                rest.copy_from_slice(&values[..rest.len()]);
                 rest_states.copy_from_slice(&states[..rest.len()]);
             }
         });
     }
 
-    /// Steps of sixteen Gaussians. Returns the splats of the new rows.
+    /// Steps of sixteen Gaussians. Returns the splats of the new values.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
     fn step<S: Simd>(
         &self,
         simd: S,
-        rows: &mut [Row; LANES],
+        values: &mut [Components; LANES],
         states: &mut [State; LANES],
         slopes: &[(SplatGradient, f32); LANES],
     ) -> [Splat; LANES] {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
-        let mut row = [zero; MAX_COMPONENTS];
+        let mut old = [zero; MAX_COMPONENTS];
         let mut mean = [zero; MAX_COMPONENTS];
         for index in 0..MAX_COMPONENTS {
-            row[index] = f32x16::from_fn(simd, |lane| rows[lane][index]);
-            mean[index] = f32x16::from_fn(simd, |lane| states[lane].mean[index]);
+            old[index] = f32x16::from_fn(simd, |lane| values[lane].to_array()[index]);
+            mean[index] = f32x16::from_fn(simd, |lane| states[lane].mean.to_array()[index]);
         }
         let pace = f32x16::from_fn(simd, |lane| states[lane].pace);
         let weight = f32x16::from_fn(simd, |lane| states[lane].weight);
         let sensitivity = f32x16::from_fn(simd, |lane| slopes[lane].1);
 
-        let [_, _, l11, l21, l22, ..] = row;
+        let Components { center: [x, y], shape: [l11, l21, l22], color } =
+            Components::from_array(old);
         let area = l11 * l22;
-        let color = [row[5], row[6], row[7], row[8]];
         let squared_color =
             color[0] * color[0] + color[1] * color[1] + color[2] * color[2] + color[3] * color[3];
         let gradient = self.gradient(simd, [l11, l21, l22], color, area, squared_color, slopes);
+        let gradient = gradient.to_array();
 
         let area = area * sensitivity;
         let damping = self.options.damping * self.options.damping;
         let by_strength = one / ((squared_color + damping) * area);
         let by_area = one / area;
+        let parts = Components::by_attribute(by_strength, by_strength, by_area).to_array();
         let mut reciprocals = [zero; MAX_COMPONENTS];
         // 0 if all are finite, else NaN.
         let (mut agreement, mut finite) = (zero, zero);
         for index in 0..MAX_COMPONENTS {
-            let part = if index < 5 { by_strength } else { by_area };
-            reciprocals[index] = part * RECIPROCALS[index];
+            reciprocals[index] = parts[index] * RECIPROCALS.to_array()[index];
             agreement += mean[index] * gradient[index] * reciprocals[index];
             finite += gradient[index] * 0.0;
         }
@@ -146,32 +141,42 @@ impl BlockStep<'_> {
             new_mean[index] = mean[index] * momentum + gradient[index] * (1.0 - momentum);
             steps[index] = rate * new_mean[index] * reciprocals[index];
         }
+        let mut steps = Components::from_array(steps);
         let trusted = self.options.trust_region;
-        for index in 0..5 {
-            steps[index] = steps[index].max(-trusted).min(trusted);
+        for axis in 0..steps.center.len() {
+            steps.center[axis] = steps.center[axis].max(-trusted).min(trusted);
+        }
+        for index in 0..steps.shape.len() {
+            steps.shape[index] = steps.shape[index].max(-trusted).min(trusted);
         }
 
-        let [u, v, size, ratio, slant, ..] = steps;
-        let mut new = [zero; MAX_COMPONENTS];
-        new[0] = row[0] - l11 * u;
-        new[1] = row[1] - (l21 * u + l22 * v);
-        new[2] = l11 - l11 * (size + ratio);
-        new[3] = l21 - (l21 * (size + ratio) + l22 * slant);
-        new[4] = l22 - l22 * (size - ratio);
+        let ([u, v], [size, ratio, slant]) = (steps.center, steps.shape);
+        let mut new = Components {
+            center: [x - l11 * u, y - (l21 * u + l22 * v)],
+            shape: [
+                l11 - l11 * (size + ratio),
+                l21 - (l21 * (size + ratio) + l22 * slant),
+                l22 - l22 * (size - ratio),
+            ],
+            color,
+        };
         let faded = simd_kernel::exp(simd, size);
-        for index in 5..MAX_COMPONENTS {
-            new[index] = row[index] * faded - steps[index];
+        for channel in 0..color.len() {
+            new.color[channel] = color[channel] * faded - steps.color[channel];
         }
         self.clamp(simd, &mut new);
 
+        let mut new = new.to_array();
+        let mut by_component = [[0.0; LANES]; MAX_COMPONENTS];
+        let mut averages = [[0.0; LANES]; MAX_COMPONENTS];
         for index in 0..MAX_COMPONENTS {
-            row[index] = stepped.select(new[index], row[index]);
-            let value = row[index].to_array();
-            let average = stepped.select(new_mean[index], mean[index]).to_array();
-            for lane in 0..LANES {
-                rows[lane][index] = value[lane];
-                states[lane].mean[index] = average[lane];
-            }
+            new[index] = stepped.select(new[index], old[index]);
+            by_component[index] = new[index].to_array();
+            averages[index] = stepped.select(new_mean[index], mean[index]).to_array();
+        }
+        for lane in 0..LANES {
+            values[lane] = lane_of(&by_component, lane);
+            states[lane].mean = lane_of(&averages, lane);
         }
         let pace = stepped.select(new_pace, pace).to_array();
         let weight = stepped.select(new_weight, weight).to_array();
@@ -180,18 +185,11 @@ impl BlockStep<'_> {
             states[lane].weight = weight[lane];
         }
 
-        let inverse = inverse([row[2], row[3], row[4]]).map(f32x16::to_array);
-        let row = row.map(f32x16::to_array);
+        let [i11, w, i22] = inverse(Components::from_array(new).shape).map(f32x16::to_array);
         let mut splats = [Splat::NOWHERE; LANES];
         for lane in 0..LANES {
-            splats[lane] = Splat {
-                x: row[0][lane],
-                y: row[1][lane],
-                i11: inverse[0][lane],
-                w: inverse[1][lane],
-                i22: inverse[2][lane],
-                color: [row[5][lane], row[6][lane], row[7][lane], row[8][lane]],
-            };
+            let Components { center: [x, y], color, .. } = values[lane];
+            splats[lane] = Splat { x, y, i11: i11[lane], w: w[lane], i22: i22[lane], color };
         }
         splats
     }
@@ -206,7 +204,7 @@ impl BlockStep<'_> {
         area: f32x16<S>,
         squared_color: f32x16<S>,
         slopes: &[(SplatGradient, f32); LANES],
-    ) -> [f32x16<S>; MAX_COMPONENTS] {
+    ) -> Components<f32x16<S>> {
         let [i11, w, i22] = inverse(cholesky);
         let x = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[0]);
         let y = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[1]);
@@ -235,27 +233,24 @@ impl BlockStep<'_> {
                 by_color[channel] += rate_by_color * color[channel];
             }
         }
-        let ([size, ratio, slant], [c0, c1, c2, c3]) = (shape, by_color);
-        [i11 * x, w * x + i22 * y, size, ratio, slant, c0, c1, c2, c3]
+        Components { center: [i11 * x, w * x + i22 * y], shape, color: by_color }
     }
 
-    /// [`RowBounds::clamped`] for finite rows.
+    /// [`Bounds::clamped`] for finite values.
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
-    fn clamp<S: Simd>(&self, simd: S, row: &mut [f32x16<S>; MAX_COMPONENTS]) {
+    fn clamp<S: Simd>(&self, simd: S, new: &mut Components<f32x16<S>>) {
         let max = self.bounds.max_deviation();
-        for (index, (low, high)) in self.bounds.center_ranges().into_iter().enumerate() {
-            row[index] = row[index].max(low).min(high);
+        for (axis, (low, high)) in self.bounds.center_ranges().into_iter().enumerate() {
+            new.center[axis] = new.center[axis].max(low).min(high);
         }
-        let l11 = row[2].max(MIN_DEVIATION).min(max);
-        let l21 = row[3].max(-max).min(max);
+        let [l11, l21, l22] = new.shape;
+        let l11 = l11.max(MIN_DEVIATION).min(max);
+        let l21 = l21.max(-max).min(max);
         let long = (l11 * l11 + l21 * l21).sqrt() / l11;
         let least = long.max(1.0) * f32x16::splat(simd, MIN_DEVIATION);
-        row[2] = l11;
-        row[3] = l21;
-        row[4] = row[4].max(MIN_DEVIATION).min(max).max(least);
-        for index in 5..MAX_COMPONENTS {
-            row[index] = row[index].max(-MAX_COLOR).min(MAX_COLOR);
+        new.shape = [l11, l21, l22.max(MIN_DEVIATION).min(max).max(least)];
+        for channel in 0..new.color.len() {
+            new.color[channel] = new.color[channel].max(-MAX_COLOR).min(MAX_COLOR);
         }
     }
 }
@@ -265,6 +260,16 @@ impl BlockStep<'_> {
 fn inverse<S: Simd>([l11, l21, l22]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     let (i11, i22) = (1.0 / l11, 1.0 / l22);
     [i11, -(l21 * i11) * i22, i22]
+}
+
+/// The components of one of sixteen Gaussians.
+#[inline(always)]
+fn lane_of(components: &[[f32; LANES]; MAX_COMPONENTS], lane: usize) -> Components {
+    let mut of_lane = [0.0; MAX_COMPONENTS];
+    for index in 0..MAX_COMPONENTS {
+        of_lane[index] = components[index][lane];
+    }
+    Components::from_array(of_lane)
 }
 
 /// Writes a block of splats from an index on, as far as there is room.
@@ -279,9 +284,9 @@ fn write(splats: &mut [Splat], first: usize, block: &[Splat; LANES]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::fit::components::Slope;
     use crate::encode::fit::parameterization::GeometrySums;
-    use crate::encode::fit::row::{Slope, shape_of};
-    use crate::gaussian::{Gaussian, Parameterization};
+    use crate::gaussian::Parameterization;
     use crate::testing::simd_levels;
     use glam::Vec2;
 
@@ -291,25 +296,22 @@ mod tests {
 
     fn block_step(rate_term: Option<RateTerm>, channels: usize) -> BlockStep<'static> {
         let bounds =
-            RowBounds { parameterization: PARAMETERIZATION, channels, size: Vec2::new(90.0, 60.0) };
+            Bounds { parameterization: PARAMETERIZATION, channels, size: Vec2::new(90.0, 60.0) };
         BlockStep { options: &OPTIONS, bounds, factor: 0.8, rate_term }
     }
 
     /// Gaussians of all shapes, a part of which the step clamps.
-    fn rows(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<Row> {
-        let row = |_| {
-            let mut row = [0.0; MAX_COMPONENTS];
-            row[0] = 110.0 * rng.f32() - 10.0;
-            row[1] = 80.0 * rng.f32() - 10.0;
-            row[2] = 0.4 + 9.0 * rng.f32() * rng.f32();
-            row[3] = 8.0 * rng.f32() - 4.0;
-            row[4] = 0.4 + 9.0 * rng.f32() * rng.f32();
-            for value in &mut row[5..5 + channels] {
-                *value = 2.0 * rng.f32() - 1.0;
-            }
-            row
+    fn values(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<Components> {
+        let components = |_| {
+            let center = [110.0 * rng.f32() - 10.0, 80.0 * rng.f32() - 10.0];
+            let mut deviation = || 0.4 + 9.0 * rng.f32() * rng.f32();
+            let (l11, l22) = (deviation(), deviation());
+            let shape = [l11, 8.0 * rng.f32() - 4.0, l22];
+            let mut color = [0.0; 4];
+            color[..channels].fill_with(|| 2.0 * rng.f32() - 1.0);
+            Components { center, shape, color }
         };
-        (0..count).map(row).collect()
+        (0..count).map(components).collect()
     }
 
     fn slopes(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<(SplatGradient, f32)> {
@@ -328,21 +330,20 @@ mod tests {
     /// The steps of Gaussians one by one, through the gradients of the parameterization.
     fn step_each(
         step: &BlockStep<'_>,
-        rows: &mut [Row],
+        values: &mut [Components],
         states: &mut [State],
         slopes: &[(SplatGradient, f32)],
     ) {
-        for ((row, state), (by_splat, sensitivity)) in rows.iter_mut().zip(states).zip(slopes) {
+        for ((values, state), (by_splat, sensitivity)) in values.iter_mut().zip(states).zip(slopes)
+        {
             let mut by_splat = *by_splat;
             if let Some(rate_term) = step.rate_term {
-                let gaussian = Gaussian::from_components(&row[..], PARAMETERIZATION);
-                by_splat += rate_term.gradient(&gaussian);
+                by_splat += rate_term.gradient(&values.gaussian(PARAMETERIZATION));
             }
-            let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, shape_of(row));
-            let [c0, c1, c2, c3] = by_splat.color;
-            let gradient = [center.x, center.y, shape.x, shape.y, shape.z, c0, c1, c2, c3];
+            let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, values.shape);
+            let gradient = Components { center, shape, color: by_splat.color };
             let slope = Slope { gradient, sensitivity: *sensitivity };
-            super::super::step(row, state, &slope, step.options, step.bounds, step.factor);
+            super::super::step(values, state, &slope, step.options, step.bounds, step.factor);
         }
     }
 
@@ -354,7 +355,7 @@ mod tests {
                 // Two blocks and a part of one.
                 let count = 2 * LANES + 5;
                 let step = block_step(rate_term, channels);
-                let mut found = rows(count, channels, &mut rng);
+                let mut found = values(count, channels, &mut rng);
                 let mut states = vec![State::NEW; count];
                 for _ in 0..4 {
                     let slopes = slopes(count, channels, &mut rng);
@@ -362,19 +363,27 @@ mod tests {
                     step_each(&step, &mut expected, &mut expected_states, &slopes);
                     let before = found.clone();
                     let mut splats = vec![Splat::NOWHERE; count];
-                    step.run(Level::new(), &mut found, &mut states, &mut splats, |index, row| {
-                        assert_eq!(*row, before[index]);
-                        slopes[index]
-                    });
+                    step.run(
+                        Level::new(),
+                        &mut found,
+                        &mut states,
+                        &mut splats,
+                        |index, values| {
+                            assert_eq!(*values, before[index]);
+                            slopes[index]
+                        },
+                    );
                     assert_ne!(found, before);
-                    let splat = |row: &Row| {
-                        Splat::new(&Gaussian::from_components(&row[..], PARAMETERIZATION))
-                    };
-                    let of_rows: Vec<_> = found.iter().filter_map(splat).collect();
-                    assert_eq!(format!("{splats:?}"), format!("{of_rows:?}"));
+                    let splat =
+                        |values: &Components| Splat::new(&values.gaussian(PARAMETERIZATION));
+                    let of_values: Vec<_> = found.iter().filter_map(splat).collect();
+                    assert_eq!(format!("{splats:?}"), format!("{of_values:?}"));
                     for index in 0..count {
-                        let scale = 1e-4 * (1.0 + found[index][4].max(found[index][2]));
-                        for (found, expected) in found[index].iter().zip(expected[index]) {
+                        let [l11, _, l22] = found[index].shape;
+                        let scale = 1e-4 * (1.0 + l22.max(l11));
+                        let (found, expected) =
+                            (found[index].to_array(), expected[index].to_array());
+                        for (found, expected) in found.into_iter().zip(expected) {
                             assert!(
                                 (found - expected).abs() <= scale,
                                 "{channels} {index}: {found}, {expected}"
@@ -382,8 +391,9 @@ mod tests {
                         }
                         let (state, expected) = (states[index], expected_states[index]);
                         assert_eq!([state.pace, state.weight], [expected.pace, expected.weight]);
-                        let size = expected.mean.iter().fold(1.0, |most: f32, x| most.max(x.abs()));
-                        for (found, expected) in state.mean.iter().zip(expected.mean) {
+                        let (mean, expected) = (state.mean.to_array(), expected.mean.to_array());
+                        let size = expected.iter().fold(1.0, |most: f32, x| most.max(x.abs()));
+                        for (found, expected) in mean.into_iter().zip(expected) {
                             assert!((found - expected).abs() <= 1e-4 * size, "{found}, {expected}");
                         }
                     }
@@ -398,7 +408,7 @@ mod tests {
         let mut slopes = slopes(LANES, 3, &mut rng);
         slopes[3].0.geometry.second[1] = f32::NAN;
         slopes[8].0.color[2] = f32::INFINITY;
-        let before = rows(LANES, 3, &mut rng);
+        let before = values(LANES, 3, &mut rng);
         let (mut after, mut states) = (before.clone(), vec![State::NEW; LANES]);
         block_step(None, 3)
             .run(Level::new(), &mut after, &mut states, &mut [], |index, _| slopes[index]);
@@ -414,13 +424,13 @@ mod tests {
             let mut rng = fastrand::Rng::with_seed(7);
             let count = 3 * LANES + 1;
             let step = block_step(Some(RateTerm::new(0.3, 40, 3)), 3);
-            let (mut rows, mut states) = (rows(count, 3, &mut rng), vec![State::NEW; count]);
+            let (mut values, mut states) = (values(count, 3, &mut rng), vec![State::NEW; count]);
             for _ in 0..3 {
                 let slopes = slopes(count, 3, &mut rng);
-                step.run(level, &mut rows, &mut states, &mut [], |index, _| slopes[index]);
+                step.run(level, &mut values, &mut states, &mut [], |index, _| slopes[index]);
             }
-            let states = states.iter().flat_map(|state| state.mean);
-            rows.iter().copied().flatten().chain(states).map(f32::to_bits).collect::<Vec<_>>()
+            let all = values.into_iter().chain(states.iter().map(|state| state.mean));
+            all.flat_map(|values| values.to_array().map(f32::to_bits)).collect::<Vec<_>>()
         };
         let expected = run(Level::baseline());
         for (name, level) in simd_levels() {

@@ -1,15 +1,14 @@
 //! Tests of the pass against formulas in f64, and of its SIMD code.
 
-use glam::Vec3;
-
 use super::*;
 use crate::color::ColorModel;
 use crate::encode::distortion::plain_distortion;
+use crate::encode::fit::components::Components;
 use crate::encode::fit::parameterization;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
 use crate::encode::source::Source;
-use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::gaussian::{Gaussian, Parameterization, component_count};
 use crate::testing::simd_levels;
 
 const WIDTH: u32 = 37;
@@ -34,7 +33,7 @@ fn run(
 
 /// Half the distortion in f64, directly from the formulas of the paper.
 fn loss(
-    rows: &[[f64; MAX_COMPONENTS]],
+    scene: &[Components<f64>],
     parameterization: Parameterization,
     kernel: Kernel,
     source: &Source<'_>,
@@ -45,8 +44,7 @@ fn loss(
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
             let mut sums = BASE.map(f64::from);
-            for row in rows {
-                let [a, b, c] = [row[2], row[3], row[4]];
+            for &Components { center, shape: [a, b, c], color } in scene {
                 let (xx, xy, yy) = match parameterization {
                     Parameterization::Covariance => (a, b, c),
                     Parameterization::Cholesky => (a * a, a * b, b * b + c * c),
@@ -60,7 +58,7 @@ fn loss(
                         )
                     }
                 };
-                let (dx, dy) = (f64::from(x) + 0.5 - row[0], f64::from(y) + 0.5 - row[1]);
+                let (dx, dy) = (f64::from(x) + 0.5 - center[0], f64::from(y) + 0.5 - center[1]);
                 let determinant = xx * yy - xy * xy;
                 let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
                 let weight = match kernel {
@@ -68,7 +66,7 @@ fn loss(
                     Kernel::Exponential { cutoff } if q <= f64::from(cutoff) => (-q / 2.0).exp(),
                     Kernel::Exponential { .. } => 0.0,
                 };
-                for (sum, color) in sums.iter_mut().zip(&row[5..]) {
+                for (sum, color) in sums.iter_mut().zip(color) {
                     *sum += color * weight;
                 }
             }
@@ -92,7 +90,7 @@ fn scene(
     parameterization: Parameterization,
     channels: usize,
     rng: &mut fastrand::Rng,
-) -> Vec<[f32; MAX_COMPONENTS]> {
+) -> Vec<Components> {
     (0..12)
         .map(|index| {
             let (s1, s2) = match index % 3 {
@@ -103,54 +101,40 @@ fn scene(
             let angle = rng.f32() * 6.0 - 3.0;
             let factor = Parameterization::RotationScale.to_cholesky([s1, s2, angle]);
             let shape = match parameterization {
-                Parameterization::RotationScale => Vec3::new(s1, s2, angle),
+                Parameterization::RotationScale => [s1, s2, angle],
                 _ => parameterization::from_cholesky(parameterization, factor),
             };
-            let mut row = [0.0; MAX_COMPONENTS];
-            row[0] = rng.f32() * 45.0 - 4.0;
-            row[1] = rng.f32() * 27.0 - 3.0;
-            row[2..5].copy_from_slice(&shape.to_array());
-            for value in &mut row[5..5 + channels] {
-                *value = rng.f32() * 0.4 - 0.2;
-            }
-            row
+            let center = [rng.f32() * 45.0 - 4.0, rng.f32() * 27.0 - 3.0];
+            let mut color = [0.0; 4];
+            color[..channels].fill_with(|| rng.f32() * 0.4 - 0.2);
+            Components { center, shape, color }
         })
         .collect()
 }
 
 /// The splats of a scene.
-fn splats_of(
-    rows: &[[f32; MAX_COMPONENTS]],
-    parameterization: Parameterization,
-    channels: usize,
-) -> Vec<Splat> {
-    let splat = |row: &[f32; MAX_COMPONENTS]| {
-        let gaussian = Gaussian::from_components(&row[..5 + channels], parameterization);
-        Splat::new(&gaussian).expect("the scene is valid")
+fn splats_of(scene: &[Components], parameterization: Parameterization) -> Vec<Splat> {
+    let splat = |components: &Components| {
+        Splat::new(&components.gaussian(parameterization)).expect("the scene is valid")
     };
-    rows.iter().map(splat).collect()
+    scene.iter().map(splat).collect()
 }
 
 fn gradients(
-    rows: &[[f32; MAX_COMPONENTS]],
+    scene: &[Components],
     parameterization: Parameterization,
     kernel: Kernel,
     raster: &Raster,
-) -> Vec<[f32; MAX_COMPONENTS]> {
-    let splats = splats_of(rows, parameterization, raster.channels);
+) -> Vec<Components> {
+    let splats = splats_of(scene, parameterization);
     let mut pass = Pass::new(raster);
     run(&mut pass, raster, &splats, kernel, BASE);
-    let by_row = rows.iter().enumerate().map(|(index, row)| {
-        let gradient = pass.gradient(index, raster.channels);
-        let (center, shape) =
-            gradient.geometry.gradients(parameterization, Vec3::from_slice(&row[2..5]));
-        let mut out = [0.0; MAX_COMPONENTS];
-        out[..2].copy_from_slice(&center.to_array());
-        out[2..5].copy_from_slice(&shape.to_array());
-        out[5..].copy_from_slice(&gradient.color);
-        out
+    let gradients = scene.iter().enumerate().map(|(index, components)| {
+        let SplatGradient { geometry, color } = pass.gradient(index, raster.channels);
+        let (center, shape) = geometry.gradients(parameterization, components.shape);
+        Components { center, shape, color }
     });
-    by_row.collect()
+    gradients.collect()
 }
 
 #[test]
@@ -168,18 +152,21 @@ fn every_gradient_equals_its_finite_difference() {
             let samples: Vec<u8> =
                 (0..WIDTH as usize * HEIGHT as usize * channels).map(|_| rng.u8(1..255)).collect();
             let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
-            let rows = scene(parameterization, channels, &mut rng);
-            let exact = rows.iter().map(|row| row.map(f64::from)).collect::<Vec<_>>();
+            let scene = scene(parameterization, channels, &mut rng);
+            let exact = scene.iter().map(|components| components.to_array().map(f64::from));
+            let exact = exact.collect::<Vec<_>>();
             let raster =
                 unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
-            let found = gradients(&rows, parameterization, kernel, &raster);
+            let found = gradients(&scene, parameterization, kernel, &raster);
             for (index, found) in found.iter().enumerate() {
-                for component in 0..5 + channels {
+                let found = found.to_array();
+                for component in 0..component_count(channels) {
                     let step = 1e-5 * exact[index][component].abs().max(1.0);
                     let moved = |by: f64| {
-                        let mut rows = exact.clone();
-                        rows[index][component] += by;
-                        loss(&rows, parameterization, kernel, &source, &raster)
+                        let mut moved = exact.clone();
+                        moved[index][component] += by;
+                        let moved: Vec<_> = moved.into_iter().map(Components::from_array).collect();
+                        loss(&moved, parameterization, kernel, &source, &raster)
                     };
                     let expected = (moved(step) - moved(-step)) / (2.0 * step);
                     let error = (f64::from(found[component]) - expected).abs();
@@ -202,8 +189,8 @@ fn every_simd_level_gives_the_same_bits() {
     let mut rng = fastrand::Rng::with_seed(2);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
-    let rows = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats = splats_of(&rows, Parameterization::Cholesky, 3);
+    let scene = scene(Parameterization::Cholesky, 3, &mut rng);
+    let splats = splats_of(&scene, Parameterization::Cholesky);
     let run = |level, raster: &Raster| {
         let mut pass = Pass { level, ..Pass::new(raster) };
         let error = run(&mut pass, raster, &splats, Kernel::Quartic, BASE);
@@ -255,8 +242,8 @@ fn measured_distortions_are_those_of_the_tiles_rendered_again() {
     let mut rng = fastrand::Rng::with_seed(3);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
-    let rows = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats = splats_of(&rows, Parameterization::Cholesky, 3);
+    let scene = scene(Parameterization::Cholesky, 3, &mut rng);
+    let splats = splats_of(&scene, Parameterization::Cholesky);
     for tune in [Tune::Visual, Tune::Psnr] {
         let raster =
             unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
