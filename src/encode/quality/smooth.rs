@@ -27,9 +27,9 @@ const TURNS: f32 = 1.2;
 /// The weight of even ground that is no part of a gradient. The errors there are around edges, which hide
 /// them.
 const EVEN_WEIGHT: f32 = 0.14;
-/// The weight of the mean of noise, which hides the errors of its blocks: a shift of half a step is as bad
-/// as one of 0.15 of blocks in a gradient.
-const NOISE_WEIGHT: f32 = 0.09;
+/// The weight of the mean of noise, which hides the errors of its blocks: a shift of a quarter of a step is
+/// as bad as one of 0.15 of blocks in a gradient.
+const NOISE_WEIGHT: f32 = 0.36;
 
 /// One row of a picture over a background in steps, channel by channel.
 pub(super) type Line = [[f32; COLUMNS]; 3];
