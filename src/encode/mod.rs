@@ -4,7 +4,6 @@
 //! `file` writes codes as bytes; `pipeline` runs these stages one after the other.
 
 mod alpha_bleed;
-mod curvature;
 mod distortion;
 mod encoder;
 mod entropy;
@@ -14,6 +13,7 @@ mod fit;
 mod job;
 mod mul_add;
 mod options;
+mod own_frame;
 mod packed;
 mod pipeline;
 mod progress;

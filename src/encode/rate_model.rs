@@ -29,10 +29,10 @@ const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
 pub(crate) const LAMBDA: f32 = 0.322;
 /// Steps of geometry whose quantization adds as much distortion as that of a step of colour, for a
 /// Gaussian of strength 1: from integrals of the quartic kernel's derivatives.
-const POSITION: f32 = 1.095;
-const SIZE: f32 = 0.775;
-const RATIO: f32 = 0.866;
-const SLANT: f32 = 1.732;
+const POSITION_STEP: f32 = 1.095;
+const SIZE_STEP: f32 = 0.775;
+const RATIO_STEP: f32 = 0.866;
+const SLANT_STEP: f32 = 1.732;
 
 /// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
 /// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
@@ -87,7 +87,7 @@ pub(crate) fn distortion_per_gaussian(step: f64) -> f64 {
 /// The lattice for a step of colour, given by its base-2 logarithm.
 pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
     let step = color_step(step) as f32;
-    Lattice::new([POSITION, SIZE, RATIO, SLANT], vec![step; model.channels()])
+    Lattice::new([POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP], vec![step; model.channels()])
 }
 
 /// The Lagrange multiplier lambda for a lattice: squared error per bit.

@@ -12,7 +12,9 @@ use glam::{Vec2, Vec3};
 use super::components::{Bounds, Components, Slope};
 use super::parameterization::OwnFrame;
 use super::training::GaussNewton;
-use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
+use crate::encode::own_frame::{
+    CENTER_CURVATURE, COLOR_CURVATURE, RATIO_CURVATURE, SHEAR_CURVATURE, SIZE_CURVATURE,
+};
 use crate::gaussian::MAX_COMPONENTS;
 use crate::math;
 
@@ -48,7 +50,7 @@ impl State {
 }
 
 /// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
-/// the centre, the logarithms of size and ratio, the slant, and the colour.
+/// the centre, the logarithms of size and ratio, the shear, and the colour.
 #[inline]
 pub(super) fn step(
     components: &mut Components,
@@ -72,9 +74,10 @@ pub(super) fn step(
     let squared_color = color.iter().map(|color| color * color).sum::<f32>();
     let squared_strength = (squared_color + options.damping * options.damping) * area;
     let curvatures = Components {
-        center: [POSITION * squared_strength; 2],
-        shape: [SIZE, RATIO, SLANT].map(|curvature| curvature * squared_strength),
-        color: [COLOR * area; 4],
+        center: [CENTER_CURVATURE * squared_strength; 2],
+        shape: [SIZE_CURVATURE, RATIO_CURVATURE, SHEAR_CURVATURE]
+            .map(|curvature| curvature * squared_strength),
+        color: [COLOR_CURVATURE * area; 4],
     }
     .to_array();
     let momentum = options.momentum;

@@ -27,6 +27,7 @@ use checkpoint::Checkpoint;
 use components::{Bounds, Components, Slope};
 use densify::{Densifier, MIN_COLOR};
 use lsq::{LsqQuantizers, QuantizerGradients};
+use parameterization::gradients;
 use parameters::Parameters;
 use pass::{Pass, Rendered};
 use rate_term::RateTerm;
@@ -418,7 +419,8 @@ impl<'a> Fit<'a> {
                 if let Some(rate_term) = rate_term {
                     by_splat += rate_term.gradient(&gaussian);
                 }
-                let (center, shape) = by_splat.geometry.gradients(parameterization, decoded.shape);
+                let (center, shape) =
+                    gradients(&by_splat.geometry, parameterization, decoded.shape);
                 let mut gradient = Components { center, shape, color: by_splat.color };
                 if let Some(quantizers) = quantizers {
                     add(sum, &quantizers.backward(values, &decoded, &mut gradient));

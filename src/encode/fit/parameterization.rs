@@ -4,6 +4,7 @@
 
 use glam::{Mat2, Mat3, Vec2, Vec3};
 
+use crate::encode::own_frame::GeometrySums;
 use crate::gaussian::{Parameterization, inverse_cholesky};
 
 // Constants: docs/tuning.md, "Growth".
@@ -11,75 +12,59 @@ use crate::gaussian::{Parameterization, inverse_cholesky};
 /// centres of pixels, where it has no effect and no gradient.
 pub(crate) const MIN_DEVIATION: f32 = 0.4;
 
-/// The sums over pixels from which the gradients by a Gaussian's geometry follow. In them,
-/// s = -2 dLoss/dq, q is the squared Mahalanobis distance of a pixel, and d is the centre of the
-/// pixel minus the centre of the Gaussian.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct GeometrySums {
-    /// The sum of s d: (x, y).
-    pub(crate) first: [f32; 2],
-    /// The sum of s d d^T: (xx, xy, yy).
-    pub(crate) second: [f32; 3],
+/// The gradients of the loss by the centre and by the three shape values of `parameterization`.
+///
+/// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
+/// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
+/// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
+#[inline]
+pub(crate) fn gradients(
+    sums: &GeometrySums,
+    parameterization: Parameterization,
+    values: [f32; 3],
+) -> ([f32; 2], [f32; 3]) {
+    let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values));
+    // glam builds matrices from columns.
+    let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
+    let [xx, xy, yy] = sums.second;
+    let moments = Mat2::from_cols(Vec2::new(xx, xy), Vec2::new(xy, yy));
+    let center = m.transpose() * (m * Vec2::from(sums.first));
+    let by_factor = m.transpose() * (m * moments * m.transpose());
+    let shape = match parameterization {
+        Parameterization::Cholesky => [by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y],
+        Parameterization::Covariance => {
+            let by_covariance = by_factor * m * 0.5;
+            // xy stands for both off-diagonal entries.
+            [
+                by_covariance.x_axis.x,
+                by_covariance.x_axis.y + by_covariance.y_axis.x,
+                by_covariance.y_axis.y,
+            ]
+        }
+        Parameterization::RotationScale => {
+            let by_covariance = by_factor * m * 0.5;
+            let [s1, s2, angle] = values;
+            let (axis1, axis2) = axes(angle);
+            // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
+            let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
+            [
+                2.0 * s1 * along(axis1, axis1),
+                2.0 * s2 * along(axis2, axis2),
+                (s1 * s1 - s2 * s2) * (along(axis1, axis2) + along(axis2, axis1)),
+            ]
+        }
+    };
+    (center.to_array(), shape)
 }
 
-impl GeometrySums {
-    /// The gradients of the loss by the centre and by the three shape values of `parameterization`.
-    ///
-    /// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
-    /// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
-    /// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
-    #[inline]
-    pub(crate) fn gradients(
-        &self,
-        parameterization: Parameterization,
-        values: [f32; 3],
-    ) -> ([f32; 2], [f32; 3]) {
-        let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values));
-        // glam builds matrices from columns.
-        let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
-        let [xx, xy, yy] = self.second;
-        let moments = Mat2::from_cols(Vec2::new(xx, xy), Vec2::new(xy, yy));
-        let center = m.transpose() * (m * Vec2::from(self.first));
-        let by_factor = m.transpose() * (m * moments * m.transpose());
-        let shape = match parameterization {
-            Parameterization::Cholesky => {
-                [by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y]
-            }
-            Parameterization::Covariance => {
-                let by_covariance = by_factor * m * 0.5;
-                // xy stands for both off-diagonal entries.
-                [
-                    by_covariance.x_axis.x,
-                    by_covariance.x_axis.y + by_covariance.y_axis.x,
-                    by_covariance.y_axis.y,
-                ]
-            }
-            Parameterization::RotationScale => {
-                let by_covariance = by_factor * m * 0.5;
-                let [s1, s2, angle] = values;
-                let (axis1, axis2) = axes(angle);
-                // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
-                let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
-                [
-                    2.0 * s1 * along(axis1, axis1),
-                    2.0 * s2 * along(axis2, axis2),
-                    (s1 * s1 - s2 * s2) * (along(axis1, axis2) + along(axis2, axis1)),
-                ]
-            }
-        };
-        (center.to_array(), shape)
-    }
-}
-
-/// A Gaussian's own frame, in which its centre moves in standard deviations and its shape changes
-/// relative to itself.
+/// The derivatives of the centre and of the shape values by the directions of a Gaussian's own frame
+/// (`encode/own_frame.rs`).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OwnFrame {
     /// The Cholesky factor L: the derivative of the centre by its coordinates (u, v) in the frame.
     pub(crate) center: Mat2,
-    /// The derivatives of the three shape values by the logarithms of size and ratio, and by the slant,
-    /// in columns: L becomes L (I + D), where D is the identity for the size, diag(1, -1) for the
-    /// ratio, and 1 in the lower left corner for the slant.
+    /// The derivatives of the three shape values by the logarithms of size and ratio, and by the shear,
+    /// in columns.
     pub(crate) shape: Mat3,
 }
 
@@ -91,12 +76,12 @@ impl OwnFrame {
         let center = Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22));
         // The derivatives of the covariance (xx, xy, yy): L (D + D^T) L^T.
         let by_ratio = 2.0 * Vec3::new(l11 * l11, l11 * l21, l21 * l21 - l22 * l22);
-        let by_slant = Vec3::new(0.0, l11 * l22, 2.0 * l21 * l22);
+        let by_shear = Vec3::new(0.0, l11 * l22, 2.0 * l21 * l22);
         let shape = match parameterization {
             Parameterization::Cholesky => {
                 Mat3::from_cols(values, Vec3::new(l11, l21, -l22), Vec3::new(0.0, l22, 0.0))
             }
-            Parameterization::Covariance => Mat3::from_cols(2.0 * values, by_ratio, by_slant),
+            Parameterization::Covariance => Mat3::from_cols(2.0 * values, by_ratio, by_shear),
             Parameterization::RotationScale => {
                 let (axis1, axis2) = axes(values.z);
                 let [s1, s2, _] = values.into();
@@ -114,7 +99,7 @@ impl OwnFrame {
                         along(axis1, axis2) / difference,
                     )
                 };
-                Mat3::from_cols(Vec3::new(s1, s2, 0.0), changed(by_ratio), changed(by_slant))
+                Mat3::from_cols(Vec3::new(s1, s2, 0.0), changed(by_ratio), changed(by_shear))
             }
         };
         Self { center, shape }
@@ -285,7 +270,7 @@ mod tests {
                     .center
                     .abs_diff_eq(Mat2::from_cols(Vec2::new(l11, l21), Vec2::new(0.0, l22)), 1e-5)
             );
-            // Size, ratio and slant.
+            // Size, ratio and shear.
             for (column, [d11, d21, d22]) in
                 [[1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [0.0, 1.0, 0.0]].into_iter().enumerate()
             {

@@ -13,10 +13,10 @@ use fearless_simd::Level;
 
 use super::bins::{RowBins, TileRow};
 use super::distortion_map;
-use super::parameterization::GeometrySums;
 use super::training::Distortion;
 use super::training_tile::{RenderingError, Slot, TileState, TrainingTile, slots_per_span};
 use crate::encode::error::EncodeError;
+use crate::encode::own_frame::GeometrySums;
 use crate::encode::progress::Observer;
 use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::kernel::Kernel;

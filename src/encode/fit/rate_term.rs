@@ -2,8 +2,8 @@
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::parameterization::GeometrySums;
 use super::pass::SplatGradient;
+use crate::encode::own_frame::GeometrySums;
 use crate::encode::rate_model::{LAMBDA, step_for};
 use crate::gaussian::{Gaussian, component_count};
 
@@ -71,7 +71,7 @@ impl RateTerm {
         area * (self.weight * self.components) / (squared * area + self.squared_step)
     }
 
-    /// The gradients of half the term by size (at constant strength), ratio and slant, each in the
+    /// The gradients of half the term by size (at constant strength), ratio and shear, each in the
     /// Gaussian's own frame, for sixteen Gaussians with these Cholesky factors.
     #[inline(always)]
     pub(super) fn by_shape<S: Simd>(
@@ -89,6 +89,7 @@ impl RateTerm {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::fit::parameterization::gradients;
     use crate::gaussian::Parameterization;
 
     /// The values are l11, l21, l22 and three channels.
@@ -115,7 +116,7 @@ mod tests {
             let cholesky = [l11, l21, l22];
             let gaussian = Gaussian { center: [3.0, 4.0], cholesky, color: [c0, c1, c2, 0.0] };
             let SplatGradient { geometry, color } = rate_term.gradient(&gaussian);
-            let (center, shape) = geometry.gradients(Parameterization::Cholesky, cholesky);
+            let (center, shape) = gradients(&geometry, Parameterization::Cholesky, cholesky);
             assert_eq!(center, [0.0; 2]);
             assert_eq!(color[3], 0.0);
             let found = [shape[0], shape[1], shape[2], color[0], color[1], color[2]];

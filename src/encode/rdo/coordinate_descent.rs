@@ -6,13 +6,13 @@ use core::ops::Range;
 
 use rayon::prelude::*;
 
-use super::quadratic_model::GeometryChange;
 use super::residuals::{Band, Residuals, window};
 use super::rounds::{BandEntries, Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_CLASS, SymbolCosts};
 use crate::color::ColorModel;
 use crate::encode::error::EncodeError;
+use crate::encode::own_frame::{self, GeometryChange};
 use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
@@ -274,12 +274,10 @@ impl CoordinateDescent<'_> {
 
     /// The change of geometry from a Gaussian with its code to another code.
     fn change(&self, gaussian: &Gaussian, from: &Code, to: &Code) -> GeometryChange {
-        let [l11, l21, l22] = gaussian.cholesky;
-        let [x, y] = self.coder.grid.center(to.center);
-        let u = (x - gaussian.center[0]) / l11;
+        let center = self.coder.grid.center(to.center);
         let [before, after] = [from, to].map(|code| self.coder.lattice.shape_values(code));
         GeometryChange {
-            center: [u, (y - gaussian.center[1] - l21 * u) / l22],
+            center: own_frame::coordinates(gaussian, center),
             size: after[0] - before[0],
             ratio: after[1] - before[1],
             slant: after[2] - before[2],

@@ -8,7 +8,6 @@
 mod code_optimizer;
 mod coordinate_descent;
 mod kernel_weights;
-mod quadratic_model;
 mod residuals;
 mod rounds;
 mod search_work;

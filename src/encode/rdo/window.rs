@@ -7,11 +7,11 @@ use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, kernel_root};
-use super::quadratic_model::{GeometryChange, GeometryErrorSums};
 use super::residuals::{Band, ROWS_PER_TASK, StoredLanes, is_shared, load, store, window};
 use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 use crate::encode::mul_add::MulAdd;
+use crate::encode::own_frame::{GeometryChange, GeometrySums};
 use crate::encode::raster::Raster;
 use crate::gaussian::Gaussian;
 
@@ -142,7 +142,7 @@ impl Window {
         let sensitivity = if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
         Some(ErrorGradient {
             change: sums.change.with_present(gaussian, model),
-            by_geometry: sums.geometry(gaussian).gradient(gaussian),
+            by_geometry: sums.by_geometry(gaussian),
             sensitivity,
         })
     }
@@ -348,8 +348,7 @@ impl Frame<'_> {
         GradientSums {
             change,
             weights: lane_sum(all),
-            first: first.map(lane_sum),
-            second: second.map(lane_sum),
+            geometry: GeometrySums { first: first.map(lane_sum), second: second.map(lane_sum) },
         }
     }
 
@@ -455,9 +454,8 @@ struct GradientSums {
     change: ChangeSums,
     /// Squared weights.
     weights: f32,
-    /// As in [`GeometryErrorSums`].
-    first: [f32; 2],
-    second: [f32; 3],
+    /// In the Gaussian's own frame.
+    geometry: GeometrySums,
 }
 
 impl GradientSums {
@@ -465,18 +463,14 @@ impl GradientSums {
         Self {
             change: self.change.plus(other.change),
             weights: self.weights + other.weights,
-            first: core::array::from_fn(|at| self.first[at] + other.first[at]),
-            second: core::array::from_fn(|at| self.second[at] + other.second[at]),
+            geometry: self.geometry + other.geometry,
         }
     }
 
-    fn geometry(&self, gaussian: &Gaussian) -> GeometryErrorSums {
+    fn by_geometry(&self, gaussian: &Gaussian) -> GeometryChange {
         let channels = gaussian.color.iter().zip(self.change.products);
-        GeometryErrorSums {
-            first: self.first,
-            second: self.second,
-            weighted: channels.map(|(color, product)| color * product).sum(),
-        }
+        let by_color = channels.map(|(color, product)| color * product).sum();
+        GeometryChange::gradient(gaussian, self.geometry, by_color)
     }
 }
 

@@ -1,8 +1,7 @@
 //! Gauss-Newton steps of trained Cholesky factors, sixteen Gaussians at a time.
 //!
-//! The gradients in a Gaussian's own frame follow directly from the sums of the pass: with the inverse
-//! M of the factor L, that by the centre is M (sum of s d), and where L becomes L (I + D), that by the
-//! shape is the sum of the products of the entries of D and of Z^T, with Z = M (sum of s d d^T) M^T.
+//! The gradients in a Gaussian's own frame follow directly from the sums of the pass
+//! (`encode/own_frame.rs`).
 //!
 //! Loops are over indices, as in `fit/training_tile.rs`. There are no fused multiplications, so all
 //! machines get the same bits.
@@ -10,12 +9,15 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{FASTER, LEAST_PACE, MOST_PACE, SLOWER, State};
-use crate::encode::curvature::{COLOR, POSITION, RATIO, SIZE, SLANT};
 use crate::encode::fit::components::{Bounds, Components, MAX_COLOR};
 use crate::encode::fit::parameterization::MIN_DEVIATION;
 use crate::encode::fit::pass::SplatGradient;
 use crate::encode::fit::rate_term::RateTerm;
 use crate::encode::fit::training::GaussNewton;
+use crate::encode::own_frame::{
+    CENTER_CURVATURE, COLOR_CURVATURE, GeometrySums, RATIO_CURVATURE, SHEAR_CURVATURE,
+    SIZE_CURVATURE,
+};
 use crate::gaussian::MAX_COMPONENTS;
 use crate::render::simd_kernel;
 use crate::render::splat::Splat;
@@ -23,9 +25,9 @@ use crate::simd::LANES;
 
 /// The reciprocals of the curvatures for a strength or an area of 1.
 const RECIPROCALS: Components = Components {
-    center: [1.0 / POSITION; 2],
-    shape: [1.0 / SIZE, 1.0 / RATIO, 1.0 / SLANT],
-    color: [1.0 / COLOR; 4],
+    center: [1.0 / CENTER_CURVATURE; 2],
+    shape: [1.0 / SIZE_CURVATURE, 1.0 / RATIO_CURVATURE, 1.0 / SHEAR_CURVATURE],
+    color: [1.0 / COLOR_CURVATURE; 4],
 };
 
 /// What the steps of all Gaussians have in common.
@@ -150,12 +152,12 @@ impl BlockStep<'_> {
             steps.shape[index] = steps.shape[index].max(-trusted).min(trusted);
         }
 
-        let ([u, v], [size, ratio, slant]) = (steps.center, steps.shape);
+        let ([u, v], [size, ratio, shear]) = (steps.center, steps.shape);
         let mut new = Components {
             center: [x - l11 * u, y - (l21 * u + l22 * v)],
             shape: [
                 l11 - l11 * (size + ratio),
-                l21 - (l21 * (size + ratio) + l22 * slant),
+                l21 - (l21 * (size + ratio) + l22 * shear),
                 l22 - l22 * (size - ratio),
             ],
             color,
@@ -205,18 +207,17 @@ impl BlockStep<'_> {
         squared_color: f32x16<S>,
         slopes: &[(SplatGradient, f32); LANES],
     ) -> Components<f32x16<S>> {
-        let [i11, w, i22] = inverse(cholesky);
-        let x = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[0]);
-        let y = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[1]);
-        let xx = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[0]);
-        let xy = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[1]);
-        let yy = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[2]);
-        let across = w * xx + i22 * xy;
-        let z11 = i11 * i11 * xx;
-        let z21 = i11 * across;
-        let z22 = w * across + i22 * (w * xy + i22 * yy);
-
-        let mut shape = [z11 + z22, z11 - z22, z21];
+        let zero = f32x16::splat(simd, 0.0);
+        let mut sums = GeometrySums { first: [zero; 2], second: [zero; 3] };
+        for axis in 0..sums.first.len() {
+            sums.first[axis] = f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.first[axis]);
+        }
+        for entry in 0..sums.second.len() {
+            sums.second[entry] =
+                f32x16::from_fn(simd, |lane| slopes[lane].0.geometry.second[entry]);
+        }
+        let sums = sums.in_own_frame(inverse(cholesky));
+        let mut shape = sums.by_shape();
         let mut by_color = color;
         for channel in 0..color.len() {
             by_color[channel] = f32x16::from_fn(simd, |lane| slopes[lane].0.color[channel]);
@@ -233,7 +234,7 @@ impl BlockStep<'_> {
                 by_color[channel] += rate_by_color * color[channel];
             }
         }
-        Components { center: [i11 * x, w * x + i22 * y], shape, color: by_color }
+        Components { center: sums.first, shape, color: by_color }
     }
 
     /// [`Bounds::clamped`] for finite values.
@@ -285,7 +286,7 @@ fn write(splats: &mut [Splat], first: usize, block: &[Splat; LANES]) {
 mod tests {
     use super::*;
     use crate::encode::fit::components::Slope;
-    use crate::encode::fit::parameterization::GeometrySums;
+    use crate::encode::fit::parameterization::gradients;
     use crate::gaussian::Parameterization;
     use crate::testing::simd_levels;
     use glam::Vec2;
@@ -340,7 +341,7 @@ mod tests {
             if let Some(rate_term) = step.rate_term {
                 by_splat += rate_term.gradient(&values.gaussian(PARAMETERIZATION));
             }
-            let (center, shape) = by_splat.geometry.gradients(PARAMETERIZATION, values.shape);
+            let (center, shape) = gradients(&by_splat.geometry, PARAMETERIZATION, values.shape);
             let gradient = Components { center, shape, color: by_splat.color };
             let slope = Slope { gradient, sensitivity: *sensitivity };
             super::super::step(values, state, &slope, step.options, step.bounds, step.factor);

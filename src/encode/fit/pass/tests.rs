@@ -131,7 +131,8 @@ fn gradients(
     run(&mut pass, raster, &splats, kernel, BASE);
     let gradients = scene.iter().enumerate().map(|(index, components)| {
         let SplatGradient { geometry, color } = pass.gradient(index, raster.channels);
-        let (center, shape) = geometry.gradients(parameterization, components.shape);
+        let (center, shape) =
+            parameterization::gradients(&geometry, parameterization, components.shape);
         Components { center, shape, color }
     });
     gradients.collect()

@@ -1,13 +1,92 @@
-//! A quadratic model of the squared error as a function of a small change of a Gaussian's geometry.
-//! The curvatures, and the frame in which changes are measured, are those of `encode/curvature.rs`.
+//! A Gaussian's own frame: the gradient and the curvature of the squared error there.
+//!
+//! With its Cholesky factor L and its centre m, a point p has the coordinates (u, v) = L^-1 (p - m), and
+//! q = u^2 + v^2. The geometry changes in five directions: the *centre* along u and v, and the shape, where L
+//! becomes L (I + D), by *size*, *ratio* and *shear*. D is the identity for the size, diag(1, -1) for the
+//! ratio, and 1 in the lower left corner for the shear. The logarithm of the size is ln(l11 l22) / 2, that
+//! of the ratio ln(l11 / l22) / 2.
+//!
+//! Codes have the *slant*, l21 / l22, in place of the shear. Where the slant remains, a change of the ratio
+//! shears the Gaussian, too: the shear is the change of the slant, minus twice the slant times the change
+//! of the ratio.
+//!
+//! When the size of a Gaussian changes, its colour changes too, such that its strength, colour times the
+//! square root of the area l11 l22, and with it the sum of its squares, remains the same. Then the Hessian
+//! is diagonal: it mixes neither the directions of the geometry nor geometry and colour.
 
-use crate::encode::curvature::{POSITION, RATIO, SIZE, SLANT};
+use core::ops::{Add, Mul, Sub};
+
 use crate::gaussian::Gaussian;
 
-/// A change of a Gaussian's geometry, or a gradient by its components.
+/// The curvatures: half of the second derivatives of the squared error of one Gaussian, which are integrals
+/// of the squares of the quartic kernel's derivatives. Those by the geometry are for a strength of 1.
+///
+/// By either coordinate of the centre: 2 pi / 3.
+pub(crate) const CENTER_CURVATURE: f32 = 2.094_395;
+/// By the logarithm of the size: 4 pi / 3.
+pub(crate) const SIZE_CURVATURE: f32 = 4.188_79;
+/// By the logarithm of the ratio: 16 pi / 15.
+pub(crate) const RATIO_CURVATURE: f32 = 3.351_032;
+/// By the shear: 4 pi / 15.
+pub(crate) const SHEAR_CURVATURE: f32 = 0.837_758;
+/// By the colour, for an area of 1: 4 pi / 5.
+pub(crate) const COLOR_CURVATURE: f32 = 2.513_274;
+
+/// The sums over pixels from which the gradient by a Gaussian's geometry follows. In them, s is
+/// -2 dLoss/dq, where the loss is half the error, and d the pixel minus the centre: in pixels, or in the
+/// own frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct GeometrySums<T = f32> {
+    /// The sum of s d: (x, y). In the own frame, it is the gradient by the centre.
+    pub(crate) first: [T; 2],
+    /// The sum of s d d^T: (xx, xy, yy).
+    pub(crate) second: [T; 3],
+}
+
+impl<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T>> GeometrySums<T> {
+    /// Sums in pixels, in the own frame instead, given the inverse M of the Cholesky factor: M (sum of
+    /// s d) and M (sum of s d d^T) M^T.
+    #[inline(always)]
+    pub(crate) fn in_own_frame(self, [i11, w, i22]: [T; 3]) -> Self {
+        let Self { first: [x, y], second: [xx, xy, yy] } = self;
+        let across = w * xx + i22 * xy;
+        Self {
+            first: [i11 * x, w * x + i22 * y],
+            second: [i11 * i11 * xx, i11 * across, w * across + i22 * (w * xy + i22 * yy)],
+        }
+    }
+
+    /// The gradient by size, ratio and shear, where colours stay: the sums of the products of the entries
+    /// of D and of these sums in the own frame.
+    #[inline(always)]
+    pub(crate) fn by_shape(self) -> [T; 3] {
+        let [uu, uv, vv] = self.second;
+        [uu + vv, uu - vv, uv]
+    }
+}
+
+impl Add for GeometrySums {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            first: core::array::from_fn(|at| self.first[at] + other.first[at]),
+            second: core::array::from_fn(|at| self.second[at] + other.second[at]),
+        }
+    }
+}
+
+/// The coordinates of a point in a Gaussian's own frame.
+pub(crate) fn coordinates(gaussian: &Gaussian, [x, y]: [f32; 2]) -> [f32; 2] {
+    let [l11, l21, l22] = gaussian.cholesky;
+    let u = (x - gaussian.center[0]) / l11;
+    [u, (y - gaussian.center[1] - l21 * u) / l22]
+}
+
+/// A change of the geometry that a code has, or a gradient by it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct GeometryChange {
-    /// The change of the centre, in the Gaussian's frame before.
+    /// The change of the centre, in the frame before.
     pub(crate) center: [f32; 2],
     /// The change of ln(l11 l22) / 2.
     pub(crate) size: f32,
@@ -18,6 +97,19 @@ pub(crate) struct GeometryChange {
 }
 
 impl GeometryChange {
+    /// The gradient of the squared error by the geometry of a Gaussian. `sums` are those in its own frame;
+    /// `by_color` is the sum of the products of its colours and of half the gradient by them.
+    pub(crate) fn gradient(gaussian: &Gaussian, sums: GeometrySums, by_color: f32) -> Self {
+        let [_, l21, l22] = gaussian.cholesky;
+        let [size, ratio, shear] = sums.by_shape();
+        Self {
+            center: sums.first.map(|sum| 2.0 * sum),
+            size: 2.0 * (size - by_color),
+            ratio: 2.0 * (ratio - 2.0 * l21 / l22 * shear),
+            slant: 2.0 * shear,
+        }
+    }
+
     /// A Gaussian after this change, with the same strength.
     pub(crate) fn applied(&self, gaussian: &Gaussian) -> Gaussian {
         let [l11, l21, l22] = gaussian.cholesky;
@@ -40,13 +132,12 @@ impl GeometryChange {
             + self.size * change.size
             + self.ratio * change.ratio
             + self.slant * change.slant;
-        // A change of the ratio also shears a slanted Gaussian, unless the slant makes up for it.
         let shear = change.slant - 2.0 * slant * change.ratio;
         let [u, v] = change.center;
-        let quadratic = POSITION * (u * u + v * v)
-            + SIZE * change.size * change.size
-            + RATIO * change.ratio * change.ratio
-            + SLANT * shear * shear;
+        let quadratic = CENTER_CURVATURE * (u * u + v * v)
+            + SIZE_CURVATURE * change.size * change.size
+            + RATIO_CURVATURE * change.ratio * change.ratio
+            + SHEAR_CURVATURE * shear * shear;
         linear + squared_strength * quadratic
     }
 
@@ -56,38 +147,12 @@ impl GeometryChange {
         let component = |derivative: f32, curvature: f32| {
             (-derivative / (2.0 * curvature * squared_strength)).clamp(-max_change, max_change)
         };
-        let ratio = component(self.ratio + 2.0 * slant * self.slant, RATIO);
+        let ratio = component(self.ratio + 2.0 * slant * self.slant, RATIO_CURVATURE);
         Self {
-            center: self.center.map(|derivative| component(derivative, POSITION)),
-            size: component(self.size, SIZE),
+            center: self.center.map(|derivative| component(derivative, CENTER_CURVATURE)),
+            size: component(self.size, SIZE_CURVATURE),
             ratio,
-            slant: component(self.slant, SLANT) + 2.0 * slant * ratio,
-        }
-    }
-}
-
-/// The sums over pixels from which the gradient by a Gaussian's geometry follows. In them, e is the
-/// scalar product of the Gaussian's colour and the residual at a pixel, and t = 1 - q/4.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct GeometryErrorSums {
-    /// The sums of e t u and e t v.
-    pub(crate) first: [f32; 2],
-    /// The sums of e t u^2, e t u v and e t v^2.
-    pub(crate) second: [f32; 3],
-    /// The sum of e t^2.
-    pub(crate) weighted: f32,
-}
-
-impl GeometryErrorSums {
-    /// The gradient of the squared error by the geometry of `gaussian`.
-    pub(crate) fn gradient(&self, gaussian: &Gaussian) -> GeometryChange {
-        let [_, l21, l22] = gaussian.cholesky;
-        let [uu, uv, vv] = self.second;
-        GeometryChange {
-            center: self.first.map(|sum| 2.0 * sum),
-            size: 2.0 * (uu + vv - self.weighted),
-            ratio: 2.0 * (uu - vv - 2.0 * l21 / l22 * uv),
-            slant: 2.0 * uv,
+            slant: component(self.slant, SHEAR_CURVATURE) + 2.0 * slant * ratio,
         }
     }
 }
@@ -100,11 +165,9 @@ mod tests {
     fn between(from: &Gaussian, to: &Gaussian) -> GeometryChange {
         let [l11, l21, l22] = from.cholesky;
         let [m11, m21, m22] = to.cholesky;
-        let [dx, dy] = [to.center[0] - from.center[0], to.center[1] - from.center[1]];
-        let u = dx / l11;
         let (log1, log2) = ((m11 / l11).ln(), (m22 / l22).ln());
         GeometryChange {
-            center: [u, (dy - l21 * u) / l22],
+            center: coordinates(from, to.center),
             size: 0.5 * (log1 + log2),
             ratio: 0.5 * (log1 - log2),
             slant: m21 / m22 - l21 / l22,
