@@ -11,7 +11,7 @@ use crate::coding::entropy::{Lattice, LatticeSteps};
 use crate::coding::packed::Quantizer;
 use crate::container::{Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
-use crate::gaussian::{CENTER, Gaussian, SHAPE};
+use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::orientation::Orientation;
 use crate::render::Picture;
@@ -93,6 +93,8 @@ impl StreamDecoder {
     #[cfg(feature = "std")]
     #[must_use]
     pub fn attribute_bits(&self) -> Option<AttributeBits> {
+        use crate::gaussian::{CENTER, SHAPE};
+
         let statistics = self.chunks.statistics?;
         let quantizers = self.quantizers();
         let bits_of = |components: core::ops::Range<usize>| {
