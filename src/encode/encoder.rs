@@ -3,6 +3,7 @@
 use core::ops::ControlFlow;
 use std::time::Instant;
 
+use super::aim::Aim;
 use super::error::{EncodeError, OptionError};
 use super::fit::training::Training;
 use super::job::Job;
@@ -202,12 +203,13 @@ impl Encoder {
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
-        let (training, passes) = self.check()?;
+        let pixels = source.width() as usize * source.height() as usize;
+        let (aim, training, passes) = self.check(pixels)?;
         let mut observer = Observer::new(progress, training.iterations);
         let source = source.keeping_invisible(self.keep_invisible);
         let job = Job {
             source: &source,
-            target: self.target,
+            aim,
             tune: self.tune,
             precision: self.precision,
             seed: self.seed,
@@ -227,8 +229,8 @@ impl Encoder {
             bytes: outcome.file,
             report: Report {
                 gaussians: outcome.gaussians,
-                psnr: outcome.distortion.psnr,
-                psnr_float: outcome.distortion.psnr_float,
+                psnr: outcome.psnr.rounded,
+                psnr_float: outcome.psnr.exact,
                 quality: outcome.quality,
                 iterations: outcome.work.iterations,
                 evaluations: outcome.work.evaluations,
@@ -239,15 +241,15 @@ impl Encoder {
         })
     }
 
-    /// Checks all options; returns the constants of training and the number of passes of
-    /// rate-distortion optimization.
-    fn check(&self) -> Result<(Training, u32), EncodeError> {
+    /// Checks all options; returns the aim for a picture with so many pixels, the constants of training and the
+    /// number of passes of rate-distortion optimization.
+    fn check(&self, pixels: usize) -> Result<(Aim, Training, u32), EncodeError> {
         let Some(&(iterations, passes)) = EFFORTS.get(usize::from(self.effort).wrapping_sub(1))
         else {
             return Err(OptionError::Effort(self.effort).into());
         };
-        self.target.check()?;
-        let fewest = if self.target.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
+        let aim = Aim::new(self.target, pixels)?;
+        let fewest = if aim.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
         let iterations = iterations.max(fewest);
         self.metadata.check().map_err(OptionError::Metadata)?;
         let training = match &self.training {
@@ -261,7 +263,7 @@ impl Encoder {
         if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {
             return Err(OptionError::Training("entropy coding needs the quartic kernel").into());
         }
-        Ok((training, passes))
+        Ok((aim, training, passes))
     }
 }
 

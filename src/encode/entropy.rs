@@ -2,12 +2,12 @@
 
 use core::ops::Range;
 
+use super::aim::{Aim, FileAim};
 use super::error::EncodeError;
 use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::Target;
 use super::progress::Observer;
 use super::quality::Judge;
 use super::raster::Raster;
@@ -34,7 +34,7 @@ const FACTORS: (f64, f64) = (0.25, 4.0);
 /// Two fits tell p: it is low for noise, and high for smooth pictures.
 const POWERS: (f64, f64) = (0.4, 2.0);
 
-/// From this deviation from a quality on (see `rdo/step_search.rs`; a point or two), the codes of a second
+/// From this deviation from a quality on (see `aim.rs`; a point or two), the codes of a second
 /// fit are tried.
 const MISSED: f64 = 0.1;
 
@@ -59,16 +59,18 @@ pub(crate) fn finish(
     mut fit: Fit<'_>,
     job: &Job<'_>,
     judge: &Judge<'_>,
+    budget: Budget,
     raster: &Raster,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
-    if let Target::Psnr(psnr) = job.target {
-        extend(&mut fit, rate_model::SHARE_OF_FIT * raster.error_of(psnr), job, observer)?;
+    if let Budget::SquaredError(error) = budget {
+        extend(&mut fit, error, job, observer)?;
     }
-    let too_good = match job.target.quality() {
-        Some(quality) => correct(&mut fit, quality, job, judge, layout, observer)?,
-        None => None,
+    let too_good = if let Aim::File(FileAim::Quality(quality)) = job.aim {
+        correct(&mut fit, quality, job, judge, layout, observer)?
+    } else {
+        None
     };
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
@@ -85,11 +87,11 @@ pub(crate) fn finish(
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
     let mut search = TargetSearch::new(judge, raster, layout, search_work, observer)?;
-    let (mut coded, deviation) = search.run(&gaussians, distortion, job.target, observer)?;
+    let (mut coded, deviation) = search.run(&gaussians, distortion, job.aim, observer)?;
     if let Some(fitted) = too_good.filter(|_| deviation > MISSED) {
         observer.expect(SearchWork::new(job, fitted.gaussians.len()).whole());
         let (other, deviation_of_other) =
-            search.run(&fitted.gaussians, fitted.distortion, job.target, observer)?;
+            search.run(&fitted.gaussians, fitted.distortion, job.aim, observer)?;
         if deviation_of_other < deviation {
             coded = other;
         }

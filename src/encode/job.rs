@@ -1,7 +1,8 @@
 //! The input of the pipeline.
 
+use super::aim::Aim;
 use super::fit::training::Training;
-use super::options::{Precision, Target, Tune};
+use super::options::{Precision, Tune};
 use super::source::Source;
 use super::workload::Workload;
 use crate::container::Metadata;
@@ -11,7 +12,7 @@ use crate::limits::Limits;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job<'a> {
     pub(crate) source: &'a Source<'a>,
-    pub(crate) target: Target,
+    pub(crate) aim: Aim,
     pub(crate) tune: Tune,
     pub(crate) precision: Precision,
     pub(crate) seed: u64,

@@ -1,7 +1,5 @@
 //! Options of the encoder: the target of a file and the precision of its attributes.
 
-use super::error::OptionError;
-
 /// The target that an encoded file has to meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -37,67 +35,8 @@ pub enum Target {
     Lambda(f64),
 }
 
-/// By how much a PSNR may exceed its target, in dB.
-pub(crate) const PSNR_TOLERANCE: f64 = 0.05;
-/// The share of a target size that a file must reach.
-pub(crate) const SIZE_TOLERANCE: f64 = 0.99;
 /// Most Gaussians that the encoder writes: as many as a decoder accepts by default.
 pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
-
-/// By how much a quality may miss its target.
-pub(crate) const QUALITY_TOLERANCE: f64 = 1.0;
-
-// Constants: docs/tuning.md, "Not measured".
-/// The quality of [`Target::Auto`].
-const AUTO_QUALITY: f64 = 75.0;
-
-impl Target {
-    /// Refuses a number that is out of range.
-    pub(crate) fn check(self) -> Result<(), OptionError> {
-        let within = |name, value, least, most| {
-            if (least..=most).contains(&value) {
-                Ok(())
-            } else {
-                Err(OptionError::Target { name, value, least, most })
-            }
-        };
-        match self {
-            Self::Auto => Ok(()),
-            Self::Gaussians(count) => {
-                within("number of Gaussians", count.into(), 1.0, MAX_GAUSSIANS.into())
-            }
-            Self::Bytes(bytes) => within("size in bytes", bytes as f64, 1.0, f64::from(1 << 30)),
-            Self::BitsPerPixel(rate) => within("bits per pixel", rate, 1e-6, 1e6),
-            Self::Psnr(psnr) => within("PSNR in dB", psnr, 1.0, 120.0),
-            Self::Quality(quality) => within("quality", quality, 0.0, 100.0),
-            Self::Lambda(lambda) => within("lambda", lambda, 0.01, 1e6),
-        }
-    }
-
-    /// Most bytes that the file of a picture with so many pixels may have; `None` if the target
-    /// does not set a size.
-    pub(crate) fn bytes(self, pixels: usize) -> Option<u64> {
-        match self {
-            Self::Bytes(bytes) => Some(bytes),
-            Self::BitsPerPixel(rate) => Some((rate * pixels as f64 / 8.0) as u64),
-            _ => None,
-        }
-    }
-
-    /// Whether the target sets the error, and so leaves the number of Gaussians open.
-    pub(crate) fn is_by_error(self) -> bool {
-        matches!(self, Self::Psnr(_) | Self::Lambda(_)) || self.quality().is_some()
-    }
-
-    /// The visual quality; `None` if the target is something else.
-    pub(crate) fn quality(self) -> Option<f64> {
-        match self {
-            Self::Auto => Some(AUTO_QUALITY),
-            Self::Quality(quality) => Some(quality),
-            _ => None,
-        }
-    }
-}
 
 /// What the encoder minimizes for the size of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

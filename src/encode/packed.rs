@@ -1,11 +1,12 @@
 //! From a fit to a file of the packed coding that meets its target.
 
+use super::aim::{Aim, FileAim, PSNR_TOLERANCE, SIZE_TOLERANCE};
 use super::error::EncodeError;
 use super::file::{FileLayout, packed_layers_length};
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::{PSNR_TOLERANCE, Precision, SIZE_TOLERANCE, Target};
+use super::options::Precision;
 use super::progress::Observer;
 use super::quality::Judge;
 use super::source::Source;
@@ -58,17 +59,19 @@ pub(crate) fn finish(
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
-    let Job { source, target, .. } = *job;
-    let file = if let Target::Psnr(target) = target {
-        let fitted = raised(&mut fit, target, layout, source, observer)?;
-        trimmed(layout, layout.ordered(&fitted), source, target, observer)?
-    } else if let Some(quality) = target.quality() {
-        extended(&mut fit, quality, layout, judge, observer)?
-    } else {
-        if let (Some(_), Budget::Count(count)) = (target.bytes(job.pixels()), budget) {
-            fill(&mut fit, count, observer)?;
+    let file = match (job.aim, budget) {
+        (Aim::File(FileAim::Psnr(psnr)), _) => {
+            let fitted = raised(&mut fit, psnr, layout, job.source, observer)?;
+            trimmed(layout, layout.ordered(&fitted), job.source, psnr, observer)?
         }
-        layout.write_packed(&fit.fitted())
+        (Aim::File(FileAim::Quality(quality)), _) => {
+            extended(&mut fit, quality, layout, judge, observer)?
+        }
+        (Aim::File(FileAim::Size(_)), Budget::Count(count)) => {
+            fill(&mut fit, count, observer)?;
+            layout.write_packed(&fit.fitted())
+        }
+        _ => layout.write_packed(&fit.fitted()),
     };
     Ok((file, fit.work()))
 }
@@ -177,7 +180,7 @@ fn more(fit: &Fit<'_>, factor: f64) -> usize {
 
 /// The PSNR of a file in dB.
 fn psnr(file: &[u8], source: &Source<'_>, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
-    Ok(Verified::new(file, source, observer)?.distortion(u32::MAX, observer)?.psnr)
+    Verified::new(file, source, observer)?.psnr(u32::MAX, observer)
 }
 
 /// The file with as few Gaussians as reach `target`: first the fewest in file order, then without
@@ -216,9 +219,8 @@ fn least_prefix(
     target: f64,
     observer: &mut Observer<'_>,
 ) -> Result<u32, EncodeError> {
-    let mut reaches = |count| -> Result<bool, EncodeError> {
-        Ok(verified.distortion(count, observer)?.psnr >= target)
-    };
+    let mut reaches =
+        |count| -> Result<bool, EncodeError> { Ok(verified.psnr(count, observer)? >= target) };
     let (mut short, mut enough) = (0, verified.gaussians());
     // Nearly monotone, and whatever this ends on was seen to be enough.
     while enough - short > 1 {

@@ -1,11 +1,12 @@
 //! The way of a picture to a file that meets its target.
 
+use super::aim::{Aim, FileAim};
 use super::error::EncodeError;
 use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::{Precision, Target};
+use super::options::Precision;
 use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::raster::Raster;
@@ -38,7 +39,7 @@ pub(crate) struct Outcome {
     pub(crate) file: Vec<u8>,
     pub(crate) work: Work,
     pub(crate) gaussians: u32,
-    pub(crate) distortion: FilePsnr,
+    pub(crate) psnr: FilePsnr,
     /// The visual quality, from 0 to 100.
     pub(crate) quality: f64,
     pub(crate) shortfall: Option<Shortfall>,
@@ -51,7 +52,9 @@ pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outco
     verify::check_limits(job)?;
     let judge = Judge::new(job.source);
     let outcome = encode_for_target(job, &judge, None, Work::default(), observer)?;
-    let Some(most_bytes) = job.target.bytes(job.pixels()) else { return Ok(outcome) };
+    let Aim::File(FileAim::Size(most_bytes)) = job.aim else { return Ok(outcome) };
+    // Files are compared by PSNR with either tune: they are tuned alike, and with so many Gaussians the
+    // estimate of quality is often near its highest, where it hardly tells them apart.
     let outcome = with_more(outcome, most_bytes, job, &judge, observer)?;
     with_fewer(outcome, most_bytes, job, &judge, observer)
 }
@@ -75,7 +78,7 @@ fn with_more(
             break;
         }
         let larger = encode_for_target(job, judge, Some(count), outcome.work, observer)?;
-        if larger.distortion.psnr < outcome.distortion.psnr + LEAST_GAIN_OF_MORE {
+        if larger.psnr.rounded < outcome.psnr.rounded + LEAST_GAIN_OF_MORE {
             return Ok(Outcome { work: larger.work, ..outcome });
         }
         outcome = larger;
@@ -105,10 +108,10 @@ fn with_fewer(
             return Ok(outcome);
         }
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
-        let modest_job = Job { target: Target::Gaussians(most as u32), ..*job };
+        let modest_job = Job { aim: Aim::Count(most as u32), ..*job };
         let modest = encode_for_target(&modest_job, judge, None, outcome.work, observer)?;
         let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
-        let gain = outcome.distortion.psnr - modest.distortion.psnr;
+        let gain = outcome.psnr.rounded - modest.psnr.rounded;
         let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
         if gain >= least || modest.file.len() as u64 > most_bytes {
             return Ok(Outcome { work: modest.work, ..outcome });
@@ -128,19 +131,17 @@ fn encode_for_target(
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome, EncodeError> {
-    let Job { source, target, precision, training, .. } = *job;
+    let Job { source, precision, training, .. } = *job;
     let preparation = job.workload(0).preparation();
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
     let raster = Raster::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
 
-    let (within_reach, room) = within_reach(job, &layout, observer)?;
-    let job = &Job { target: within_reach, ..*job };
-    let budget = match count {
-        Some(count) => Budget::Count(count),
-        None => budget(job, room, &raster, observer)?,
-    };
+    let asked = job.aim;
+    let (aim, budget) = within_reach(job, &layout, &raster, observer)?;
+    let job = &Job { aim, ..*job };
+    let budget = count.map_or(budget, Budget::Count);
     let expected = match budget {
         Budget::Count(count) => count,
         Budget::Bits { .. } => budget.wanted(0, rate_model::USUAL_COMPONENT_BITS, job.pixels()),
@@ -156,7 +157,7 @@ fn encode_for_target(
     let is_lost_to_rounding = fit.is_lost_to_rounding();
 
     let (file, mut work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, judge, &raster, &layout, observer),
+        Precision::Entropy => entropy::finish(fit, job, judge, budget, &raster, &layout, observer),
         Precision::Packed | Precision::Float => {
             packed::finish(fit, job, judge, budget, &layout, observer)
         }
@@ -168,24 +169,24 @@ fn encode_for_target(
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());
-    let (distortion, verdict) = verified.judged(judge, observer)?;
+    let (psnr, verdict) = verified.judged(judge, observer)?;
     let judging = quality::memory(source);
     work.peak_memory = work.peak_memory.max(judging).max(peak_before);
     // The estimate of an exact copy would have rounding errors.
-    let is_exact = distortion.psnr == f64::INFINITY;
+    let is_exact = psnr.rounded == f64::INFINITY;
     let quality = if is_exact { 100.0 } else { verdict.quality() };
     let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
     let reached = Reached {
         bytes: file.len(),
         metadata: layout.metadata_length(),
-        psnr: distortion.psnr,
+        psnr: psnr.rounded,
         exact_psnr,
         quality,
         verdict,
         gaussians,
     };
-    let shortfall = Shortfall::of(target, job.pixels(), reached);
-    Ok(Outcome { file, work, gaussians, distortion, quality, shortfall, is_lost_to_rounding })
+    let shortfall = asked.of_file().and_then(|aim| Shortfall::of(aim, reached));
+    Ok(Outcome { file, work, gaussians, psnr, quality, shortfall, is_lost_to_rounding })
 }
 
 /// The work from training on, about, with so many Gaussians.
@@ -195,61 +196,51 @@ fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
         Precision::Entropy => SearchWork::new(job, gaussians).whole(),
         Precision::Packed | Precision::Float => workload.verification(),
     };
-    let rounds = if job.target.is_by_error() { USUAL_CORRECTIONS } else { 0.0 };
+    let rounds = if job.aim.is_by_error() { USUAL_CORRECTIONS } else { 0.0 };
     workload.training(iterations) + rounds * workload.retraining(iterations) + later
 }
 
-/// The target, or the size of a file without Gaussians if the target is a smaller one; and how many bytes
-/// of a size are for the Gaussians.
+/// The aim, or the size of a file without Gaussians if the aim is a smaller one; and what decides the number of
+/// Gaussians during training.
 fn within_reach(
     job: &Job<'_>,
     layout: &FileLayout<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<(Target, Option<u64>), EncodeError> {
-    let Some(bytes) = job.target.bytes(job.pixels()) else { return Ok((job.target, None)) };
-    let least = match job.precision {
-        Precision::Entropy => entropy::least_length(layout, observer)?,
-        Precision::Packed | Precision::Float => packed::least_length(job, layout),
-    };
-    layout.check_size(bytes, least)?;
-    let target = if bytes < least { Target::Bytes(least) } else { job.target };
-    Ok((target, Some(bytes.saturating_sub(least))))
-}
-
-/// What decides the number of Gaussians during training, given the bytes for them if the target is a size.
-fn budget(
-    job: &Job<'_>,
-    room: Option<u64>,
     raster: &Raster,
     observer: &mut Observer<'_>,
-) -> Result<Budget, EncodeError> {
-    let Job { target, precision, .. } = *job;
-    let is_coded = precision == Precision::Entropy;
-    if let Some(bytes) = room {
-        return Ok(if is_coded {
-            Budget::Bits { bits: (bytes * 8) as f64, tune: job.tune }
-        } else {
-            Budget::Count(packed::count_for_size(bytes, job))
-        });
-    }
-    if let Some(quality) = target.quality() {
-        let [fine, .., coarse] = match &raster.sensitivity {
-            Some(sensitivity) => sensitivity.means,
-            None => Sensitivity::new(job.source, observer)?.means,
-        };
-        let count = quality::count_for(quality, raster.pixels(), [fine, coarse]);
-        return Ok(Budget::Count(count));
-    }
-    Ok(match target {
-        Target::Psnr(psnr) => {
-            let share = if is_coded { rate_model::SHARE_OF_FIT } else { 1.0 };
-            Budget::SquaredError(share * raster.error_of(psnr))
-        }
-        Target::Lambda(lambda) => {
+) -> Result<(Aim, Budget), EncodeError> {
+    let is_coded = job.precision == Precision::Entropy;
+    let budget = match job.aim {
+        Aim::Count(count) => Budget::Count(count as usize),
+        Aim::Lambda(lambda) => {
             let step = rate_model::step_for_lambda(lambda);
             Budget::DistortionPerGaussian(rate_model::distortion_per_gaussian(step))
         }
-        Target::Gaussians(count) => Budget::Count(count as usize),
-        _ => unreachable!("the others were handled above"),
-    })
+        Aim::File(FileAim::Size(bytes)) => {
+            let least = if is_coded {
+                entropy::least_length(layout, observer)?
+            } else {
+                packed::least_length(job, layout)
+            };
+            layout.check_size(bytes, least)?;
+            let room = bytes.saturating_sub(least);
+            let budget = if is_coded {
+                Budget::Bits { bits: (room * 8) as f64, tune: job.tune }
+            } else {
+                Budget::Count(packed::count_for_size(room, job))
+            };
+            return Ok((Aim::File(FileAim::Size(bytes.max(least))), budget));
+        }
+        Aim::File(FileAim::Psnr(psnr)) => {
+            let share = if is_coded { rate_model::SHARE_OF_FIT } else { 1.0 };
+            Budget::SquaredError(share * raster.error_of(psnr))
+        }
+        Aim::File(FileAim::Quality(quality)) => {
+            let [fine, .., coarse] = match &raster.sensitivity {
+                Some(sensitivity) => sensitivity.means,
+                None => Sensitivity::new(job.source, observer)?.means,
+            };
+            Budget::Count(quality::count_for(quality, raster.pixels(), [fine, coarse]))
+        }
+    };
+    Ok((job.aim, budget))
 }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::options::{PSNR_TOLERANCE, QUALITY_TOLERANCE, SIZE_TOLERANCE, Target};
+use super::aim::{FileAim, PSNR_TOLERANCE, QUALITY_TOLERANCE, SIZE_TOLERANCE};
 use super::quality::{MOST_QUALITY, Verdict};
 
 /// Why a file does not meet its target within 1 % of size, 0.05 dB, or 1 of quality. The text says it
@@ -94,42 +94,43 @@ pub(crate) struct Reached {
 
 impl Shortfall {
     /// That of a file; `None` if it meets its target.
-    pub(crate) fn of(target: Target, pixels: usize, reached: Reached) -> Option<Self> {
+    pub(crate) fn of(aim: FileAim, reached: Reached) -> Option<Self> {
         let Reached { bytes, metadata, psnr, exact_psnr, quality, verdict, gaussians } = reached;
-        if let Target::Psnr(target) = target {
-            return if psnr < target {
-                Some(Self::PsnrBelow { psnr })
-            } else {
+        match aim {
+            FileAim::Psnr(target) if psnr < target => Some(Self::PsnrBelow { psnr }),
+            FileAim::Psnr(target) => {
                 (psnr > target + PSNR_TOLERANCE).then_some(Self::PsnrAbove { psnr, gaussians })
-            };
-        }
-        if let Some(target) = target.quality() {
-            let aim = target.min(MOST_QUALITY);
-            return if quality < aim - QUALITY_TOLERANCE {
-                Some(Self::QualityBelow { quality })
-            } else if quality < target - QUALITY_TOLERANCE {
-                Some(Self::QualityCapped { quality })
-            } else {
+            }
+            FileAim::Quality(target) => {
+                let aimed = target.min(MOST_QUALITY);
+                if quality < aimed - QUALITY_TOLERANCE {
+                    return Some(Self::QualityBelow { quality });
+                }
+                if quality < target - QUALITY_TOLERANCE {
+                    return Some(Self::QualityCapped { quality });
+                }
                 // What keeps gradients clean and small pictures sound is no surplus.
                 let most = target + QUALITY_TOLERANCE;
                 let is_above = quality > most && verdict.excess(most) < 1.0;
                 is_above.then_some(Self::QualityAbove { quality, gaussians })
-            };
+            }
+            FileAim::Size(most) => {
+                let most = most as f64;
+                let missing = most - bytes as f64;
+                if missing < 0.0 {
+                    return Some(Self::SizeAbove { bytes, metadata });
+                }
+                if missing <= (1.0 - SIZE_TOLERANCE) * most {
+                    return None;
+                }
+                let is_needless = psnr >= exact_psnr || missing < BYTES_OF_GAUSSIAN;
+                Some(if is_needless {
+                    Self::SizeBelow { bytes, gaussians }
+                } else {
+                    Self::SizeUnused { bytes, gaussians }
+                })
+            }
         }
-        let most = target.bytes(pixels)? as f64;
-        let missing = most - bytes as f64;
-        if missing < 0.0 {
-            return Some(Self::SizeAbove { bytes, metadata });
-        }
-        if missing <= (1.0 - SIZE_TOLERANCE) * most {
-            return None;
-        }
-        let is_needless = psnr >= exact_psnr || missing < BYTES_OF_GAUSSIAN;
-        Some(if is_needless {
-            Self::SizeBelow { bytes, gaussians }
-        } else {
-            Self::SizeUnused { bytes, gaussians }
-        })
     }
 }
 

@@ -1,13 +1,12 @@
-//! Verification: the distortion of a file as its decoder renders it, which is what the encoder
-//! reports.
+//! Verification: the PSNR of a file as its decoder renders it, which is what the encoder reports.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
+use super::aim::Aim;
 use super::error::EncodeError;
 use super::file::FileLayout;
 use super::job::Job;
-use super::options::Target;
 use super::progress::Observer;
 use super::quality::{Judge, Judgement, Verdict};
 use super::source::{SPAN, Source};
@@ -30,14 +29,14 @@ pub(crate) struct Verified<'a> {
     source: &'a Source<'a>,
 }
 
-/// The distortion of the decoded picture.
+/// The PSNR of a decoded file in dB.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilePsnr {
-    /// PSNR in dB of samples rounded to the source's depth; colours count times alpha, unless those that
+    /// Of samples rounded to the source's depth; colours count times alpha, unless those that
     /// do not show are to be kept.
-    pub(crate) psnr: f64,
-    /// PSNR in dB of samples that are clamped, but not rounded.
-    pub(crate) psnr_float: f64,
+    pub(crate) rounded: f64,
+    /// Of samples that are clamped, but not rounded.
+    pub(crate) exact: f64,
 }
 
 /// Refuses a picture that no file can hold within the limits, as far as this is known before the work.
@@ -45,10 +44,10 @@ pub(crate) struct FilePsnr {
 /// # Errors
 /// [`EncodeError::Limit`] when a decoder would refuse every such file.
 pub(crate) fn check_limits(job: &Job<'_>) -> Result<(), EncodeError> {
-    let Job { source, target, training, metadata, limits, .. } = *job;
+    let Job { source, aim, training, metadata, limits, .. } = *job;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, [0.0; 4], kernel, parameterization, metadata);
-    let gaussians = if let Target::Gaussians(count) = target { count } else { 0 };
+    let gaussians = if let Aim::Count(count) = aim { count } else { 0 };
     let mut stream = StreamDecoder::new().with_limits(limits.clone());
     stream.feed(&layout.start(gaussians)).map_err(refusal)?;
     Ok(())
@@ -109,24 +108,20 @@ impl<'a> Verified<'a> {
         self.stream.gaussians().len() as u32
     }
 
-    /// The distortion of the picture that the first `count` Gaussians make, or all of them if there
-    /// are fewer.
+    /// The PSNR in dB, at the source's depth, of the picture that the first `count` Gaussians make, or all
+    /// of them if there are fewer.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn distortion(
-        &self,
-        count: u32,
-        observer: &mut Observer<'_>,
-    ) -> Result<FilePsnr, EncodeError> {
+    pub(crate) fn psnr(&self, count: u32, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
         let mut errors = Errors::default();
         strips::render(&self.picture(), count, observer, |region, planes| {
             errors.add(self.source, region, planes);
         })?;
-        Ok(errors.psnr(self.source))
+        Ok(errors.psnr(self.source).rounded)
     }
 
-    /// The distortion of the decoded picture, and how it differs from the source to the eye.
+    /// The PSNR of the decoded picture, and how it differs from the source to the eye.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -215,8 +210,8 @@ impl Errors {
         let samples = f64::from(source.width()) * f64::from(source.height());
         let most = full_scale * full_scale * samples * source.color().channels() as f64;
         FilePsnr {
-            psnr: 10.0 * (most / self.rounded).log10(),
-            psnr_float: 10.0 * (most / self.exact).log10(),
+            rounded: 10.0 * (most / self.rounded).log10(),
+            exact: 10.0 * (most / self.exact).log10(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Estimates of the work of the search for a target, for the progress report.
 
-use super::step_search::Aim;
+use crate::encode::aim::FileAim;
 use crate::encode::job::Job;
 use crate::encode::workload::Workload;
 
@@ -14,13 +14,12 @@ pub(crate) struct SearchWork {
     workload: Workload,
     /// Passes that the effort sets.
     pub(super) passes: u32,
-    aim: Option<Aim>,
+    aim: Option<FileAim>,
 }
 
 impl SearchWork {
     pub(crate) fn new(job: &Job<'_>, gaussians: usize) -> Self {
-        let aim = Aim::new(job.target, job.pixels());
-        Self { workload: job.workload(gaussians), passes: job.passes, aim }
+        Self { workload: job.workload(gaussians), passes: job.passes, aim: job.aim.of_file() }
     }
 
     /// Passes of a try before it is compared with the aim.
@@ -31,7 +30,7 @@ impl SearchWork {
     /// All.
     pub(crate) fn whole(&self) -> f64 {
         let tries = match self.aim {
-            None | Some(Aim::Size { .. }) => TRIES.0,
+            None | Some(FileAim::Size(_)) => TRIES.0,
             Some(_) => TRIES.1,
         };
         tries * self.one_try() + self.workload.verification()
@@ -55,9 +54,9 @@ impl SearchWork {
     /// A comparison with the aim.
     pub(super) fn comparison(&self) -> f64 {
         let measuring = match self.aim {
-            None | Some(Aim::Size { .. }) => 0.0,
-            Some(Aim::Psnr(_)) => self.workload.error(),
-            Some(Aim::Quality(_)) => self.workload.quality(),
+            None | Some(FileAim::Size(_)) => 0.0,
+            Some(FileAim::Psnr(_)) => self.workload.error(),
+            Some(FileAim::Quality(_)) => self.workload.quality(),
         };
         self.workload.coding() + measuring
     }

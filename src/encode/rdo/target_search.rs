@@ -2,11 +2,11 @@
 
 use super::code_optimizer::{CodeOptimizer, Optimized};
 use super::search_work::SearchWork;
-use super::step_search::{Aim, StepSearch};
+use super::step_search::StepSearch;
 use crate::coding::entropy::LatticeCodes;
+use crate::encode::aim::{Aim, FileAim};
 use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
-use crate::encode::options::Target;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
 use crate::encode::raster::Raster;
@@ -72,7 +72,6 @@ fn settling(passes: u32) -> f64 {
 #[derive(Debug)]
 pub(crate) struct TargetSearch<'a> {
     judge: &'a Judge<'a>,
-    raster: &'a Raster,
     layout: &'a FileLayout<'a>,
     /// How many passes there shall be, and what they cost; for a target there may be a few more.
     work: SearchWork,
@@ -90,27 +89,27 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
         let codes = CodeOptimizer::new(raster, layout, observer)?;
-        Ok(Self { judge, raster, layout, work, codes })
+        Ok(Self { judge, layout, work, codes })
     }
 
-    /// Finds codes of `gaussians`, whose rendering has this distortion, for a target. Returns them with their
-    /// deviation from the target (see [`Aim`]); it is 0 if the target is no error.
+    /// Finds codes of `gaussians`, whose rendering has this distortion, for an aim. Returns them with their
+    /// deviation from it (see [`FileAim`]); it is 0 where no error is asked for.
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
         distortion: f64,
-        target: Target,
+        aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64), EncodeError> {
-        let step = match target {
-            Target::Lambda(lambda) => rate_model::step_for_lambda(lambda),
-            _ => rate_model::step_for(distortion, gaussians.len()),
+        let step = match aim {
+            Aim::Lambda(lambda) => rate_model::step_for_lambda(lambda),
+            Aim::Count(_) | Aim::File(_) => rate_model::step_for(distortion, gaussians.len()),
         };
         let least = rate_model::least_step(gaussians, self.layout.header().color);
         let step = step.max(least);
         observer.expect(self.work.whole());
-        let Some(aim) = Aim::new(target, self.raster.pixels()) else {
-            let is_counted = matches!(target, Target::Gaussians(_));
+        let Some(aim) = aim.of_file() else {
+            let is_counted = matches!(aim, Aim::Count(_));
             let kept = if is_counted { LEAST_KEPT * gaussians.len() as f64 } else { 0.0 };
             let coded = self.keeping(kept.ceil() as usize, gaussians, step, least, observer)?;
             return Ok((coded, 0.0));
@@ -119,7 +118,7 @@ impl<'a> TargetSearch<'a> {
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut deviation, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
-        if let Some(bytes) = target.bytes(self.raster.pixels()) {
+        if let FileAim::Size(bytes) = aim {
             return Ok((self.shortened(coded, bytes, observer)?, 0.0));
         }
         if aim.miss(deviation, weak_share(&coded.coded)) > 0.0 {
@@ -165,7 +164,7 @@ impl<'a> TargetSearch<'a> {
         gaussians: &[Gaussian],
         step: f64,
         finest: f64,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(Optimized, f64, f64), EncodeError> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
@@ -193,7 +192,7 @@ impl<'a> TargetSearch<'a> {
         &mut self,
         gaussians: &[Gaussian],
         search: &StepSearch,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(Optimized, f64, f64), EncodeError> {
         let first = self.work.first_passes();
@@ -204,7 +203,7 @@ impl<'a> TargetSearch<'a> {
             let expected = deviation - settling(pass) + settling(self.work.passes.max(pass + 1));
             let is_within_lambda = aim.is_within_lambda(expected);
             // The squared error of codes that are rounded twice is too large.
-            let can_be_rounded = matches!(aim, Aim::Size { .. }) && pass < MOST_ROUNDED_PASSES;
+            let can_be_rounded = matches!(aim, FileAim::Size(_)) && pass < MOST_ROUNDED_PASSES;
             let can_change = is_within_lambda || can_be_rounded;
             let is_enough = pass >= self.work.passes
                 && (aim.miss(deviation, weak_share(&optimized.coded)) == 0.0
@@ -248,11 +247,11 @@ impl<'a> TargetSearch<'a> {
         gaussians: &[Gaussian],
         step: f64,
         finest: f64,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
-        if !matches!(aim, Aim::Size { .. }) {
+        if !matches!(aim, FileAim::Size(_)) {
             return Ok(search.at);
         }
         for _ in 0..MOST_ROUNDING_TRIES {
@@ -294,7 +293,7 @@ impl<'a> TargetSearch<'a> {
         gaussians: &[Gaussian],
         step: f64,
         passes: u32,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(Optimized, f64), EncodeError> {
         let optimized = self.descended(gaussians, step, passes, observer)?;
@@ -306,18 +305,18 @@ impl<'a> TargetSearch<'a> {
     fn deviation(
         &self,
         coded: &CodedLayers,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
         let file = self.layout.write_entropy(coded, observer)?;
         let deviation = match aim {
-            Aim::Size { most } => (file.len() as f64 / most).log2(),
-            Aim::Psnr(psnr) => {
+            FileAim::Size(_) => (file.len() as f64 / aim.wanted()).log2(),
+            FileAim::Psnr(_) => {
                 let verified = Verified::new(&file, self.judge.source(), observer)?;
-                let reached = verified.distortion(verified.gaussians(), observer)?.psnr;
-                ((psnr - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
+                let reached = verified.psnr(verified.gaussians(), observer)?;
+                ((aim.wanted() - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
             }
-            Aim::Quality(quality) => {
+            FileAim::Quality(quality) => {
                 let verified = Verified::new(&file, self.judge.source(), observer)?;
                 let verdict = self.judge.judge(&verified.picture(), observer)?;
                 verdict.excess(quality).log2().max(-LARGEST_DEVIATION)
@@ -361,7 +360,7 @@ impl<'a> TargetSearch<'a> {
         &self,
         optimized: Optimized,
         mut deviation: f64,
-        aim: Aim,
+        aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64), EncodeError> {
         let Optimized { mut coded, mut by_use } = optimized;
