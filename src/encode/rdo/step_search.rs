@@ -8,7 +8,7 @@ pub(crate) struct StepSearch {
     /// The expected derivative of the deviation by the step.
     slope: f64,
     /// The finest step that is tried.
-    finest: f64,
+    pub(crate) finest: f64,
     /// The last steps with a positive deviation, and with one that is not positive; each with its
     /// deviation.
     bracket: [Option<(f64, f64)>; 2],
@@ -22,11 +22,6 @@ impl StepSearch {
     /// Whether the deviation with the present step asks for a finer one than the finest.
     pub(crate) fn is_exhausted(&self, deviation: f64) -> bool {
         self.at <= self.finest && deviation / self.slope > 0.0
-    }
-
-    /// The finest step that is tried.
-    pub(crate) fn finest(&self) -> f64 {
-        self.finest
     }
 
     /// Moves to the next step, given the deviation with the present one.

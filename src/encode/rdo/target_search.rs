@@ -129,8 +129,8 @@ impl<'a> TargetSearch<'a> {
                 if deviation <= 0.0 || finer < finest {
                     break;
                 }
-                (coded, deviation) =
-                    self.passed(gaussians, finer, self.work.passes, aim, observer)?;
+                coded = self.descended(gaussians, finer, self.work.passes, observer)?;
+                deviation = self.deviation(&coded.coded, aim, observer)?;
             }
         }
         self.trimmed(coded, deviation, aim, observer)
@@ -231,7 +231,7 @@ impl<'a> TargetSearch<'a> {
             } else {
                 // Codes on a new lattice, which a pass improves as it improves those of the fit.
                 let too_much = expected - SETTLING_AGAIN - aim.middle();
-                step = (step - too_much / aim.by_step()).max(search.finest());
+                step = (step - too_much / aim.by_step()).max(search.finest);
                 lambda = 0.0;
                 let gaussians = self.codes.gaussians(&coded, observer)?;
                 coded = self.codes.rounded(&gaussians, step, observer)?;
@@ -250,10 +250,10 @@ impl<'a> TargetSearch<'a> {
         aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
-        let mut search = StepSearch::new(step, aim.by_step(), finest);
         if !matches!(aim, FileAim::Size(_)) {
-            return Ok(search.at);
+            return Ok(step);
         }
+        let mut search = StepSearch::new(step, aim.by_step(), finest);
         for _ in 0..MOST_ROUNDING_TRIES {
             let coded = self.codes.rounded(gaussians, search.at, observer)?;
             let fall =
@@ -285,20 +285,6 @@ impl<'a> TargetSearch<'a> {
             optimized = self.codes.descend(optimized.into_coded(), 0.0, work, observer)?;
         }
         Ok(optimized)
-    }
-
-    /// The codes of a step after some passes, and their deviation from an aim.
-    fn passed(
-        &mut self,
-        gaussians: &[Gaussian],
-        step: f64,
-        passes: u32,
-        aim: FileAim,
-        observer: &mut Observer<'_>,
-    ) -> Result<(Optimized, f64), EncodeError> {
-        let optimized = self.descended(gaussians, step, passes, observer)?;
-        let deviation = self.deviation(&optimized.coded, aim, observer)?;
-        Ok((optimized, deviation))
     }
 
     /// The deviation from an aim.
