@@ -117,6 +117,37 @@ fn a_progressive_picture_may_end_anywhere_after_its_first_scan() {
 }
 
 #[test]
+fn a_progressive_picture_whose_scans_do_not_follow_each_other_is_damaged() {
+    let room = Room::new();
+    let error = |file: &[u8]| {
+        room.write("a.jpg", file);
+        let args = ["encode", "a.jpg", "a.gip", "--effort", "1", "--gaussians", "1"];
+        let partial = room.run(&[&args[..], &["--allow-partial"]].concat());
+        assert!(!text(&partial.stderr).is_empty());
+        room.fails(&args)
+    };
+    let scans = find(PROGRESSIVE, START_OF_SCAN);
+    let mut markers = [scans.clone(), find(PROGRESSIVE, TABLE)].concat();
+    for &at in &markers {
+        let mut file = PROGRESSIVE.to_vec();
+        file[at + 1] = 0xAB;
+        assert!(error(&file).contains("there is an invalid marker"), "{at}");
+    }
+    markers.push(PROGRESSIVE.len() - 2);
+    // Nothing comes after the last bits of a coefficient, which the last four have.
+    for &at in &scans[..scans.len() - 4] {
+        let end = *markers.iter().filter(|&&marker| marker > at).min().expect("there is an end");
+        let file = [&PROGRESSIVE[..at], &PROGRESSIVE[end..]].concat();
+        assert!(error(&file).contains("a part is missing"), "{at}");
+    }
+    // Bits that do not come next.
+    let mut file = PROGRESSIVE.to_vec();
+    let length = usize::from(file[scans[5] + 3]);
+    file[scans[5] + 1 + length] = 0x31;
+    assert!(error(&file).contains("a part is missing"));
+}
+
+#[test]
 fn a_profile_that_is_not_all_there_is_dropped_with_a_warning() {
     let room = Room::new();
     let mut profile = vec![7; 300];

@@ -20,6 +20,8 @@ pub(super) enum Damage {
     Restart,
     /// Parts of the picture do not come at all.
     Missing,
+    /// A marker that no picture has.
+    Marker,
 }
 
 impl Damage {
@@ -31,6 +33,7 @@ impl Damage {
             Self::Code => "invalid code in the data",
             Self::Restart => "a restart marker is missing",
             Self::Missing => "a part is missing",
+            Self::Marker => "there is an invalid marker",
         }
     }
 }

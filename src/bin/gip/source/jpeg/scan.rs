@@ -33,6 +33,22 @@ impl Scan<'_> {
         !frame.is_progressive && is_part && is_subsampled
     }
 
+    /// Whether the bits of its coefficients are those that come next in a progressive frame (ITU-T T.81,
+    /// G.1.1.1): the lowest frequency first, then one bit at a time of what has come.
+    pub(super) fn follows(&self, frame: &Frame) -> bool {
+        let (before, after) = self.bits;
+        let is_first = before == 0;
+        self.components.iter().all(|&index| {
+            let missing = &frame.components[index].missing_bits;
+            let mut band = missing[self.band.0..=self.band.1].iter();
+            if is_first {
+                band.all(Option::is_none) && (self.band.0 == 0 || missing[0].is_some())
+            } else {
+                before == after + 1 && band.all(|&missing| missing == Some(before))
+            }
+        })
+    }
+
     /// Reads the data of the scan. Returns where the next marker is.
     pub(super) fn read(&self, frame: &mut Frame, data: &[u8], at: usize) -> Result<usize, Damage> {
         let mut bits = Bits::new(data, at);

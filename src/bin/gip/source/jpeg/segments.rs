@@ -9,6 +9,9 @@ use super::survey::Survey;
 /// What a segment with a part of an ICC profile begins with.
 const PROFILE: &[u8] = b"ICC_PROFILE\0";
 
+/// Most bytes between segments that may be padding, whatever they are.
+const MOST_PADDING: usize = 64;
+
 /// Goes through all segments and data.
 pub(crate) fn survey(file: &[u8]) -> Survey {
     let mut segments = Segments::default();
@@ -45,6 +48,12 @@ impl Segments {
                     _ => Err(Damage::TooFew),
                 };
             };
+            // Many bytes, some of them stuffed, are those of a scan whose beginning is lost.
+            let skipped = &file[at..marker];
+            let is_stuffed = |pair: &[u8]| pair == [0xFF, 0];
+            if skipped.len() > MOST_PADDING && skipped.windows(2).any(is_stuffed) {
+                return Err(Damage::TooMany);
+            }
             at = marker + 2;
             match self.segment(file, file[marker + 1], at)? {
                 Next::At(next) => at = next,
@@ -62,6 +71,8 @@ impl Segments {
             }
             // They stand alone.
             0x01 | 0xD0..=0xD8 => return Ok(Next::At(at)),
+            // They are reserved.
+            0x02..=0xBF | 0xF0..=0xFD if self.frame.is_some() => return Err(Damage::Marker),
             _ => {}
         }
         let mut payload = || {
@@ -126,7 +137,13 @@ impl Segments {
             },
             0xDA => {
                 let Some(mut frame) = self.frame.take() else { return Ok(Next::End) };
-                let Some(scan) = self.scan(payload, &frame) else { return Ok(Next::End) };
+                let Some(scan) = self.scan(payload, &frame) else {
+                    // There are no usual tables of progressive pictures.
+                    return if frame.is_progressive { Err(Damage::Missing) } else { Ok(Next::End) };
+                };
+                if frame.is_progressive && !scan.follows(&frame) {
+                    return Err(Damage::Missing);
+                }
                 let is_unusual = scan.is_unusual(&frame);
                 let next = scan.read(&mut frame, file, end);
                 self.survey.is_unusual |= is_unusual;
