@@ -9,8 +9,9 @@ use image_gip::training::{
 };
 use image_gip::{
     ColorModel, Decoder, EncodeError, Encoded, Encoder, Gaussian, Kernel, LimitKind, Limits,
-    Metadata, MetadataError, OptionError, Parameterization, Precision, RenderOptions, SampleDepth,
-    Shortfall, Source, SourceError, StreamDecoder, Target, Text, Threads, Tune, metrics,
+    Metadata, MetadataError, OptionError, Parameterization, Precision, RenderOptions, Report,
+    SampleDepth, Shortfall, Source, SourceError, StreamDecoder, Target, Text, Threads, Tune,
+    metrics,
 };
 
 const COLORS: [ColorModel; 4] =
@@ -390,6 +391,27 @@ fn one_bright_pixel_is_found() {
     let encoded = encoder.encode(&source).expect("it encodes");
     let out = pixels_u8(&check(&encoded, &samples));
     assert!(out[17 * 64 + 40] > 150, "{}", out[17 * 64 + 40]);
+}
+
+#[test]
+fn more_effort_makes_no_small_picture_worse() {
+    // Stripes, dots on black and noise, with few Gaussians: which fit is the better one is chance.
+    let dots: Vec<u8> = noise(60 * 40).iter().map(|&value| u8::from(value > 250) * 255).collect();
+    let stripes =
+        (0..60 * 40).map(|at| if (at % 60 + at / 60) % 9 < 3 { 40 } else { 210 }).collect();
+    for samples in [stripes, dots, noise(60 * 40)] {
+        let source = Source::new_u8(60, 40, ColorModel::Gray, &samples).expect("sizes agree");
+        for (tune, rate) in [(Tune::Visual, 0.6), (Tune::Psnr, 0.6), (Tune::Psnr, 2.0)] {
+            let merit = [1, 2, 3, 4].map(|effort| {
+                let encoder = quick(Target::BitsPerPixel(rate)).with_effort(effort).with_tune(tune);
+                let Report { quality, psnr, .. } =
+                    encoder.encode(&source).expect("it encodes").report;
+                if tune == Tune::Visual { quality } else { psnr }
+            });
+            println!("{tune:?}, {rate}: {merit:?}");
+            assert!(merit.is_sorted(), "{tune:?}, {rate}: {merit:?}");
+        }
+    }
 }
 
 #[test]

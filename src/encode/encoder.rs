@@ -27,6 +27,9 @@ const EFFORTS: [(u32, u32); 7] =
 /// of fewer iterations needs far too many Gaussians to reach the error.
 const MIN_ITERATIONS_BY_ERROR: u32 = 180;
 
+/// Pictures of at most so many pixels are encoded with the lower efforts as well.
+const SMALL: usize = 1 << 15;
+
 /// Encodes interleaved 8-bit samples, rows from the top, with the default options of [`Encoder`],
 /// and returns the `.gip` file.
 ///
@@ -121,7 +124,8 @@ impl Encoder {
     }
 
     /// How much time to spend, from 1 (least) to 7 (most). Default 4. Each effort takes about twice as
-    /// long as the one before.
+    /// long as the one before. A picture of at most 32,768 pixels is encoded with the lower efforts as well,
+    /// and the best file is kept.
     pub fn with_effort(mut self, effort: u8) -> Self {
         self.effort = effort;
         self
@@ -204,21 +208,25 @@ impl Encoder {
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
         let pixels = source.width() as usize * source.height() as usize;
-        let (aim, training, passes) = self.check(pixels)?;
-        let mut observer = Observer::new(progress, training.iterations);
+        let (aim, runs) = self.check(pixels)?;
+        let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
+        let mut observer = Observer::new(progress, iterations);
         let source = source.keeping_invisible(self.keep_invisible);
-        let job = Job {
-            source: &source,
-            aim,
-            tune: self.tune,
-            precision: self.precision,
-            seed: self.seed,
-            metadata: &self.metadata,
-            training: &training,
-            limits: &self.limits,
-            passes,
-        };
-        let mut run = || pipeline::encode(&job, &mut observer);
+        let jobs: Vec<_> = runs
+            .iter()
+            .map(|(training, passes)| Job {
+                source: &source,
+                aim,
+                tune: self.tune,
+                precision: self.precision,
+                seed: self.seed,
+                metadata: &self.metadata,
+                training,
+                limits: &self.limits,
+                passes: *passes,
+            })
+            .collect();
+        let mut run = || pipeline::encode(&jobs, &mut observer);
         let outcome = match self.threads {
             // On one of the pool's threads: handing every parallel loop over to the pool, and waking up
             // afterwards, would take longer than many of the loops.
@@ -241,29 +249,33 @@ impl Encoder {
         })
     }
 
-    /// Checks all options; returns the aim for a picture with so many pixels, the constants of training and the
-    /// number of passes of rate-distortion optimization.
-    fn check(&self, pixels: usize) -> Result<(Aim, Training, u32), EncodeError> {
-        let Some(&(iterations, passes)) = EFFORTS.get(usize::from(self.effort).wrapping_sub(1))
-        else {
-            return Err(OptionError::Effort(self.effort).into());
-        };
+    /// Checks all options; returns the aim for a picture with so many pixels, and the constants of training and
+    /// the number of passes of rate-distortion optimization, of lower efforts as well if it is small.
+    fn check(&self, pixels: usize) -> Result<(Aim, Vec<(Training, u32)>), EncodeError> {
+        let efforts = EFFORTS.get(..usize::from(self.effort)).filter(|efforts| !efforts.is_empty());
+        let efforts = efforts.ok_or(OptionError::Effort(self.effort))?;
         let aim = Aim::new(self.target, pixels)?;
         let fewest = if aim.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
-        let iterations = iterations.max(fewest);
         self.metadata.check().map_err(OptionError::Metadata)?;
-        let training = match &self.training {
-            Some(training) => training.clone(),
-            None if self.precision == Precision::Packed => {
-                Training::fast(iterations).with_quantization()
-            }
-            None => Training::fast(iterations),
+        let run = |&(iterations, passes): &(u32, u32)| {
+            let fast = Training::fast(iterations.max(fewest));
+            let training = match &self.training {
+                Some(training) => training.clone(),
+                None if self.precision == Precision::Packed => fast.with_quantization(),
+                None => fast,
+            };
+            (training, passes)
         };
-        training.check().map_err(OptionError::Training)?;
-        if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {
-            return Err(OptionError::Training("entropy coding needs the quartic kernel").into());
+        let is_small = pixels <= SMALL && self.training.is_none();
+        let lower = if is_small { 0 } else { efforts.len() - 1 };
+        let runs: Vec<_> = efforts[lower..].iter().map(run).collect();
+        for (training, _) in &runs {
+            training.check().map_err(OptionError::Training)?;
+            if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {
+                return Err(OptionError::Training("entropy coding needs the quartic kernel").into());
+            }
         }
-        Ok((aim, training, passes))
+        Ok((aim, runs))
     }
 }
 

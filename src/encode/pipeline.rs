@@ -6,7 +6,7 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::Precision;
+use super::options::{Precision, Tune};
 use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::raster::Raster;
@@ -25,6 +25,10 @@ const PIXELS_PER_GAUSSIAN_OF_LARGE: usize = 5;
 const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
 /// What twice the size must bring, in dB.
 const LEAST_GAIN: f64 = 0.5;
+/// Files that differ by less, in doublings, are of the same size; and how many points of quality are worth
+/// twice the size.
+const NO_LARGER: f64 = 0.1;
+const LEAST_POINTS: f64 = 1.0;
 /// How often a file may get more Gaussians, and what they must bring each time, in dB.
 const MOST_EXTENSIONS: u32 = 4;
 const LEAST_GAIN_OF_MORE: f64 = 0.1;
@@ -47,16 +51,70 @@ pub(crate) struct Outcome {
     is_lost_to_rounding: bool,
 }
 
-/// The file for the target, or a smaller one where the target's size brings too little.
-pub(crate) fn encode(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Outcome, EncodeError> {
-    verify::check_limits(job)?;
-    let judge = Judge::new(job.source);
-    let outcome = encode_for_target(job, &judge, None, Work::default(), observer)?;
+/// The file of the last job, or of an earlier one that is better: those of lower efforts for the same picture.
+/// With few pixels it is chance which of them ends in the better fit.
+pub(crate) fn encode(
+    jobs: &[Job<'_>],
+    observer: &mut Observer<'_>,
+) -> Result<Outcome, EncodeError> {
+    let (first, later) = jobs.split_first().expect("there is a job");
+    verify::check_limits(first)?;
+    let judge = Judge::new(first.source);
+    let mut best = encode_once(first, &judge, Work::default(), observer)?;
+    for job in later {
+        let outcome = encode_once(job, &judge, best.work, observer)?;
+        let work = outcome.work;
+        best = if best.is_better_than(&outcome, job) { best } else { outcome };
+        best.work = work;
+    }
+    Ok(best)
+}
+
+impl Outcome {
+    /// Whether this file is better for the target of a job.
+    fn is_better_than(&self, other: &Self, job: &Job<'_>) -> bool {
+        let merit = |outcome: &Self| match (job.aim, job.tune) {
+            (Aim::File(FileAim::Psnr(_)), _) => [outcome.psnr.rounded, outcome.quality],
+            (Aim::File(FileAim::Quality(_)), _) => [outcome.quality, outcome.psnr.rounded],
+            (_, Tune::Visual) => [outcome.quality, outcome.psnr.rounded],
+            (_, Tune::Psnr) => [outcome.psnr.rounded, outcome.quality],
+        };
+        if matches!(job.aim, Aim::File(FileAim::Psnr(_) | FileAim::Quality(_))) {
+            let is_short = |outcome: &Self| {
+                matches!(
+                    outcome.shortfall,
+                    Some(Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })
+                )
+            };
+            match (is_short(self), is_short(other)) {
+                (false, false) => return self.file.len() < other.file.len(),
+                (true, true) => {}
+                (_, is_other_short) => return is_other_short,
+            }
+        }
+        // A file that is far larger must be worth it.
+        let doublings = (self.file.len() as f64 / other.file.len() as f64).log2();
+        let is_worth_it = doublings < NO_LARGER
+            || self.psnr.rounded - other.psnr.rounded >= LEAST_GAIN * doublings
+            || self.quality - other.quality >= LEAST_POINTS * doublings;
+        merit(self) > merit(other) && is_worth_it
+    }
+}
+
+/// The file of a job. If its target is a size, one of more Gaussians where the size has room for them, or of
+/// fewer where these show about as good a picture.
+fn encode_once(
+    job: &Job<'_>,
+    judge: &Judge<'_>,
+    work: Work,
+    observer: &mut Observer<'_>,
+) -> Result<Outcome, EncodeError> {
+    let outcome = encode_for_target(job, judge, None, work, observer)?;
     let Aim::File(FileAim::Size(most_bytes)) = job.aim else { return Ok(outcome) };
     // Files are compared by PSNR with either tune: they are tuned alike, and with so many Gaussians the
     // estimate of quality is often near its highest, where it hardly tells them apart.
-    let outcome = with_more(outcome, most_bytes, job, &judge, observer)?;
-    with_fewer(outcome, most_bytes, job, &judge, observer)
+    let outcome = with_more(outcome, most_bytes, job, judge, observer)?;
+    with_fewer(outcome, most_bytes, job, judge, observer)
 }
 
 /// A file with as many more Gaussians as its size has room for, as long as they make it better: of line
