@@ -268,7 +268,11 @@ impl Encoder {
         };
         let is_small = pixels <= SMALL && self.training.is_none();
         let lower = if is_small { 0 } else { efforts.len() - 1 };
-        let runs: Vec<_> = efforts[lower..].iter().map(run).collect();
+        let mut runs: Vec<_> = efforts[lower..].iter().map(run).collect();
+        // Low efforts have the same fit if the fewest iterations are more than theirs.
+        runs.reverse();
+        runs.dedup_by_key(|(training, _)| training.iterations);
+        runs.reverse();
         for (training, _) in &runs {
             training.check().map_err(OptionError::Training)?;
             if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {

@@ -14,6 +14,7 @@ mod fit;
 mod job;
 mod mul_add;
 mod options;
+mod outcome;
 mod own_frame;
 mod packed;
 mod pipeline;

@@ -6,7 +6,8 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::options::{Precision, Tune};
+use super::options::Precision;
+use super::outcome::{LEAST_GAIN, Outcome};
 use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::raster::Raster;
@@ -14,7 +15,7 @@ use super::rate_model;
 use super::rdo::SearchWork;
 use super::sensitivity::Sensitivity;
 use super::shortfall::{Reached, Shortfall};
-use super::verify::{FilePsnr, Verified};
+use super::verify::Verified;
 use super::{entropy, packed, verify};
 
 // Constants: docs/tuning.md, "Search for a target".
@@ -23,12 +24,6 @@ use super::{entropy, packed, verify};
 const PIXELS_PER_GAUSSIAN_OF_LARGE: usize = 5;
 /// Pixels per Gaussian of the file that it is compared with.
 const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
-/// What twice the size must bring, in dB.
-const LEAST_GAIN: f64 = 0.5;
-/// Files that differ by less, in doublings, are of the same size; and how many points of quality are worth
-/// twice the size.
-const NO_LARGER: f64 = 0.1;
-const LEAST_POINTS: f64 = 1.0;
 /// How often a file may get more Gaussians, and what they must bring each time, in dB.
 const MOST_EXTENSIONS: u32 = 4;
 const LEAST_GAIN_OF_MORE: f64 = 0.1;
@@ -36,20 +31,6 @@ const LEAST_GAIN_OF_MORE: f64 = 0.1;
 /// they are known.
 const USUAL_PIXELS: usize = 100;
 const USUAL_CORRECTIONS: f64 = 0.5;
-
-/// A finished encoding, verified.
-#[derive(Debug)]
-pub(crate) struct Outcome {
-    pub(crate) file: Vec<u8>,
-    pub(crate) work: Work,
-    pub(crate) gaussians: u32,
-    pub(crate) psnr: FilePsnr,
-    /// The visual quality, from 0 to 100.
-    pub(crate) quality: f64,
-    pub(crate) shortfall: Option<Shortfall>,
-    /// Whether most of the error is that of codes of fixed depths.
-    is_lost_to_rounding: bool,
-}
 
 /// The file of the last job, or of an earlier one that is better: those of lower efforts for the same picture.
 /// With few pixels it is chance which of them ends in the better fit.
@@ -64,41 +45,10 @@ pub(crate) fn encode(
     for job in later {
         let outcome = encode_once(job, &judge, best.work, observer)?;
         let work = outcome.work;
-        best = if best.is_better_than(&outcome, job) { best } else { outcome };
+        best = if best.is_better_than(&outcome, job.aim, job.tune) { best } else { outcome };
         best.work = work;
     }
     Ok(best)
-}
-
-impl Outcome {
-    /// Whether this file is better for the target of a job.
-    fn is_better_than(&self, other: &Self, job: &Job<'_>) -> bool {
-        let merit = |outcome: &Self| match (job.aim, job.tune) {
-            (Aim::File(FileAim::Psnr(_)), _) => [outcome.psnr.rounded, outcome.quality],
-            (Aim::File(FileAim::Quality(_)), _) => [outcome.quality, outcome.psnr.rounded],
-            (_, Tune::Visual) => [outcome.quality, outcome.psnr.rounded],
-            (_, Tune::Psnr) => [outcome.psnr.rounded, outcome.quality],
-        };
-        if matches!(job.aim, Aim::File(FileAim::Psnr(_) | FileAim::Quality(_))) {
-            let is_short = |outcome: &Self| {
-                matches!(
-                    outcome.shortfall,
-                    Some(Shortfall::PsnrBelow { .. } | Shortfall::QualityBelow { .. })
-                )
-            };
-            match (is_short(self), is_short(other)) {
-                (false, false) => return self.file.len() < other.file.len(),
-                (true, true) => {}
-                (_, is_other_short) => return is_other_short,
-            }
-        }
-        // A file that is far larger must be worth it.
-        let doublings = (self.file.len() as f64 / other.file.len() as f64).log2();
-        let is_worth_it = doublings < NO_LARGER
-            || self.psnr.rounded - other.psnr.rounded >= LEAST_GAIN * doublings
-            || self.quality - other.quality >= LEAST_POINTS * doublings;
-        merit(self) > merit(other) && is_worth_it
-    }
 }
 
 /// The file of a job. If its target is a size, one of more Gaussians where the size has room for them, or of
