@@ -33,9 +33,12 @@ impl Scan<'_> {
         !frame.is_progressive && is_part && is_subsampled
     }
 
-    /// Whether the bits of its coefficients are those that come next in a progressive frame (ITU-T T.81,
-    /// G.1.1.1): the lowest frequency first, then one bit at a time of what has come.
+    /// Whether the bits of its coefficients are those that come next, which a progressive frame has an order
+    /// for (ITU-T T.81, G.1.1.1): the lowest frequency first, then one bit at a time of what has come.
     pub(super) fn follows(&self, frame: &Frame) -> bool {
+        if !frame.is_progressive {
+            return true;
+        }
         let (before, after) = self.bits;
         let is_first = before == 0;
         self.components.iter().all(|&index| {

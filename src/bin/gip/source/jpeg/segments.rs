@@ -137,13 +137,11 @@ impl Segments {
             },
             0xDA => {
                 let Some(mut frame) = self.frame.take() else { return Ok(Next::End) };
-                let Some(scan) = self.scan(payload, &frame) else {
+                let scan = self.scan(payload, &frame);
+                let Some(scan) = scan.filter(|scan| scan.follows(&frame)) else {
                     // There are no usual tables of progressive pictures.
                     return if frame.is_progressive { Err(Damage::Missing) } else { Ok(Next::End) };
                 };
-                if frame.is_progressive && !scan.follows(&frame) {
-                    return Err(Damage::Missing);
-                }
                 let is_unusual = scan.is_unusual(&frame);
                 let next = scan.read(&mut frame, file, end);
                 self.survey.is_unusual |= is_unusual;
