@@ -69,40 +69,45 @@ pub(crate) struct Slope {
 pub(crate) struct Bounds {
     pub(crate) parameterization: Parameterization,
     pub(crate) channels: usize,
-    /// Width and height of the picture in pixels.
-    pub(crate) size: Vec2,
+    /// The ranges of x and y of a centre. Farther outside, it would widen the range over which positions
+    /// are quantized, for a Gaussian of which little is visible; and it would leave the grid of the entropy
+    /// coding, which moves a centre inwards, and a long Gaussian with it.
+    pub(super) center_ranges: [(f32, f32); 2],
+    /// Largest standard deviation that is trained, in pixels: twice the longer side of the picture.
+    pub(super) max_deviation: f32,
 }
 
 impl Bounds {
-    /// Largest standard deviation that is trained, in pixels: twice the longer side of the picture.
-    #[inline]
-    pub(super) fn max_deviation(self) -> f32 {
-        2.0 * self.size.max_element()
+    /// Those for a picture of this width and height in pixels.
+    pub(crate) fn new(
+        parameterization: Parameterization,
+        channels: usize,
+        [width, height]: [u32; 2],
+    ) -> Self {
+        let size = Vec2::new(width as f32, height as f32);
+        let grid = CenterGrid::new(width, height);
+        let margin = (8.0 + 0.05 * size).min(Vec2::splat(grid.margin() - MOST_ROUNDING));
+        Self {
+            parameterization,
+            channels,
+            center_ranges: [(-margin.x, size.x + margin.x), (-margin.y, size.y + margin.y)],
+            max_deviation: 2.0 * size.max_element(),
+        }
     }
 
     /// The components with all values clamped, so that the shape is valid.
     #[inline]
     pub(crate) fn clamped(self, mut components: Components) -> Components {
-        let (shape, max) = (components.shape, self.max_deviation());
+        let (shape, max) = (components.shape, self.max_deviation);
         components.shape = parameterization::clamped(self.parameterization, shape, max);
         self.clamp_center_and_color(&mut components);
         components
     }
 
-    /// The ranges of x and y of a centre. Farther outside, it would widen the range over which positions
-    /// are quantized, for a Gaussian of which little is visible; and it would leave the grid of the entropy
-    /// coding, which moves a centre inwards, and a long Gaussian with it.
-    #[inline]
-    pub(super) fn center_ranges(self) -> [(f32, f32); 2] {
-        let grid = CenterGrid::new(self.size.x as u32, self.size.y as u32);
-        let margin = (8.0 + 0.05 * self.size).min(Vec2::splat(grid.margin() - MOST_ROUNDING));
-        [(-margin.x, self.size.x + margin.x), (-margin.y, self.size.y + margin.y)]
-    }
-
     /// Clamps everything but the shape.
     #[inline]
     pub(crate) fn clamp_center_and_color(self, components: &mut Components) {
-        for (value, (low, high)) in components.center.iter_mut().zip(self.center_ranges()) {
+        for (value, (low, high)) in components.center.iter_mut().zip(self.center_ranges) {
             *value = value.clamp(low, high);
         }
         components.color = components.color.map(|value| value.clamp(-MAX_COLOR, MAX_COLOR));
@@ -117,11 +122,7 @@ mod tests {
     fn centers_have_codes_even_where_a_gaussian_is_steep() {
         for side in [1, 8, 96, 128, 129, 200, 256, 257, 480, 512, 513, 768, 3000, 65_536_u32] {
             let grid = CenterGrid::new(side, 8);
-            let bounds = Bounds {
-                parameterization: Parameterization::Cholesky,
-                channels: 1,
-                size: Vec2::new(side as f32, 8.0),
-            };
+            let bounds = Bounds::new(Parameterization::Cholesky, 1, [side, 8]);
             for (outermost, outwards) in [(-1e6, -0.9), (1e6, 0.9)] {
                 let mut values = Components { center: [outermost; 2], ..Components::ZERO };
                 bounds.clamp_center_and_color(&mut values);

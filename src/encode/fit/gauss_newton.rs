@@ -122,8 +122,8 @@ mod tests {
     const DENSITY: f32 = 2.0;
 
     fn bounds(parameterization: Parameterization) -> Bounds {
-        let length = SIDE as f32 / DENSITY;
-        Bounds { parameterization, channels: CHANNELS, size: Vec2::splat(length) }
+        let length = (SIDE as f32 / DENSITY) as u32;
+        Bounds::new(parameterization, CHANNELS, [length; 2])
     }
 
     /// The quartic kernel of a Gaussian at all pixels.

@@ -355,7 +355,6 @@ fn three_sigma_range(values: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
     use proptest::prelude::*;
 
     use super::*;
@@ -373,7 +372,7 @@ mod tests {
         [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
     fn bounds(parameterization: Parameterization) -> Bounds {
-        Bounds { parameterization, channels: 3, size: Vec2::new(300.0, 200.0) }
+        Bounds::new(parameterization, 3, [300, 200])
     }
 
     /// Valid Gaussians, from tiny ones to ones as large as the picture, some of them very

@@ -19,8 +19,6 @@ pub(crate) mod training;
 mod training_tile;
 pub(crate) mod vector_quantizer;
 
-use glam::Vec2;
-
 use bins::reset;
 use budget::Budget;
 use checkpoint::Checkpoint;
@@ -113,11 +111,11 @@ impl<'a> Fit<'a> {
             budget,
             precision,
             base,
-            bounds: Bounds {
-                parameterization: training.parameterization,
-                channels: raster.channels,
-                size: Vec2::new(raster.width as f32, raster.height as f32),
-            },
+            bounds: Bounds::new(
+                training.parameterization,
+                raster.channels,
+                [raster.width as u32, raster.height as u32],
+            ),
             parameters: Parameters::new(&training.optimizer),
             quantizers: None,
             float_error: 0.0,

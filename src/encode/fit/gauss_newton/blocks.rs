@@ -240,8 +240,8 @@ impl BlockStep<'_> {
     /// [`Bounds::clamped`] for finite values.
     #[inline(always)]
     fn clamp<S: Simd>(&self, simd: S, new: &mut Components<f32x16<S>>) {
-        let max = self.bounds.max_deviation();
-        for (axis, (low, high)) in self.bounds.center_ranges().into_iter().enumerate() {
+        let max = self.bounds.max_deviation;
+        for (axis, (low, high)) in self.bounds.center_ranges.into_iter().enumerate() {
             new.center[axis] = new.center[axis].max(low).min(high);
         }
         let [l11, l21, l22] = new.shape;
@@ -289,15 +289,13 @@ mod tests {
     use crate::encode::fit::parameterization::gradients;
     use crate::gaussian::Parameterization;
     use crate::testing::simd_levels;
-    use glam::Vec2;
 
     const OPTIONS: GaussNewton =
         GaussNewton { rate: 1.3, momentum: 0.7, damping: 0.02, trust_region: 0.3 };
     const PARAMETERIZATION: Parameterization = Parameterization::Cholesky;
 
     fn block_step(rate_term: Option<RateTerm>, channels: usize) -> BlockStep<'static> {
-        let bounds =
-            Bounds { parameterization: PARAMETERIZATION, channels, size: Vec2::new(90.0, 60.0) };
+        let bounds = Bounds::new(PARAMETERIZATION, channels, [90, 60]);
         BlockStep { options: &OPTIONS, bounds, factor: 0.8, rate_term }
     }
 
