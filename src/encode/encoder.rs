@@ -207,8 +207,7 @@ impl Encoder {
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
         let start = Instant::now();
-        let pixels = source.width() as usize * source.height() as usize;
-        let (aim, runs) = self.check(pixels)?;
+        let (aim, runs) = self.check(source.pixels())?;
         let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
         let mut observer = Observer::new(progress, iterations);
         let source = source.keeping_invisible(self.keep_invisible);
@@ -267,12 +266,10 @@ impl Encoder {
             (training, passes)
         };
         let is_small = pixels <= SMALL && self.training.is_none();
-        let lower = if is_small { 0 } else { efforts.len() - 1 };
-        let mut runs: Vec<_> = efforts[lower..].iter().map(run).collect();
-        // Low efforts have the same fit if the fewest iterations are more than theirs.
-        runs.reverse();
-        runs.dedup_by_key(|(training, _)| training.iterations);
-        runs.reverse();
+        // Efforts with no more than the fewest iterations have the same fit.
+        let lowest = efforts.iter().rposition(|&(iterations, _)| iterations <= fewest).unwrap_or(0);
+        let lowest = if is_small { lowest } else { efforts.len() - 1 };
+        let runs: Vec<_> = efforts[lowest..].iter().map(run).collect();
         for (training, _) in &runs {
             training.check().map_err(OptionError::Training)?;
             if self.precision == Precision::Entropy && training.kernel != Kernel::Quartic {

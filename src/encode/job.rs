@@ -27,7 +27,7 @@ pub(crate) struct Job<'a> {
 impl Job<'_> {
     /// Number of pixels.
     pub(crate) fn pixels(&self) -> usize {
-        self.source.width() as usize * self.source.height() as usize
+        self.source.pixels()
     }
 
     /// The work if the picture gets so many Gaussians.

@@ -54,10 +54,20 @@ impl Outcome {
 
     /// Whether it is not much larger than another one, or so much better.
     fn is_worth_its_size(&self, other: &Self) -> bool {
-        let doublings = (self.file.len() as f64 / other.file.len() as f64).log2();
+        let doublings = self.doublings(other);
         doublings < SAME_SIZE
-            || self.psnr.rounded - other.psnr.rounded >= LEAST_GAIN * doublings
+            || self.gain(other) >= LEAST_GAIN * doublings
             || self.quality - other.quality >= LEAST_POINTS * doublings
+    }
+
+    /// The base-2 logarithm of the ratio of its size to that of another one.
+    pub(crate) fn doublings(&self, other: &Self) -> f64 {
+        (self.file.len() as f64 / other.file.len() as f64).log2()
+    }
+
+    /// By how many dB its PSNR is higher than that of another one.
+    pub(crate) fn gain(&self, other: &Self) -> f64 {
+        self.psnr.rounded - other.psnr.rounded
     }
 
     /// Whether it does not reach its PSNR or quality.

@@ -118,10 +118,8 @@ fn with_fewer(
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
         let modest_job = Job { aim: Aim::Count(most as u32), ..*job };
         let modest = encode_for_target(&modest_job, judge, None, outcome.work, observer)?;
-        let doublings = (outcome.file.len() as f64 / modest.file.len() as f64).log2();
-        let gain = outcome.psnr.rounded - modest.psnr.rounded;
-        let least = if is_large { LEAST_GAIN * doublings } else { 0.0 };
-        if gain >= least || modest.file.len() as u64 > most_bytes {
+        let least = if is_large { LEAST_GAIN * outcome.doublings(&modest) } else { 0.0 };
+        if outcome.gain(&modest) >= least || modest.file.len() as u64 > most_bytes {
             return Ok(Outcome { work: modest.work, ..outcome });
         }
         let (bytes, gaussians) = (modest.file.len(), modest.gaussians);

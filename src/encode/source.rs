@@ -81,6 +81,11 @@ impl<'a> Source<'a> {
         if self.color.has_alpha() { &[0.0, 1.0] } else { &[0.0] }
     }
 
+    /// Number of pixels.
+    pub(crate) fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
     /// Width in pixels.
     #[must_use]
     pub fn width(&self) -> u32 {
