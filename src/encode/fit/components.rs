@@ -5,6 +5,7 @@ use glam::Vec2;
 use super::parameterization;
 use crate::coding::entropy::CenterGrid;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::render::splat::Splat;
 
 /// Something for each component of a Gaussian: the trained values, their gradient, their codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,6 +46,11 @@ impl Components {
         let Self { center, shape, color } = *self;
         Gaussian { center, cholesky: parameterization.to_cholesky(shape), color }
     }
+
+    /// The splat of that Gaussian; nothing if it is not drawn.
+    pub(super) fn splat(&self, parameterization: Parameterization) -> Splat {
+        Splat::new(&self.gaussian(parameterization)).unwrap_or(Splat::NOWHERE)
+    }
 }
 
 // Constants: docs/tuning.md, "Growth".
@@ -58,8 +64,8 @@ const MOST_ROUNDING: f32 = 1.0;
 
 /// What the step of a Gaussian depends on.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Slope {
-    pub(crate) gradient: Components,
+pub(crate) struct Slope<Gradient = Components> {
+    pub(crate) gradient: Gradient,
     /// How much a squared error counts there.
     pub(crate) sensitivity: f32,
 }

@@ -1,22 +1,31 @@
-//! A Gauss-Newton step with momentum.
+//! Gauss-Newton steps with momentum, sixteen Gaussians at a time.
 //!
-//! The curvature is that of a Gaussian alone. Gaussians that overlap take their steps at the same time:
-//! together they may go too far, or not far enough. So every Gaussian has a step size of its own, its
-//! *pace*, which is a factor on its steps: it rises while successive gradients agree, and falls when they
-//! turn round (as in Rprop; Riedmiller and Braun, 1993).
+//! The curvature is that of a Gaussian alone. Those that overlap take their steps at the same time, and
+//! together they would go too far, or, where they share the way, not far enough. So every Gaussian has
+//! a pace of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
+//! falls when they turn round (as in Rprop; Riedmiller and Braun, 1993).
+//!
+//! Steps are taken in the own frame of a Gaussian: its Cholesky factor L becomes L (I - D), whatever the
+//! parameterization of its shape is.
+//!
+//! Loops are over indices, as in `fit/training_tile.rs`. There are no fused multiplications, so all
+//! machines get the same bits.
 
-pub(super) mod blocks;
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
-use glam::{Vec2, Vec3};
-
-use super::components::{Bounds, Components, Slope};
-use super::parameterization::OwnFrame;
+use super::components::{Bounds, Components, MAX_COLOR, Slope};
+use super::parameterization::{self, MIN_DEVIATION};
+use super::pass::SplatGradient;
+use super::rate_term::RateTerm;
 use super::training::GaussNewton;
 use crate::encode::own_frame::{
-    CENTER_CURVATURE, COLOR_CURVATURE, RATIO_CURVATURE, SHEAR_CURVATURE, SIZE_CURVATURE,
+    CENTER_CURVATURE, COLOR_CURVATURE, GeometrySums, RATIO_CURVATURE, SHEAR_CURVATURE,
+    SIZE_CURVATURE,
 };
-use crate::gaussian::MAX_COMPONENTS;
-use crate::math;
+use crate::gaussian::{MAX_COMPONENTS, Parameterization};
+use crate::render::simd_kernel;
+use crate::render::splat::Splat;
+use crate::simd::LANES;
 
 // Constants: docs/tuning.md, "Steps of training".
 /// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
@@ -32,7 +41,8 @@ const MOST_PACE: f32 = 3.0;
 /// The state for one Gaussian.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct State {
-    /// Moving average of the gradient.
+    /// Moving average of the gradient in the own frame: by the centre; by the logarithms of size and
+    /// ratio, and by the shear; by the colour.
     mean: Components,
     /// The factor on steps.
     pace: f32,
@@ -49,169 +59,298 @@ impl State {
     }
 }
 
-/// One step for one Gaussian. The moving average is that of gradients in the Gaussian's own frame: by
-/// the centre, the logarithms of size and ratio, the shear, and the colour.
-#[inline]
-pub(super) fn step(
-    components: &mut Components,
-    state: &mut State,
-    slope: &Slope,
-    options: &GaussNewton,
-    bounds: Bounds,
-    factor: f32,
-) {
-    let Components { center, shape, color } = *components;
-    let frame = OwnFrame::new(bounds.parameterization, shape);
-    let mut by_shape = frame.shape.transpose() * Vec3::from(slope.gradient.shape);
-    // The colour falls as the size grows.
-    let colors = color.iter().zip(&slope.gradient.color);
-    by_shape.x -= colors.map(|(color, gradient)| color * gradient).sum::<f32>();
-    let by_center = frame.center.transpose() * Vec2::from(slope.gradient.center);
-    let (by_center, by_shape) = (by_center.to_array(), by_shape.to_array());
-    let gradient = Components { center: by_center, shape: by_shape, ..slope.gradient }.to_array();
+/// The reciprocals of the curvatures for a strength or an area of 1.
+const RECIPROCALS: Components = Components {
+    center: [1.0 / CENTER_CURVATURE; 2],
+    shape: [1.0 / SIZE_CURVATURE, 1.0 / RATIO_CURVATURE, 1.0 / SHEAR_CURVATURE],
+    color: [1.0 / COLOR_CURVATURE; 4],
+};
 
-    let area = frame.center.determinant() * slope.sensitivity;
-    let squared_color = color.iter().map(|color| color * color).sum::<f32>();
-    let squared_strength = (squared_color + options.damping * options.damping) * area;
-    let curvatures = Components {
-        center: [CENTER_CURVATURE * squared_strength; 2],
-        shape: [SIZE_CURVATURE, RATIO_CURVATURE, SHEAR_CURVATURE]
-            .map(|curvature| curvature * squared_strength),
-        color: [COLOR_CURVATURE * area; 4],
-    }
-    .to_array();
-    let momentum = options.momentum;
-    let mut mean = state.mean.to_array();
-    let agreement: f32 =
-        (0..MAX_COMPONENTS).map(|index| mean[index] * gradient[index] / curvatures[index]).sum();
-    // Before the first step there is nothing to agree with.
-    if state.weight > 0.0 {
-        let change = if agreement < 0.0 { SLOWER } else { FASTER };
-        state.pace = (state.pace * change).clamp(LEAST_PACE, MOST_PACE);
-    }
-    state.weight = momentum * state.weight + (1.0 - momentum);
-    let rate = state.pace * (options.rate * factor) / state.weight;
-    let mut steps = [0.0; MAX_COMPONENTS];
-    for index in 0..MAX_COMPONENTS {
-        let mean = &mut mean[index];
-        *mean = momentum * *mean + (1.0 - momentum) * gradient[index];
-        steps[index] = rate * *mean / curvatures[index];
-    }
-    let trusted = |step: f32| step.clamp(-options.trust_region, options.trust_region);
-    state.mean = Components::from_array(mean);
-    let steps = Components::from_array(steps);
-    let center = Vec2::from(center) - frame.center * Vec2::from(steps.center).map(trusted);
-    let by_shape = Vec3::from(steps.shape).map(trusted);
-    let shape: Vec3 = Vec3::from(shape) - frame.shape * by_shape;
-    let faded = math::exp(by_shape.x);
-    let color = core::array::from_fn(|channel| color[channel] * faded - steps.color[channel]);
-    let (center, shape) = (center.to_array(), shape.to_array());
-    *components = bounds.clamped(Components { center, shape, color });
+/// What the steps of all Gaussians have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step<'a> {
+    pub(super) options: &'a GaussNewton,
+    pub(super) bounds: Bounds,
+    /// The factor on the learning rate.
+    pub(super) factor: f32,
+    pub(super) rate_term: Option<RateTerm>,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gaussian::{Gaussian, Parameterization, component_count};
+/// A gradient of the loss, without the rate term, from which that in the own frame follows.
+pub(super) trait Gradient: Copy + Default {
+    /// The gradients in the own frames of sixteen Gaussians with these Cholesky factors, where colours
+    /// do not depend on the size.
+    fn in_own_frame<S: Simd>(
+        simd: S,
+        cholesky: [f32x16<S>; 3],
+        slopes: &[Slope<Self>; LANES],
+    ) -> Components<f32x16<S>>;
+}
 
-    const OPTIONS: GaussNewton =
-        GaussNewton { rate: 1.0, momentum: 0.7, damping: 1e-3, trust_region: 0.2 };
-    const CHANNELS: usize = 1;
-    /// Pixels in a row or column, and for each unit of length.
-    const SIDE: i32 = 96;
-    const DENSITY: f32 = 2.0;
-
-    fn bounds(parameterization: Parameterization) -> Bounds {
-        let length = (SIDE as f32 / DENSITY) as u32;
-        Bounds::new(parameterization, CHANNELS, [length; 2])
+/// The gradient by the splat.
+impl Gradient for SplatGradient {
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn in_own_frame<S: Simd>(
+        simd: S,
+        cholesky: [f32x16<S>; 3],
+        slopes: &[Slope<Self>; LANES],
+    ) -> Components<f32x16<S>> {
+        let zero = f32x16::splat(simd, 0.0);
+        let mut sums = GeometrySums { first: [zero; 2], second: [zero; 3] };
+        for axis in 0..sums.first.len() {
+            sums.first[axis] =
+                f32x16::from_fn(simd, |lane| slopes[lane].gradient.geometry.first[axis]);
+        }
+        for entry in 0..sums.second.len() {
+            sums.second[entry] =
+                f32x16::from_fn(simd, |lane| slopes[lane].gradient.geometry.second[entry]);
+        }
+        let sums = sums.in_own_frame(inverse(cholesky));
+        let mut color = [zero; 4];
+        for channel in 0..color.len() {
+            color[channel] = f32x16::from_fn(simd, |lane| slopes[lane].gradient.color[channel]);
+        }
+        Components { center: sums.first, shape: sums.by_shape(), color }
     }
+}
 
-    /// The quartic kernel of a Gaussian at all pixels.
-    fn rendering(components: &Components, parameterization: Parameterization) -> Vec<f64> {
-        let Gaussian { center, cholesky, color } = components.gaussian(parameterization);
-        let [l11, l21, l22] = cholesky.map(f64::from);
-        let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
-        pixels
-            .map(|(x, y)| {
-                let at = |pixel: i32| (f64::from(pixel) + 0.5) / f64::from(DENSITY);
-                let u = (at(x) - f64::from(center[0])) / l11;
-                let v = (at(y) - f64::from(center[1]) - l21 * u) / l22;
-                f64::from(color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
-            })
-            .collect()
-    }
-
-    /// Half of the squared error per unit of area.
-    fn loss(components: &Components, source: &[f64], parameterization: Parameterization) -> f64 {
-        let rendering = rendering(components, parameterization);
-        let squares = rendering.iter().zip(source).map(|(value, source)| (value - source).powi(2));
-        0.5 * squares.sum::<f64>() / f64::from(DENSITY * DENSITY)
-    }
-
-    fn gradient(
-        components: &Components,
-        source: &[f64],
-        parameterization: Parameterization,
-    ) -> Components {
-        let mut gradient = [0.0; MAX_COMPONENTS];
-        for (index, value) in gradient.iter_mut().enumerate().take(component_count(CHANNELS)) {
-            let at = |step: f32| {
-                let mut moved = components.to_array();
-                moved[index] += step;
-                loss(&Components::from_array(moved), source, parameterization)
-            };
-            *value = ((at(1e-2) - at(-1e-2)) / 2e-2) as f32;
+/// The gradient in the own frame itself.
+impl Gradient for Components {
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn in_own_frame<S: Simd>(
+        simd: S,
+        _: [f32x16<S>; 3],
+        slopes: &[Slope<Self>; LANES],
+    ) -> Components<f32x16<S>> {
+        let mut gradient = [f32x16::splat(simd, 0.0); MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            gradient[index] = f32x16::from_fn(simd, |lane| slopes[lane].gradient.to_array()[index]);
         }
         Components::from_array(gradient)
     }
+}
 
-    #[test]
-    fn a_gaussian_alone_comes_to_its_optimum() {
-        for parameterization in [Parameterization::Covariance, Parameterization::Cholesky] {
-            let from = |[l11, l21, l22]: [f32; 3], center: [f32; 2], color: f32| {
-                let shape = super::super::parameterization::from_cholesky(
-                    parameterization,
-                    [l11, l21, l22],
-                );
-                Components { center, shape, color: [color, 0.0, 0.0, 0.0] }
-            };
-            let optimum = from([5.0, -2.0, 3.0], [24.0, 22.0], 0.5);
-            let source = rendering(&optimum, parameterization);
-            let mut found = from([4.0, 0.0, 4.0], [25.5, 21.0], 0.1);
-            let before = loss(&found, &source, parameterization);
-            let mut state = State::NEW;
-            for _ in 0..40 {
-                let gradient = gradient(&found, &source, parameterization);
-                let slope = Slope { gradient, sensitivity: 1.0 };
-                step(&mut found, &mut state, &slope, &OPTIONS, bounds(parameterization), 1.0);
+impl Step<'_> {
+    /// One step for each Gaussian. `slope` returns what it depends on, for an index and the values.
+    /// `splats`, if there are as many, become those of the new values.
+    pub(super) fn run<G: Gradient>(
+        &self,
+        level: Level,
+        values: &mut [Components],
+        states: &mut [State],
+        splats: &mut [Splat],
+        mut slope: impl FnMut(usize, &Components) -> Slope<G>,
+    ) {
+        let parameterization = self.bounds.parameterization;
+        dispatch!(level, simd => {
+            let blocks = values.chunks_mut(LANES).zip(states.chunks_mut(LANES)).enumerate();
+            for (block, (values, states)) in blocks {
+                let first = block * LANES;
+                let mut slopes = [Slope { gradient: G::default(), sensitivity: 1.0 }; LANES];
+                let mut of_lanes = [values[0]; LANES];
+                let mut states_of_lanes = [State::NEW; LANES];
+                for lane in 0..values.len() {
+                    slopes[lane] = slope(first + lane, &values[lane]);
+                    of_lanes[lane] = values[lane];
+                    of_lanes[lane].shape = parameterization.to_cholesky(values[lane].shape);
+                    states_of_lanes[lane] = states[lane];
+                }
+                let made = self.step(simd, &mut of_lanes, &mut states_of_lanes, &slopes);
+                for lane in 0..values.len() {
+                    values[lane] = self.trained(of_lanes[lane]);
+                    states[lane] = states_of_lanes[lane];
+                }
+                if let Some(splats) = splats.get_mut(first..first + values.len()) {
+                    if parameterization == Parameterization::Cholesky {
+                        splats.copy_from_slice(&made[..values.len()]);
+                    } else {
+                        for lane in 0..values.len() {
+                            splats[lane] = values[lane].splat(parameterization);
+                        }
+                    }
+                }
             }
-            let after = loss(&found, &source, parameterization);
-            assert!(after < 1e-3 * before, "{parameterization:?}: {before}, {after}, {found:?}");
-            let mut pairs = found.to_array().into_iter().zip(optimum.to_array());
-            assert!(pairs.all(|(a, b)| (a - b).abs() < 0.1), "{found:?}");
+        });
+    }
+
+    /// The trained values of a Gaussian whose shape is its Cholesky factor, and clamped.
+    #[inline(always)]
+    fn trained(&self, values: Components) -> Components {
+        match self.bounds.parameterization {
+            Parameterization::Cholesky => values,
+            other => {
+                let shape = parameterization::from_cholesky(other, values.shape);
+                self.bounds.clamped(Components { shape, ..values })
+            }
         }
     }
 
-    #[test]
-    fn the_pace_rises_with_agreement_and_falls_with_contradiction() {
-        let color = [0.5, 0.0, 0.0, 0.0];
-        let mut values = Components { center: [24.0; 2], shape: [3.0, 0.0, 3.0], color };
-        let mut state = State::NEW;
-        let mut paced = |by_color: f32| {
-            let mut gradient = Components::ZERO;
-            gradient.color[0] = by_color;
-            let slope = Slope { gradient, sensitivity: 1.0 };
-            let bounds = bounds(Parameterization::Cholesky);
-            step(&mut values, &mut state, &slope, &OPTIONS, bounds, 0.01);
-            state.pace
-        };
-        let paces = [1.0, 1.0, 1.0, -9.0, 9.0].map(&mut paced);
-        assert_eq!(paces[0], FIRST_PACE);
-        assert!(paces[0] < paces[1] && paces[1] < paces[2], "{paces:?}");
-        assert!(paces[2] > paces[3] && paces[3] > paces[4], "{paces:?}");
-        for _ in 0..50 {
-            paced(9.0);
+    /// Steps of sixteen Gaussians whose shapes are their Cholesky factors. Returns the splats of the new
+    /// values.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn step<S: Simd, G: Gradient>(
+        &self,
+        simd: S,
+        values: &mut [Components; LANES],
+        states: &mut [State; LANES],
+        slopes: &[Slope<G>; LANES],
+    ) -> [Splat; LANES] {
+        let zero = f32x16::splat(simd, 0.0);
+        let one = f32x16::splat(simd, 1.0);
+        let mut old = [zero; MAX_COMPONENTS];
+        let mut mean = [zero; MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            old[index] = f32x16::from_fn(simd, |lane| values[lane].to_array()[index]);
+            mean[index] = f32x16::from_fn(simd, |lane| states[lane].mean.to_array()[index]);
         }
-        assert_eq!(paced(9.0), MOST_PACE);
+        let pace = f32x16::from_fn(simd, |lane| states[lane].pace);
+        let weight = f32x16::from_fn(simd, |lane| states[lane].weight);
+        let sensitivity = f32x16::from_fn(simd, |lane| slopes[lane].sensitivity);
+
+        let Components { center: [x, y], shape: [l11, l21, l22], color } =
+            Components::from_array(old);
+        let area = l11 * l22;
+        let squared_color =
+            color[0] * color[0] + color[1] * color[1] + color[2] * color[2] + color[3] * color[3];
+        let mut gradient = G::in_own_frame(simd, [l11, l21, l22], slopes);
+        for channel in 0..color.len() {
+            // The colour falls as the size grows.
+            gradient.shape[0] -= color[channel] * gradient.color[channel];
+        }
+        if let Some(rate_term) = self.rate_term {
+            let rate_by_shape = rate_term.by_shape(simd, [l11, l21, l22]);
+            for index in 0..rate_by_shape.len() {
+                gradient.shape[index] += rate_by_shape[index];
+            }
+            let rate_by_color = rate_term.by_color(area, squared_color);
+            for channel in 0..color.len() {
+                gradient.color[channel] += rate_by_color * color[channel];
+            }
+        }
+        let gradient = gradient.to_array();
+
+        let area = area * sensitivity;
+        let damping = self.options.damping * self.options.damping;
+        let by_strength = one / ((squared_color + damping) * area);
+        let by_area = one / area;
+        let parts = Components::by_attribute(by_strength, by_strength, by_area).to_array();
+        let mut reciprocals = [zero; MAX_COMPONENTS];
+        // 0 if all are finite, else NaN.
+        let (mut agreement, mut finite) = (zero, zero);
+        for index in 0..MAX_COMPONENTS {
+            reciprocals[index] = parts[index] * RECIPROCALS.to_array()[index];
+            agreement += mean[index] * gradient[index] * reciprocals[index];
+            finite += gradient[index] * 0.0;
+        }
+        // A Gaussian whose gradient is not finite stays as it is until it is pruned.
+        let stepped = finite.simd_eq(zero);
+
+        // Before the first step there is nothing to agree with.
+        let change = agreement
+            .simd_lt(zero)
+            .select(f32x16::splat(simd, SLOWER), f32x16::splat(simd, FASTER));
+        let changed = (pace * change).max(LEAST_PACE).min(MOST_PACE);
+        let new_pace = weight.simd_gt(zero).select(changed, pace);
+        let momentum = self.options.momentum;
+        let new_weight = weight * momentum + (1.0 - momentum);
+        let rate = new_pace * (self.options.rate * self.factor) / new_weight;
+        let mut new_mean = [zero; MAX_COMPONENTS];
+        let mut steps = [zero; MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            new_mean[index] = mean[index] * momentum + gradient[index] * (1.0 - momentum);
+            steps[index] = rate * new_mean[index] * reciprocals[index];
+        }
+        let mut steps = Components::from_array(steps);
+        let trusted = self.options.trust_region;
+        for axis in 0..steps.center.len() {
+            steps.center[axis] = steps.center[axis].max(-trusted).min(trusted);
+        }
+        for index in 0..steps.shape.len() {
+            steps.shape[index] = steps.shape[index].max(-trusted).min(trusted);
+        }
+
+        let ([u, v], [size, ratio, shear]) = (steps.center, steps.shape);
+        let mut new = Components {
+            center: [x - l11 * u, y - (l21 * u + l22 * v)],
+            shape: [
+                l11 - l11 * (size + ratio),
+                l21 - (l21 * (size + ratio) + l22 * shear),
+                l22 - l22 * (size - ratio),
+            ],
+            color,
+        };
+        let faded = simd_kernel::exp(simd, size);
+        for channel in 0..color.len() {
+            new.color[channel] = color[channel] * faded - steps.color[channel];
+        }
+        self.clamp(simd, &mut new);
+
+        let mut new = new.to_array();
+        let mut by_component = [[0.0; LANES]; MAX_COMPONENTS];
+        let mut averages = [[0.0; LANES]; MAX_COMPONENTS];
+        for index in 0..MAX_COMPONENTS {
+            new[index] = stepped.select(new[index], old[index]);
+            by_component[index] = new[index].to_array();
+            averages[index] = stepped.select(new_mean[index], mean[index]).to_array();
+        }
+        for lane in 0..LANES {
+            values[lane] = lane_of(&by_component, lane);
+            states[lane].mean = lane_of(&averages, lane);
+        }
+        let pace = stepped.select(new_pace, pace).to_array();
+        let weight = stepped.select(new_weight, weight).to_array();
+        for lane in 0..LANES {
+            states[lane].pace = pace[lane];
+            states[lane].weight = weight[lane];
+        }
+
+        let [i11, w, i22] = inverse(Components::from_array(new).shape).map(f32x16::to_array);
+        let mut splats = [Splat::NOWHERE; LANES];
+        for lane in 0..LANES {
+            let Components { center: [x, y], color, .. } = values[lane];
+            splats[lane] = Splat { x, y, i11: i11[lane], w: w[lane], i22: i22[lane], color };
+        }
+        splats
+    }
+
+    /// [`Bounds::clamped`] for finite values, whose shapes are Cholesky factors.
+    #[inline(always)]
+    fn clamp<S: Simd>(&self, simd: S, new: &mut Components<f32x16<S>>) {
+        let max = self.bounds.max_deviation;
+        for (axis, (low, high)) in self.bounds.center_ranges.into_iter().enumerate() {
+            new.center[axis] = new.center[axis].max(low).min(high);
+        }
+        let [l11, l21, l22] = new.shape;
+        let l11 = l11.max(MIN_DEVIATION).min(max);
+        let l21 = l21.max(-max).min(max);
+        let long = (l11 * l11 + l21 * l21).sqrt() / l11;
+        let least = long.max(1.0) * f32x16::splat(simd, MIN_DEVIATION);
+        new.shape = [l11, l21, l22.max(MIN_DEVIATION).min(max).max(least)];
+        for channel in 0..new.color.len() {
+            new.color[channel] = new.color[channel].max(-MAX_COLOR).min(MAX_COLOR);
+        }
     }
 }
+
+/// The inverses of Cholesky factors, as [`crate::gaussian::inverse_cholesky`] has them.
+#[inline(always)]
+fn inverse<S: Simd>([l11, l21, l22]: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let (i11, i22) = (1.0 / l11, 1.0 / l22);
+    [i11, -(l21 * i11) * i22, i22]
+}
+
+/// The components of one of sixteen Gaussians.
+#[inline(always)]
+fn lane_of(components: &[[f32; LANES]; MAX_COMPONENTS], lane: usize) -> Components {
+    let mut of_lane = [0.0; MAX_COMPONENTS];
+    for index in 0..MAX_COMPONENTS {
+        of_lane[index] = components[index][lane];
+    }
+    Components::from_array(of_lane)
+}
+
+#[cfg(test)]
+mod tests;

@@ -246,6 +246,17 @@ impl LsqQuantizers {
     }
 }
 
+/// The values that a decoder would read for trained ones.
+pub(super) fn decoded(quantizers: Option<&LsqQuantizers>, trained: &Components) -> Components {
+    quantizers.map_or(*trained, |quantizers| quantizers.decoded(&quantizers.codes(trained)))
+}
+
+pub(super) fn add(sum: &mut QuantizerGradients, gradients: &QuantizerGradients) {
+    for (sum, value) in sum.as_flattened_mut().iter_mut().zip(gradients.as_flattened()) {
+        *sum += value;
+    }
+}
+
 impl LsqQuantizer {
     fn code(&self, value: f32) -> u32 {
         self.quantizer.code(to_uniform(value, self.min_logarithm))

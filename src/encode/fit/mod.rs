@@ -1,6 +1,7 @@
 //! The training loop, which fits Gaussians to a picture (paper, section "Methodology").
 
 mod adam;
+mod backward;
 mod bins;
 pub(crate) mod budget;
 mod checkpoint;
@@ -19,13 +20,13 @@ pub(crate) mod training;
 mod training_tile;
 pub(crate) mod vector_quantizer;
 
+use backward::Backward;
 use bins::reset;
 use budget::Budget;
 use checkpoint::Checkpoint;
-use components::{Bounds, Components, Slope};
+use components::{Bounds, Components};
 use densify::{Densifier, MIN_COLOR};
-use lsq::{LsqQuantizers, QuantizerGradients};
-use parameterization::gradients;
+use lsq::{LsqQuantizers, decoded};
 use parameters::Parameters;
 use pass::{Pass, Rendered};
 use rate_term::RateTerm;
@@ -366,72 +367,38 @@ impl<'a> Fit<'a> {
         let chunks = chunks.zip(self.splats.chunks_mut(CHUNK));
         observer.map(WORK * CHUNK as f64, chunks, |(values, splats)| {
             for (values, splat) in values.iter().zip(splats) {
-                let gaussian = decoded(quantizers.as_ref(), values).gaussian(parameterization);
-                *splat = Splat::new(&gaussian).unwrap_or(Splat::NOWHERE);
+                *splat = decoded(quantizers.as_ref(), values).splat(parameterization);
             }
         })?;
         self.has_splats = true;
         Ok(())
     }
 
-    /// The rest of the backward pass, from the gradients by splats to those by trained values and
-    /// quantizers, and a step of the optimizer against both. The splats of the last pass are kept if
-    /// Gaussians are to be added where it went wrong.
+    /// A step of the optimizer against the gradients by trained values, and one against those by the
+    /// quantizers. The splats of the last pass are kept if Gaussians are to be added where it went wrong.
     fn step(
         &mut self,
         factor: f32,
         grows: bool,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        self.has_splats = false;
-        let (parameterization, channels) = (self.bounds.parameterization, self.raster.channels);
-        let (pass, quantizers) = (&self.pass, self.quantizers.as_ref());
-        let raster = self.raster;
+        let channels = self.raster.channels;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
-        if quantizers.is_none() {
-            let (bounds, parameters) = (self.bounds, &mut self.parameters);
-            let splats = if grows { &mut [] } else { &mut self.splats[..] };
-            let is_done = parameters.step_in_blocks(
-                bounds,
-                factor,
-                rate_term,
-                splats,
-                observer,
-                #[inline(always)]
-                |index, values| {
-                    let sensitivity = raster.sensitivity_under(values.center, values.shape);
-                    (pass.gradient(index, channels), sensitivity)
-                },
-            )?;
-            if is_done {
-                self.has_splats = !grows;
-                return Ok(());
-            }
-        }
-        let by_chunk: Vec<QuantizerGradients> =
-            self.parameters.step(self.bounds, factor, observer, |index, values, sum| {
-                let decoded = decoded(quantizers, values);
-                let gaussian = decoded.gaussian(parameterization);
-                let mut by_splat = pass.gradient(index, channels);
-                if let Some(rate_term) = rate_term {
-                    by_splat += rate_term.gradient(&gaussian);
-                }
-                let (center, shape) =
-                    gradients(&by_splat.geometry, parameterization, decoded.shape);
-                let mut gradient = Components { center, shape, color: by_splat.color };
-                if let Some(quantizers) = quantizers {
-                    add(sum, &quantizers.backward(values, &decoded, &mut gradient));
-                }
-                let sensitivity = raster.sensitivity_under(gaussian.center, gaussian.cholesky);
-                Slope { gradient, sensitivity }
-            })?;
+        let backward = Backward {
+            pass: &self.pass,
+            raster: self.raster,
+            bounds: self.bounds,
+            rate_term,
+            quantizers: self.quantizers.as_ref(),
+        };
+        // A step of the quantizers changes the splats again.
+        self.has_splats = !grows && self.quantizers.is_none();
+        let splats = if self.has_splats { &mut self.splats[..] } else { &mut [] };
+        let by_quantizers = self.parameters.step(&backward, factor, splats, observer)?;
         if let Some(quantizers) = &mut self.quantizers {
-            // Added in the order of the Gaussians, so that the sum does not depend on the threads.
-            let mut total = QuantizerGradients::default();
-            by_chunk.iter().for_each(|sum| add(&mut total, sum));
             let rate = self.training.quantization.learning_rate * factor;
-            quantizers.step(&total, &self.parameters.values, rate);
+            quantizers.step(&by_quantizers, &self.parameters.values, rate);
         }
         Ok(())
     }
@@ -600,21 +567,10 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// The values that a decoder would read for trained ones.
-fn decoded(quantizers: Option<&LsqQuantizers>, values: &Components) -> Components {
-    quantizers.map_or(*values, |quantizers| quantizers.decoded(&quantizers.codes(values)))
-}
-
 /// A number that is larger for larger values, in the order of [`f32::total_cmp`].
 fn ordered(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
-}
-
-fn add(sum: &mut QuantizerGradients, values: &QuantizerGradients) {
-    for (sum, value) in sum.as_flattened_mut().iter_mut().zip(values.as_flattened()) {
-        *sum += value;
-    }
 }
 
 #[cfg(test)]

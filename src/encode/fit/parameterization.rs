@@ -104,6 +104,14 @@ impl OwnFrame {
         };
         Self { center, shape }
     }
+
+    /// A gradient by the centre and by the shape values, by their coordinates in the frame instead.
+    #[inline]
+    pub(crate) fn gradient(&self, center: [f32; 2], shape: [f32; 3]) -> ([f32; 2], [f32; 3]) {
+        let center = self.center.transpose() * Vec2::from(center);
+        let shape = self.shape.transpose() * Vec3::from(shape);
+        (center.to_array(), shape.to_array())
+    }
 }
 
 /// The shape values of a Cholesky factor.

@@ -3,23 +3,21 @@
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use super::components::{Bounds, Components, Slope};
-use super::gauss_newton::blocks::BlockStep;
-use super::pass::SplatGradient;
-use super::rate_term::RateTerm;
+use super::backward::Backward;
+use super::components::Components;
+use super::lsq::{QuantizerGradients, add};
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::gaussian::Parameterization;
 use crate::render::splat::Splat;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
-/// Work to step a Gaussian, alone and in a block.
+/// Work to step a Gaussian, by the gradient by its values and by its splat.
 const WORK: f64 = 200.0;
-const WORK_IN_BLOCK: f64 = 40.0;
+const WORK_BY_SPLAT: f64 = 40.0;
 /// Work to find the place of a Gaussian on the Z curve.
 const WORK_TO_SORT: f64 = 3.0;
 
@@ -91,73 +89,66 @@ impl Parameters {
         Ok(())
     }
 
-    /// Takes one step against the gradients, which `slope` returns for an index and its values.
-    /// `factor` scales all learning rates. `slope` may also add to a sum; there is one for every
-    /// [`CHUNK`] Gaussians, and all of them are returned in order.
+    /// Takes one step against the gradients, where `factor` scales all learning rates. `splats`, unless
+    /// it is empty, becomes those of the new values. Returns the gradient by the quantizers.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn step<Sum: Default + Send>(
+    pub(crate) fn step(
         &mut self,
-        bounds: Bounds,
+        backward: &Backward<'_>,
         factor: f32,
+        splats: &mut [Splat],
         observer: &mut Observer<'_>,
-        slope: impl Fn(usize, &Components, &mut Sum) -> Slope + Send + Sync,
-    ) -> Result<Vec<Sum>, EncodeError> {
+    ) -> Result<QuantizerGradients, EncodeError> {
+        let &Backward { bounds, rate_term, quantizers, .. } = backward;
         let values = &mut self.values;
-        match &mut self.states {
+        let by_chunk = match &mut self.states {
             States::Adam(options, states) => {
-                step_all(values, states, observer, slope, |components, state, slope| {
-                    adam::step(components, state, slope, options, bounds, factor);
-                })
+                let chunks = chunks(values, states, splats);
+                observer.map(WORK * CHUNK as f64, chunks, |(first, values, states, splats)| {
+                    let mut by_quantizers = QuantizerGradients::default();
+                    for (index, (values, state)) in (first..).zip(values.iter_mut().zip(states)) {
+                        let slope = backward.by_values(index, values, &mut by_quantizers);
+                        // A Gaussian whose gradient is not finite stays as it is until it is pruned.
+                        if slope.gradient.to_array().iter().all(|value| value.is_finite()) {
+                            adam::step(values, state, &slope, options, bounds, factor);
+                        }
+                    }
+                    for (splat, values) in splats.iter_mut().zip(values) {
+                        *splat = values.splat(bounds.parameterization);
+                    }
+                    by_quantizers
+                })?
             }
             States::GaussNewton(options, states) => {
-                step_all(values, states, observer, slope, |components, state, slope| {
-                    gauss_newton::step(components, state, slope, options, bounds, factor);
-                })
+                let step = gauss_newton::Step { options, bounds, factor, rate_term };
+                let level = Level::new();
+                let chunks = chunks(values, states, splats);
+                let work = if quantizers.is_some() { WORK } else { WORK_BY_SPLAT };
+                observer.map(work * CHUNK as f64, chunks, |(first, values, states, splats)| {
+                    let mut by_quantizers = QuantizerGradients::default();
+                    match quantizers {
+                        None => step.run(
+                            level,
+                            values,
+                            states,
+                            splats,
+                            #[inline(always)]
+                            |index, values| backward.by_splat(first + index, values),
+                        ),
+                        Some(_) => step.run(level, values, states, splats, |index, values| {
+                            backward.in_own_frame(first + index, values, &mut by_quantizers)
+                        }),
+                    }
+                    by_quantizers
+                })?
             }
-        }
-    }
-
-    /// Takes the steps of [`Self::step`] in blocks, if there is code for that. `slope` returns, for an
-    /// index and its values, the gradient of the pass and how much a squared error counts there. `splats`,
-    /// unless it is empty, becomes those of the new values. Returns whether the steps were taken.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn step_in_blocks(
-        &mut self,
-        bounds: Bounds,
-        factor: f32,
-        rate_term: Option<RateTerm>,
-        mut splats: &mut [Splat],
-        observer: &mut Observer<'_>,
-        slope: impl Fn(usize, &Components) -> (SplatGradient, f32) + Send + Sync,
-    ) -> Result<bool, EncodeError> {
-        let (States::GaussNewton(options, states), Parameterization::Cholesky) =
-            (&mut self.states, bounds.parameterization)
-        else {
-            return Ok(false);
         };
-        let step = BlockStep { options, bounds, factor, rate_term };
-        let level = Level::new();
-        let chunks = self.values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
-        let chunks = chunks.map(|(chunk, (values, states))| {
-            let count = splats.len().min(values.len());
-            let splats = splats.split_off_mut(..count).expect("there are so many");
-            (chunk * CHUNK, values, states, splats)
-        });
-        observer.map(WORK_IN_BLOCK * CHUNK as f64, chunks, |(first, values, states, splats)| {
-            step.run(
-                level,
-                values,
-                states,
-                splats,
-                #[inline(always)]
-                |index, components| slope(first + index, components),
-            );
-        })?;
-        Ok(true)
+        // Added in the order of the Gaussians, so that the sum does not depend on the threads.
+        let mut total = QuantizerGradients::default();
+        by_chunk.iter().for_each(|sum| add(&mut total, sum));
+        Ok(total)
     }
 
     /// Size in bytes.
@@ -176,25 +167,17 @@ fn spread(value: f32) -> u32 {
     bits
 }
 
-/// Takes a step for every Gaussian, and returns the sums in order.
-fn step_all<State: Send, Sum: Default + Send>(
-    values: &mut [Components],
-    states: &mut [State],
-    observer: &mut Observer<'_>,
-    slope: impl Fn(usize, &Components, &mut Sum) -> Slope + Send + Sync,
-    step: impl Fn(&mut Components, &mut State, &Slope) + Send + Sync,
-) -> Result<Vec<Sum>, EncodeError> {
+/// Values, states, and splats if there are any, in chunks, with the index of the first of each.
+fn chunks<'a, State>(
+    values: &'a mut [Components],
+    states: &'a mut [State],
+    mut splats: &'a mut [Splat],
+) -> impl ExactSizeIterator<Item = (usize, &'a mut [Components], &'a mut [State], &'a mut [Splat])>
+{
     let chunks = values.chunks_mut(CHUNK).zip(states.chunks_mut(CHUNK)).enumerate();
-    observer.map(WORK * CHUNK as f64, chunks, |(chunk, (values, states))| {
-        let mut sum = Sum::default();
-        let each = values.iter_mut().zip(states);
-        for (index, (components, state)) in (chunk * CHUNK..).zip(each) {
-            let slope = slope(index, components, &mut sum);
-            // A Gaussian whose gradient is not finite stays as it is until it is pruned.
-            if slope.gradient.to_array().iter().all(|value| value.is_finite()) {
-                step(components, state, &slope);
-            }
-        }
-        sum
+    chunks.map(move |(chunk, (values, states))| {
+        let count = splats.len().min(values.len());
+        let splats = splats.split_off_mut(..count).expect("there are so many");
+        (chunk * CHUNK, values, states, splats)
     })
 }

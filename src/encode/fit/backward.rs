@@ -1,0 +1,65 @@
+//! The rest of the backward pass: from the gradients by splats to those by trained values and
+//! quantizers.
+
+use super::components::{Bounds, Components, Slope};
+use super::lsq::{LsqQuantizers, QuantizerGradients, add, decoded};
+use super::parameterization::{self, OwnFrame};
+use super::pass::{Pass, SplatGradient};
+use super::rate_term::RateTerm;
+use crate::encode::raster::Raster;
+use crate::gaussian::Gaussian;
+
+/// A pass, and what its gradients depend on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Backward<'a> {
+    pub(super) pass: &'a Pass,
+    pub(super) raster: &'a Raster,
+    pub(super) bounds: Bounds,
+    pub(super) rate_term: Option<RateTerm>,
+    pub(super) quantizers: Option<&'a LsqQuantizers>,
+}
+
+impl Backward<'_> {
+    /// The gradient by the splat of a Gaussian that has these values, without the rate term.
+    #[inline(always)]
+    pub(super) fn by_splat(&self, index: usize, values: &Components) -> Slope<SplatGradient> {
+        let Gaussian { center, cholesky, .. } = values.gaussian(self.bounds.parameterization);
+        let sensitivity = self.raster.sensitivity_under(center, cholesky);
+        Slope { gradient: self.pass.gradient(index, self.bounds.channels), sensitivity }
+    }
+
+    /// The gradient by trained values. That by the quantizers is added to `by_quantizers`.
+    pub(super) fn by_values(
+        &self,
+        index: usize,
+        trained: &Components,
+        by_quantizers: &mut QuantizerGradients,
+    ) -> Slope {
+        let parameterization = self.bounds.parameterization;
+        let decoded = decoded(self.quantizers, trained);
+        let Slope { gradient: mut by_splat, sensitivity } = self.by_splat(index, &decoded);
+        if let Some(rate_term) = self.rate_term {
+            by_splat += rate_term.gradient(&decoded.gaussian(parameterization));
+        }
+        let (center, shape) =
+            parameterization::gradients(&by_splat.geometry, parameterization, decoded.shape);
+        let mut gradient = Components { center, shape, color: by_splat.color };
+        if let Some(quantizers) = self.quantizers {
+            add(by_quantizers, &quantizers.backward(trained, &decoded, &mut gradient));
+        }
+        Slope { gradient, sensitivity }
+    }
+
+    /// [`Self::by_values`] in the Gaussian's own frame.
+    pub(super) fn in_own_frame(
+        &self,
+        index: usize,
+        trained: &Components,
+        by_quantizers: &mut QuantizerGradients,
+    ) -> Slope {
+        let Slope { gradient, sensitivity } = self.by_values(index, trained, by_quantizers);
+        let frame = OwnFrame::new(self.bounds.parameterization, trained.shape);
+        let (center, shape) = frame.gradient(gradient.center, gradient.shape);
+        Slope { gradient: Components { center, shape, ..gradient }, sensitivity }
+    }
+}
