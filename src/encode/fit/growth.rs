@@ -1,0 +1,164 @@
+//! Birth and death of Gaussians: densification, culling and pruning, for a budget.
+
+use super::budget::Budget;
+use super::components::Components;
+use super::densify::{Densifier, MIN_COLOR};
+use super::lsq::decoded;
+use super::pass::Rendered;
+use super::trained::{CHUNK, Fit, WORK};
+use super::training::Portion;
+use super::training_tile::RenderingError;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
+use crate::encode::rate_model;
+use crate::gaussian::Gaussian;
+
+impl Fit<'_> {
+    /// The number of Gaussians that the budget sets, if training changes the error by the factor
+    /// `foreseen`.
+    pub(super) fn wanted(&self, foreseen: f64) -> usize {
+        let RenderingError { squared, distortion, .. } = self.error;
+        let measured = match self.budget {
+            Budget::Count(_) => 0.0,
+            Budget::Bits { .. } => self.component_bits(distortion * foreseen),
+            Budget::SquaredError(_) => squared * foreseen,
+            Budget::DistortionPerGaussian(_) => distortion * foreseen,
+        };
+        self.budget.wanted(self.len(), measured, self.most())
+    }
+
+    /// The bits of a component on average, if the picture has this distortion.
+    pub(super) fn component_bits(&self, distortion: f64) -> f64 {
+        if self.len() == 0 {
+            return rate_model::USUAL_COMPONENT_BITS;
+        }
+        let step = rate_model::color_step(rate_model::step_for(distortion, self.len()));
+        let bits = |values: &Components| {
+            rate_model::component_bits(&values.gaussian(self.bounds.parameterization), step)
+        };
+        self.parameters.values.iter().map(bits).sum::<f64>() / self.len() as f64
+    }
+
+    /// How many Gaussians this growth step adds. `kept` Gaussians remain when the surplus has been
+    /// culled; `steps_left` growth steps follow this one.
+    pub(super) fn portion(&self, kept: usize, steps_left: u32) -> usize {
+        let densification = &self.training.densification;
+        let grown = kept as f64 * (1.0 + f64::from(densification.surplus));
+        let missing = (grown.round() as usize).saturating_sub(self.len());
+        match densification.portion {
+            _ if steps_left == 0 => missing,
+            Portion::Even => missing.div_ceil(steps_left as usize + 1),
+            Portion::Half => missing.div_ceil(2),
+            Portion::Fixed(count) => missing.min(count as usize),
+        }
+    }
+
+    /// Densification: adds up to `count` Gaussians where the distortion is large, and up to `replaced`
+    /// more in place of the least important ones. Where there is no place for all, fewer are replaced.
+    pub(super) fn grow(
+        &mut self,
+        count: usize,
+        replaced: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        if count + replaced == 0 {
+            return Ok(());
+        }
+        let pass = Rendered {
+            pass: &self.pass,
+            raster: self.raster,
+            splats: &self.splats,
+            kernel: self.training.kernel,
+            base: self.base,
+        };
+        let densifier = Densifier {
+            options: &self.training.densification,
+            filter: self.training.filter,
+            pass,
+            bounds: self.bounds,
+            count: self.parameters.len() - replaced,
+        };
+        let new = densifier.new_gaussians(count + replaced, &mut self.rng, observer)?;
+        observer.poll()?;
+        self.cull(new.len() * replaced / (count + replaced), observer)?;
+        self.free_bins();
+        self.parameters.extend(&new);
+        self.parameters.sort(observer)?;
+        self.invalidate();
+        Ok(())
+    }
+
+    /// Culling: removes the `count` Gaussians of least importance.
+    pub(super) fn cull(
+        &mut self,
+        count: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let count = count.min(self.len());
+        if count == 0 {
+            return Ok(());
+        }
+        let parameterization = self.bounds.parameterization;
+        let chunks = self.parameters.values.chunks(CHUNK).enumerate();
+        // In the order of importance, and of equal ones in that of the Gaussians.
+        let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, values)| {
+            let key = |(index, values): (usize, &Components)| {
+                let gaussian = values.gaussian(parameterization);
+                let Gaussian { center, cholesky, .. } = gaussian;
+                let sensitivity = self.raster.sensitivity_under(center, cholesky);
+                u64::from(ordered(gaussian.importance() * sensitivity)) << 32 | index as u64
+            };
+            (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
+        })?;
+        let mut keys = keys.concat();
+        observer.poll()?;
+        keys.select_nth_unstable(count - 1);
+        let mut keep = vec![true; keys.len()];
+        for key in &keys[..count] {
+            // The cast leaves the index.
+            keep[*key as u32 as usize] = false;
+        }
+        observer.poll()?;
+        self.parameters.retain(|index| keep[index]);
+        self.invalidate();
+        observer.poll()
+    }
+
+    /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
+    pub(super) fn prune(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+        let values = &self.parameters.values;
+        let parameterization = self.bounds.parameterization;
+        let quantizers = self.quantizers.as_ref();
+        let is_visible = |index: usize| {
+            let gaussian = decoded(quantizers, &values[index]).gaussian(parameterization);
+            let has_color = gaussian.color.iter().any(|color| color.abs() >= MIN_COLOR);
+            let is_inside = self.pass.touches(index);
+            gaussian.is_drawable() && has_color && is_inside
+        };
+        let keep = observer.map(WORK, 0..values.len(), is_visible)?;
+        if keep.contains(&false) {
+            self.parameters.retain(|index| keep[index]);
+            self.invalidate();
+        }
+        observer.poll()
+    }
+}
+
+/// A number that is larger for larger values, in the order of [`f32::total_cmp`].
+fn ordered(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ordered;
+
+    #[test]
+    fn ordered_numbers_are_in_total_order() {
+        let values =
+            [-f32::NAN, f32::NEG_INFINITY, -2.0, -0.0, 0.0, 1e-40, 1.0, f32::INFINITY, f32::NAN];
+        assert!(values.is_sorted_by(|a, b| a.total_cmp(b).is_lt()));
+        assert!(values.is_sorted_by(|a, b| ordered(*a) < ordered(*b)));
+    }
+}

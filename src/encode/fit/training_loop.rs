@@ -1,0 +1,158 @@
+//! The training loop.
+
+use super::budget::Budget;
+use super::parameters::Parameters;
+use super::schedule::TrainingSchedule;
+use super::trained::{Fit, Next};
+use super::training::Training;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
+use crate::encode::workload::Workload;
+
+// Constants: docs/tuning.md, "Growth".
+/// The error after training as a share of the error during growth: training continues to lower the
+/// error when no more Gaussians are added.
+const FORESEEN: f64 = 0.75;
+
+/// What an iteration depends on.
+#[derive(Clone, Copy, Debug)]
+struct Iteration {
+    /// For the progress that is told.
+    work: f64,
+    starts_quantization: bool,
+    /// Scales all learning rates.
+    factor: f32,
+    /// Iterations that are planned in total.
+    planned: u32,
+    next: Next,
+}
+
+impl Fit<'_> {
+    /// Trains from nothing. `workload` is what was expected of it, for the progress that is told.
+    pub(crate) fn run(
+        &mut self,
+        workload: Workload,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let Training { iterations, densification, schedule, .. } = self.training;
+        let plan = TrainingSchedule::new(self.training, self.precision);
+        self.forward(Next::Growth, observer)?;
+        let first = densification.initial * self.wanted(1.0) as f32;
+        self.grow((first.ceil() as usize).max(1), 0, observer)?;
+        let mut kept = usize::MAX;
+        let planned = self.work.iterations + iterations;
+        for iteration in 0..*iterations {
+            let done = iteration + 1;
+            let growths_left = plan.growths_left(done);
+            let grown = 2.0 * f64::from(iteration) / f64::from(*iterations);
+            let step = Iteration {
+                work: workload.iteration(grown.min(1.0)),
+                starts_quantization: iteration == plan.quantized_from,
+                factor: schedule.factor(iteration, *iterations),
+                planned,
+                next: if growths_left.is_some() { Next::Growth } else { Next::Pass },
+            };
+            self.iterate(step, observer)?;
+            if done % densification.prune_interval == 0 {
+                self.prune(observer)?;
+            }
+            if let Some(steps_left) = growths_left {
+                kept = self.wanted(FORESEEN);
+                let portion = self.portion(kept, steps_left);
+                let replaced = (densification.replaced * self.len() as f32) as usize;
+                self.grow(portion, replaced, observer)?;
+            }
+            if let Some(culls_left) = plan.culls_left(done) {
+                // In a simple picture the error may fall much faster with the count than foreseen.
+                kept = kept.max(self.wanted(FORESEEN));
+                // Growth may have ended before the budget, where there is little to correct.
+                let surplus = self.len().saturating_sub(kept);
+                self.cull(surplus / (culls_left as usize + 1), observer)?;
+            }
+        }
+        self.settle(observer)
+    }
+
+    /// Trains from nothing again, with this many Gaussians.
+    pub(crate) fn restart(
+        &mut self,
+        count: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        self.budget = Budget::Count(count);
+        self.parameters = Parameters::new(&self.training.optimizer);
+        self.quantizers = None;
+        self.invalidate();
+        self.run(Workload::new(self.raster.pixels(), count), observer)
+    }
+
+    /// Adds or removes Gaussians of a finished fit, so that there are `count`, and trains all for a
+    /// quarter of the iterations more: at first without quantization, because quantizers of the others
+    /// would round what is new to nothing.
+    pub(crate) fn resize(
+        &mut self,
+        count: usize,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        if let Some(best) = self.best.take() {
+            self.parameters.replace(best.values);
+        }
+        let was_quantized = self.quantizers.take().is_some();
+        self.invalidate();
+        self.forward(Next::Growth, observer)?;
+        self.cull(self.len().saturating_sub(count), observer)?;
+        self.grow(count.saturating_sub(self.len()), 0, observer)?;
+        let iterations = self.training.iterations.div_ceil(4);
+        let planned = self.work.iterations + iterations;
+        let quantized_from = (self.training.quantization.warm_up * iterations as f32) as u32;
+        let quantized_from = quantized_from.min(iterations - 1);
+        let workload = Workload::new(self.raster.pixels(), self.len());
+        for iteration in 0..iterations {
+            let step = Iteration {
+                work: workload.iteration(1.0),
+                starts_quantization: was_quantized && iteration == quantized_from,
+                factor: 0.5 * (1.0 - iteration as f32 / iterations as f32),
+                planned,
+                next: Next::Pass,
+            };
+            self.iterate(step, observer)?;
+        }
+        self.settle(observer)
+    }
+
+    /// One iteration: a pass, and a step of the optimizer.
+    fn iterate(
+        &mut self,
+        iteration: Iteration,
+        observer: &mut Observer<'_>,
+    ) -> Result<(), EncodeError> {
+        let Iteration { work, starts_quantization, factor, planned, next } = iteration;
+        observer.advance(work)?;
+        if starts_quantization {
+            self.start_quantization();
+        }
+        self.forward(next, observer)?;
+        if self.is_lost() {
+            self.return_to_best();
+            self.forward(next, observer)?;
+        }
+        self.keep_if_best();
+        observer.report(self.work.iterations, planned, self.len(), self.psnr())?;
+        self.work.iterations += 1;
+        self.step(factor, next, observer)?;
+        let memory = self.memory();
+        self.work.peak_memory = self.work.peak_memory.max(memory);
+        Ok(())
+    }
+
+    /// Ends training: renders the values of the last step, keeps them if they are the best, and
+    /// frees memory.
+    pub(super) fn settle(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+        self.binned_for = 0;
+        self.forward(Next::Pass, observer)?;
+        self.keep_if_best();
+        self.binned_for = 0;
+        self.free_bins();
+        Ok(())
+    }
+}
