@@ -58,7 +58,7 @@ impl Gaussian {
     /// The energy of the Gaussian: what it adds, squared and summed up over pixels and channels, up
     /// to a constant factor of the kernel.
     #[cfg(feature = "encode")]
-    pub(crate) fn importance(&self) -> f32 {
+    pub(crate) fn energy(&self) -> f32 {
         let [l11, _, l22] = self.cholesky;
         self.color.iter().map(|color| color * color).sum::<f32>() * l11 * l22
     }

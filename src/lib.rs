@@ -60,7 +60,7 @@
 //! - **Rendering:** [`Picture`] is a header with the Gaussians that have arrived; [`RenderOptions`]
 //!   has the output size, the [`Region`] and the [`ColorModel`].
 //! - **The model:** [`Gaussian`], its stored shape ([`Parameterization`]), the [`Kernel`], and the
-//!   [`Quantizer`]s or [`LatticeSteps`] that relate codes to values.
+//!   [`Quantizer`]s or [`QuantizationSteps`] that relate codes to values.
 //! - **Encoding** (feature `encode`): `encode`, or an `Encoder`, which encodes a
 //!   `Source` for a `Target` and returns the file with a `Report`.
 //! - **The `image` crate** (feature `image`): `register` makes `image::open` read `.gip`.
@@ -135,7 +135,7 @@ pub use crate::image::{GipDecoder, register};
 #[cfg(feature = "decode")]
 pub use chunk::ChunkType;
 #[cfg(feature = "decode")]
-pub use coding::entropy::{AttributeBits, LatticeSteps};
+pub use coding::entropy::{AttributeBits, QuantizationSteps};
 #[cfg(feature = "decode")]
 pub use coding::packed::{Quantizer, UniformQuantizer};
 #[cfg(feature = "decode")]

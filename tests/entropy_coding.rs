@@ -21,10 +21,10 @@ fn number(random: &mut Random, bits: u64) -> i32 {
     if random.next() & 1 == 1 { -magnitude } else { magnitude }
 }
 
-/// Codes of all classes, mostly small, some beyond the symbols, anywhere in the grid.
+/// Codes of all exponents, mostly small, some beyond the symbols, anywhere in the grid.
 fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
     let grid = Grid::new(header.sides());
-    let class = (random.next() % 8) as u32;
+    let exponent = (random.next() % 8) as u32;
     let long = if random.next().is_multiple_of(8) { 15 } else { 5 };
     let center = grid.roots.map(|roots| {
         let side = roots * grid.root * 128;
@@ -32,7 +32,7 @@ fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
         start + (random.next() % u64::from((side - start).min(spread))) as u32
     });
     Code {
-        class,
+        exponent,
         axes: (0..header.channels()).map(|_| number(random, long)).collect(),
         size: number(random, long),
         ratio: number(random, long),

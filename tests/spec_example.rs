@@ -168,9 +168,9 @@ fn the_symbols_of_the_entropy_coding_are_those_in_the_bytes() {
     assert!(entropy_coded().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
     // The values with which the first codes end.
     let first = &layer.codes[0];
-    assert_eq!((first.class, &first.axes[..], first.ratio), (2, &[7, 1, -2][..], 1));
+    assert_eq!((first.exponent, &first.axes[..], first.ratio), (2, &[7, 1, -2][..], 1));
     let second = &layer.codes[1];
-    assert_eq!((second.class, &second.axes[..], second.ratio), (4, &[-11, 3, 5][..], -3));
+    assert_eq!((second.exponent, &second.axes[..], second.ratio), (4, &[-11, 3, 5][..], -3));
     assert_eq!((first.slant, second.slant), (0, 41));
     assert_eq!((first.size, second.size), (0, 31 - 33));
 }

@@ -25,7 +25,7 @@ fn sample() -> File {
         let axes = vec![within(9), within(5), within(3)];
         let [size, ratio, slant] = [within(4), within(2), within(2)];
         let center = grid.units([random.range(0.0, 200.0), random.range(0.0, 150.0)]);
-        Code { class: 2, axes, size, ratio, slant, center }
+        Code { exponent: 2, axes, size, ratio, slant, center }
     };
     let layers = LAYERS.map(|count| (0..count).map(&mut code).collect()).into();
     File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)

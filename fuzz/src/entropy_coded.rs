@@ -29,7 +29,7 @@ enum Layer {
 /// Few bytes, so that many come together.
 #[derive(Arbitrary, Debug)]
 struct Gaussian {
-    class: u8,
+    exponent: u8,
     axes: [Number; 4],
     size: Number,
     ratio: Number,
@@ -119,7 +119,7 @@ impl Gaussian {
             (side * u64::from(self.center[axis]) >> 16) as u32
         };
         Code {
-            class: u32::from(self.class % 8),
+            exponent: u32::from(self.exponent % 8),
             axes: self.axes[..channels].iter().map(Number::value).collect(),
             size: self.size.value(),
             ratio: self.ratio.value(),
@@ -130,7 +130,7 @@ impl Gaussian {
 }
 
 impl Number {
-    /// Within the 65,542 that symbols and their excess can say in every class.
+    /// Within the 65,542 that symbols and their excess can say with every exponent.
     fn value(&self) -> i32 {
         let value = i32::from(self.0);
         if value.abs() < 64 { value } else { value * value * value / 32 }

@@ -25,7 +25,7 @@ pub enum Coding {
     /// may stand in any order.
     Packed,
     /// The entropy coding: the Gaussians of each layer are stored as a set, in the order of a tree
-    /// of cells. Each has a precision class, and every attribute is entropy coded.
+    /// of cells. Each has a step exponent, and every attribute is entropy coded.
     Entropy,
 }
 

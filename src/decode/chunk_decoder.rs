@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use super::memory::{peak_memory, reserve};
 use super::pending::PendingLayers;
 use crate::chunk::ChunkType;
-use crate::coding::entropy::{AttributeBits, Lattice};
+use crate::coding::entropy::{AttributeBits, Quantization};
 use crate::coding::packed::{PackedLayerReader, Quantizer};
 use crate::container::{Coding, Header, Metadata};
 use crate::error::DecodeError;
@@ -29,8 +29,8 @@ pub(super) struct ChunkDecoder {
     pub(super) header: Option<Header>,
     /// The quantizers of the packed coding, one per component.
     pub(super) quantizers: Vec<Quantizer>,
-    /// The lattice of the entropy coding.
-    pub(super) lattice: Option<Lattice>,
+    /// The quantization grid of the entropy coding.
+    pub(super) quantization: Option<Quantization>,
     /// The bounds of every layer that the header declares, if the file has them.
     bounds: Option<Vec<LayerBounds>>,
     /// Entropy-coded layers that have arrived and are not decoded yet.
@@ -161,7 +161,7 @@ impl ChunkDecoder {
             ChunkType::GAUS if self.layers.len() == self.declared_layers() => {
                 malformed("more layers than the header declares")
             }
-            ChunkType::GAUS if self.lattice.is_some() => self.collect_within_limits(length),
+            ChunkType::GAUS if self.quantization.is_some() => self.collect_within_limits(length),
             ChunkType::GAUS => {
                 Ok(Stage::Layer(PackedLayerReader::new(length), self.gaussians.len()))
             }
@@ -183,7 +183,7 @@ impl ChunkDecoder {
 
     /// Whether `QNTZ` was read.
     fn has_quantizers(&self) -> bool {
-        self.lattice.is_some() || !self.quantizers.is_empty()
+        self.quantization.is_some() || !self.quantizers.is_empty()
     }
 
     /// Collects a payload, if there is memory for it and for all Gaussians.
@@ -233,8 +233,8 @@ impl ChunkDecoder {
                         self.quantizers = Quantizer::parse_all(payload, header.components())?;
                     }
                     Coding::Entropy => {
-                        let lattice = Lattice::parse(payload, header.color.channels())?;
-                        self.lattice = Some(lattice);
+                        let quantization = Quantization::parse(payload, header.color.channels())?;
+                        self.quantization = Some(quantization);
                     }
                 }
             }
@@ -289,14 +289,14 @@ impl ChunkDecoder {
 
     /// Decodes the pending layers up to the first that is malformed.
     pub(super) fn decode_pending(&mut self, threads: Threads) -> Result<(), DecodeError> {
-        let (Some(header), Some(lattice)) = (&self.header, &self.lattice) else {
+        let (Some(header), Some(quantization)) = (&self.header, &self.quantization) else {
             return Ok(());
         };
         let pending = core::mem::take(&mut self.pending);
         let layers = pending.select(|_| true);
         reserve(&mut self.gaussians, layers.count(), header.gaussians as usize);
         let statistics = self.statistics.as_mut();
-        let decoded = layers.decode(header, lattice, statistics, threads, &mut self.gaussians);
+        let decoded = layers.decode(header, quantization, statistics, threads, &mut self.gaussians);
         if decoded.is_err() {
             self.stage = Stage::Failed;
         }
@@ -310,7 +310,7 @@ impl ChunkDecoder {
     /// one that cannot be is malformed, so that its error is reported.
     #[cfg(feature = "std")]
     pub(super) fn visible_gaussians(&self, options: &RenderOptions) -> Option<Vec<Gaussian>> {
-        let (header, lattice) = (self.header.as_ref()?, self.lattice.as_ref()?);
+        let (header, quantization) = (self.header.as_ref()?, self.quantization.as_ref()?);
         let view = options.view(header, &self.limits).ok()?;
         let may_show = |bounds: LayerBounds| bounds.may_show_in(&view, header);
         let layers = self.pending.select(|bounds| bounds.is_none_or(may_show));
@@ -322,7 +322,7 @@ impl ChunkDecoder {
         self.limits.check_memory(self.memory() + copies).ok()?;
         let mut gaussians = Vec::with_capacity(count);
         gaussians.extend_from_slice(&self.gaussians);
-        layers.decode(header, lattice, None, options.threads, &mut gaussians).ok()?;
+        layers.decode(header, quantization, None, options.threads, &mut gaussians).ok()?;
         Some(gaussians)
     }
 }

@@ -5,7 +5,7 @@
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-use crate::coding::entropy::{AttributeBits, LAYER_PREFIX, Lattice, LayerCoder};
+use crate::coding::entropy::{AttributeBits, LAYER_PREFIX, LayerCoder, Quantization};
 use crate::color::ColorModel;
 use crate::container::Header;
 use crate::error::DecodeError;
@@ -46,7 +46,7 @@ impl PendingLayer {
         let mut out = out.iter_mut();
         coder.read(self.count, &self.payload[LAYER_PREFIX..], statistics, |code, shape| {
             if let Some(gaussian) = out.next() {
-                *gaussian = coder.lattice.gaussian(&code, shape, &coder.grid, model);
+                *gaussian = coder.quantization.gaussian(&code, shape, &coder.grid, model);
             }
         })
     }
@@ -113,7 +113,7 @@ impl SelectedLayers<'_> {
     pub(crate) fn decode(
         self,
         header: &Header,
-        lattice: &Lattice,
+        quantization: &Quantization,
         statistics: Option<&mut AttributeBits>,
         threads: Threads,
         gaussians: &mut Vec<Gaussian>,
@@ -121,7 +121,7 @@ impl SelectedLayers<'_> {
         let mut valid = gaussians.len();
         gaussians.resize(valid + self.count, Gaussian::NOTHING);
         let mut free = &mut gaussians[valid..];
-        let coder = LayerCoder::new(lattice, header);
+        let coder = LayerCoder::new(quantization, header);
         let mut results: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
         let mut work = Vec::with_capacity(self.layers.len());
         for (&layer, result) in self.layers.iter().zip(&mut results) {

@@ -7,7 +7,7 @@ use super::chunk_decoder::ChunkDecoder;
 use super::chunk_statistics::{ChunkCounter, ChunkStatistics};
 #[cfg(feature = "std")]
 use crate::coding::entropy::AttributeBits;
-use crate::coding::entropy::{Lattice, LatticeSteps};
+use crate::coding::entropy::{Quantization, QuantizationSteps};
 use crate::coding::packed::Quantizer;
 use crate::container::{Event, Header, Metadata, Parser};
 use crate::error::DecodeError;
@@ -213,8 +213,8 @@ impl StreamDecoder {
     /// The steps of [`Coding::Entropy`](crate::Coding); `None` until they have arrived, and with
     /// [`Coding::Packed`](crate::Coding).
     #[must_use]
-    pub fn lattice_steps(&self) -> Option<LatticeSteps> {
-        self.chunks.lattice.as_ref().map(Lattice::steps)
+    pub fn quantization_steps(&self) -> Option<QuantizationSteps> {
+        self.chunks.quantization.as_ref().map(Quantization::steps)
     }
 
     /// The metadata that has arrived. It is complete when the first Gaussian has arrived.

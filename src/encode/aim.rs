@@ -17,11 +17,11 @@ const AUTO_QUALITY: f64 = 75.0;
 const AIMED_SHARE_OF_SIZE: f64 = 0.997;
 /// By how many dB the PSNR that a search aims at exceeds the target.
 const AIMED_PSNR_EXCESS: f64 = 0.02;
-/// The deviations of size that are good enough: a file that is a little too large will be shortened.
+/// The log ratios of size that are good enough: a file that is a little too large will be shortened.
 const TOLERANCE_OF_SIZE: (f64, f64) = (-0.009, 0.04);
-/// The deviations of size that are left to the shortening, even if there are passes left.
+/// The log ratios of size that are left to the shortening, even if there are passes left.
 const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
-/// What is added to a deviation on the wrong side of the tolerance, so that every deviation on the
+/// What is added to a log ratio on the wrong side of the tolerance, so that every log ratio on the
 /// right side is preferred.
 const WRONG_SIDE_PENALTY: f64 = 1e3;
 
@@ -38,7 +38,7 @@ pub(crate) enum Aim {
 
 /// The size, PSNR or visual quality that a file is to have.
 ///
-/// The *deviation* of a file is the base-2 logarithm of its size, of its squared error, or of
+/// The *log ratio* of a file is the base-2 logarithm of its size, of its squared error, or of
 /// its error to the eye, divided by the one that is aimed at. It is positive for files that are too large
 /// or too distorted.
 #[derive(Clone, Copy, Debug)]
@@ -108,9 +108,9 @@ impl FileAim {
         }
     }
 
-    /// How badly a file with this deviation misses its target: 0 if it meets the target. `weak` is the share
+    /// How badly a file with this log ratio misses its target: 0 if it meets the target. `weak` is the share
     /// of its Gaussians that hardly show, which a file that is too large is shortened by.
-    pub(crate) fn miss(self, deviation: f64, weak: f64) -> f64 {
+    pub(crate) fn violation(self, log_ratio: f64, weak: f64) -> f64 {
         let (below, above) = match self {
             Self::Size(_) => {
                 let (below, above) = TOLERANCE_OF_SIZE;
@@ -120,13 +120,13 @@ impl FileAim {
             // At a quality of 75, a third of a point; less at a higher one.
             Self::Quality(_) => (-0.03, 0.03),
         };
-        if deviation > above {
-            return WRONG_SIDE_PENALTY + deviation;
+        if log_ratio > above {
+            return WRONG_SIDE_PENALTY + log_ratio;
         }
-        (below - deviation).max(0.0)
+        (below - log_ratio).max(0.0)
     }
 
-    /// The deviation to aim at.
+    /// The log ratio to aim at.
     pub(crate) fn middle(self) -> f64 {
         match self {
             Self::Size(_) => 0.5 * (TOLERANCE_OF_SIZE.0 + TOLERANCE_OF_SIZE.1),
@@ -134,25 +134,25 @@ impl FileAim {
         }
     }
 
-    /// What of a deviation is to be corrected.
-    pub(crate) fn beyond(self, deviation: f64) -> f64 {
+    /// What of a log ratio is to be corrected.
+    pub(crate) fn beyond(self, log_ratio: f64) -> f64 {
         match self {
             // Files that are shortened a little are as good as others.
-            Self::Size(_) => deviation - deviation.clamp(WELL_SHORTENED.0, WELL_SHORTENED.1),
-            Self::Psnr(_) | Self::Quality(_) => deviation,
+            Self::Size(_) => log_ratio - log_ratio.clamp(WELL_SHORTENED.0, WELL_SHORTENED.1),
+            Self::Psnr(_) | Self::Quality(_) => log_ratio,
         }
     }
 
-    /// Whether a pass with another Lagrange multiplier corrects a deviation.
-    pub(crate) fn is_within_lambda(self, deviation: f64) -> bool {
+    /// Whether a pass with another Lagrange multiplier corrects a log ratio.
+    pub(crate) fn is_within_lambda(self, log_ratio: f64) -> bool {
         match self {
             // A pass removes Gaussians, but adds none.
-            Self::Size(_) => (-0.012..0.05).contains(&deviation),
-            Self::Psnr(_) | Self::Quality(_) => (-0.1..0.03).contains(&deviation),
+            Self::Size(_) => (-0.012..0.05).contains(&log_ratio),
+            Self::Psnr(_) | Self::Quality(_) => (-0.1..0.03).contains(&log_ratio),
         }
     }
 
-    /// By how much the deviation changes when all steps double.
+    /// By how much the log ratio changes when all steps double.
     pub(crate) fn by_step(self) -> f64 {
         match self {
             Self::Size(_) => -0.38,
@@ -160,21 +160,21 @@ impl FileAim {
         }
     }
 
-    /// The change of the deviation with a Lagrange multiplier of 2^`lambda` times the usual one.
+    /// The change of the log ratio with a Lagrange multiplier of 2^`lambda` times the usual one.
     pub(crate) fn change_by_lambda(self, lambda: f64) -> f64 {
         lambda * self.by_lambda(lambda > 0.0)
     }
 
-    /// The change of the base-2 logarithm of the Lagrange multiplier that corrects a deviation.
-    pub(crate) fn lambda_against(self, deviation: f64) -> f64 {
+    /// The change of the base-2 logarithm of the Lagrange multiplier that corrects a log ratio.
+    pub(crate) fn lambda_against(self, log_ratio: f64) -> f64 {
         let rises = match self {
-            Self::Size(_) => deviation > 0.0,
-            Self::Psnr(_) | Self::Quality(_) => deviation < 0.0,
+            Self::Size(_) => log_ratio > 0.0,
+            Self::Psnr(_) | Self::Quality(_) => log_ratio < 0.0,
         };
-        -deviation / self.by_lambda(rises)
+        -log_ratio / self.by_lambda(rises)
     }
 
-    /// The change of the deviation when the Lagrange multiplier doubles: from the usual one if it rises above
+    /// The change of the log ratio when the Lagrange multiplier doubles: from the usual one if it rises above
     /// that, and up to the usual one otherwise. Errors change less below it, because a pass removes
     /// Gaussians but adds none.
     fn by_lambda(self, rises: bool) -> f64 {
@@ -193,23 +193,23 @@ mod tests {
     #[test]
     fn a_file_that_misses_by_0_meets_its_target() {
         let (size, psnr) = (FileAim::Size(5000), FileAim::Psnr(30.0));
-        for deviation in (-60..60).map(|step| f64::from(step) * 1e-3) {
-            let bytes = size.wanted() * deviation.exp2();
+        for log_ratio in (-60..60).map(|step| f64::from(step) * 1e-3) {
+            let bytes = size.wanted() * log_ratio.exp2();
             // A file that is a little too large is shortened.
-            if size.miss(deviation, 0.1) == 0.0 {
+            if size.violation(log_ratio, 0.1) == 0.0 {
                 assert!((SIZE_TOLERANCE * 5000.0..1.03 * 5000.0).contains(&bytes), "{bytes}");
             }
-            let reached = psnr.wanted() - deviation * 10.0 * 2_f64.log10();
-            if psnr.miss(deviation, 0.0) == 0.0 {
+            let reached = psnr.wanted() - log_ratio * 10.0 * 2_f64.log10();
+            if psnr.violation(log_ratio, 0.0) == 0.0 {
                 assert!((30.0..30.0 + PSNR_TOLERANCE).contains(&reached), "{reached}");
             }
         }
         // What shows is not removed.
-        assert!(size.miss(0.03, 0.01) > 0.0);
+        assert!(size.violation(0.03, 0.01) > 0.0);
         for aim in [size, psnr] {
-            assert_eq!(aim.miss(0.0, 0.0), 0.0);
-            assert!(aim.miss(-1.0, 0.0) > aim.miss(-0.5, 0.0));
-            assert!(aim.miss(0.5, 0.0) > aim.miss(-5.0, 0.0));
+            assert_eq!(aim.violation(0.0, 0.0), 0.0);
+            assert!(aim.violation(-1.0, 0.0) > aim.violation(-0.5, 0.0));
+            assert!(aim.violation(0.5, 0.0) > aim.violation(-5.0, 0.0));
         }
     }
 }

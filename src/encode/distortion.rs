@@ -5,8 +5,8 @@
 //! scales of s m^2, where s is the sensitivity on the scale. Blocks are whole: outside the picture,
 //! residuals are 0. The distortion is quadratic in the residuals.
 
-use super::raster::{TILE_WIDTH, TilePlane};
 use super::sensitivity::{BLOCK, SCALES, Sensitivity};
+use super::tiled_source::{TILE_WIDTH, TilePlane};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
 /// distortion by them, and returns the distortion. `size` is the number of columns and rows inside

@@ -10,11 +10,11 @@ use super::fit::{Fit, Work};
 use super::job::Job;
 use super::progress::Observer;
 use super::quality::Judge;
-use super::raster::Raster;
 use super::rate_model;
 use super::rdo::{Residuals, SearchWork, TargetSearch, Window};
 use super::strips;
-use crate::coding::entropy::{Code, LatticeCodes};
+use super::tiled_source::TiledSource;
+use crate::coding::entropy::{Code, QuantizedCodes};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
@@ -34,7 +34,7 @@ const FACTORS: (f64, f64) = (0.25, 4.0);
 /// Two fits tell p: it is low for noise, and high for smooth pictures.
 const POWERS: (f64, f64) = (0.4, 2.0);
 
-/// From this deviation from a quality on (see `aim.rs`; a point or two), the codes of a second
+/// From this log ratio from a quality on (see `aim.rs`; a point or two), the codes of a second
 /// fit are tried.
 const MISSED: f64 = 0.1;
 
@@ -49,8 +49,8 @@ pub(crate) fn least_length(
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<u64, EncodeError> {
-    let lattice = rate_model::lattice(0.0, layout.header().color);
-    let empty = LatticeCodes { lattice, codes: Vec::new() };
+    let quantization = rate_model::quantization(0.0, layout.header().color);
+    let empty = QuantizedCodes { quantization, codes: Vec::new() };
     Ok(layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64)
 }
 
@@ -60,7 +60,7 @@ pub(crate) fn finish(
     job: &Job<'_>,
     judge: &Judge<'_>,
     budget: Budget,
-    raster: &Raster,
+    tiled: &TiledSource,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(Vec<u8>, Work), EncodeError> {
@@ -76,9 +76,9 @@ pub(crate) fn finish(
         (fit.gaussians(), fit.best_error().distortion, fit.work());
     // Gaussians and their rendering; codes before a pass and after it, with what they are chosen by.
     let by_gaussian = 2 * size_of::<Gaussian>() + 3 * size_of::<Code>() + size_of::<[u64; 4]>();
-    let strip = strips::memory(job.source.width(), job.source.height(), raster.channels);
-    let residuals = raster.memory() + Residuals::memory(raster);
-    let window = Window::memory(raster, &gaussians);
+    let strip = strips::memory(job.source.width(), job.source.height(), tiled.channels);
+    let residuals = tiled.memory() + Residuals::memory(tiled);
+    let window = Window::memory(tiled, &gaussians);
     let of_other = too_good.as_ref().map_or(0, |fitted| size_of_val(&fitted.gaussians[..]));
     let memory = residuals + strip.max(window) + gaussians.len() * by_gaussian + of_other;
     work.peak_memory = work.peak_memory.max(memory);
@@ -86,13 +86,13 @@ pub(crate) fn finish(
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
-    let mut search = TargetSearch::new(judge, raster, layout, search_work, observer)?;
-    let (mut coded, deviation) = search.run(&gaussians, distortion, job.aim, observer)?;
-    if let Some(fitted) = too_good.filter(|_| deviation > MISSED) {
+    let mut search = TargetSearch::new(judge, tiled, layout, search_work, observer)?;
+    let (mut coded, log_ratio) = search.run(&gaussians, distortion, job.aim, observer)?;
+    if let Some(fitted) = too_good.filter(|_| log_ratio > MISSED) {
         observer.expect(SearchWork::new(job, fitted.gaussians.len()).whole());
-        let (other, deviation_of_other) =
+        let (other, log_ratio_of_other) =
             search.run(&fitted.gaussians, fitted.distortion, job.aim, observer)?;
-        if deviation_of_other < deviation {
+        if log_ratio_of_other < log_ratio {
             coded = other;
         }
     }

@@ -20,13 +20,13 @@ mod packed;
 mod pipeline;
 mod progress;
 mod quality;
-mod raster;
 mod rate_model;
 mod rdo;
 mod sensitivity;
 mod shortfall;
 mod source;
 mod strips;
+mod tiled_source;
 mod verify;
 mod workload;
 

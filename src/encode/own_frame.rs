@@ -10,7 +10,7 @@
 //! shears the Gaussian, too: the shear is the change of the slant, minus twice the slant times the change
 //! of the ratio.
 //!
-//! When the size of a Gaussian changes, its colour changes too, such that its strength, colour times the
+//! When the size of a Gaussian changes, its colour changes too, such that its norm, colour times the
 //! square root of the area l11 l22, and with it the sum of its squares, remains the same. Then the Hessian
 //! is diagonal: it mixes neither the directions of the geometry nor geometry and colour.
 
@@ -19,7 +19,7 @@ use core::ops::{Add, Mul, Sub};
 use crate::gaussian::Gaussian;
 
 /// The curvatures: half of the second derivatives of the squared error of one Gaussian, which are integrals
-/// of the squares of the quartic kernel's derivatives. Those by the geometry are for a strength of 1.
+/// of the squares of the quartic kernel's derivatives. Those by the geometry are for an energy of 1.
 ///
 /// By either coordinate of the centre: 2 pi / 3.
 pub(crate) const CENTER_CURVATURE: f32 = 2.094_395;
@@ -110,7 +110,7 @@ impl GeometryChange {
         }
     }
 
-    /// A Gaussian after this change, with the same strength.
+    /// A Gaussian after this change, with the same norm.
     pub(crate) fn applied(&self, gaussian: &Gaussian) -> Gaussian {
         let [l11, l21, l22] = gaussian.cholesky;
         let [u, v] = self.center;
@@ -124,9 +124,9 @@ impl GeometryChange {
     }
 
     /// The change of the squared error that the model predicts for a change of geometry; `self` is the
-    /// gradient. `slant` is the Gaussian's l21 / l22, and `squared_strength` the sum of its squared colours
+    /// gradient. `slant` is the Gaussian's l21 / l22, and `energy` the sum of its squared colours
     /// times its area.
-    pub(crate) fn error_change(&self, change: &Self, slant: f32, squared_strength: f32) -> f32 {
+    pub(crate) fn error_change(&self, change: &Self, slant: f32, energy: f32) -> f32 {
         let linear = self.center[0] * change.center[0]
             + self.center[1] * change.center[1]
             + self.size * change.size
@@ -138,14 +138,14 @@ impl GeometryChange {
             + SIZE_CURVATURE * change.size * change.size
             + RATIO_CURVATURE * change.ratio * change.ratio
             + SHEAR_CURVATURE * shear * shear;
-        linear + squared_strength * quadratic
+        linear + energy * quadratic
     }
 
     /// The change of geometry with the least error, where `self` is the gradient. Every component
     /// is clamped to `max_change`.
-    pub(crate) fn minimizer(&self, slant: f32, squared_strength: f32, max_change: f32) -> Self {
+    pub(crate) fn minimizer(&self, slant: f32, energy: f32, max_change: f32) -> Self {
         let component = |derivative: f32, curvature: f32| {
-            (-derivative / (2.0 * curvature * squared_strength)).clamp(-max_change, max_change)
+            (-derivative / (2.0 * curvature * energy)).clamp(-max_change, max_change)
         };
         let ratio = component(self.ratio + 2.0 * slant * self.slant, RATIO_CURVATURE);
         Self {
@@ -230,11 +230,11 @@ mod tests {
     fn curvatures_are_those_of_the_kernel() {
         let gaussian = gaussian();
         let [l11, l21, l22] = gaussian.cholesky;
-        let squared_strength = gaussian.color[0] * gaussian.color[0] * l11 * l22;
+        let energy = gaussian.color[0] * gaussian.color[0] * l11 * l22;
         let gradient = GeometryChange::default();
         for change in changes() {
             let expected = difference(&gaussian, &change.applied(&gaussian));
-            let found = f64::from(gradient.error_change(&change, l21 / l22, squared_strength));
+            let found = f64::from(gradient.error_change(&change, l21 / l22, energy));
             assert!((found / expected - 1.0).abs() < 0.05, "{change:?}: {found:e}, {expected:e}");
         }
     }

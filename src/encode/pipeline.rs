@@ -10,11 +10,11 @@ use super::options::Precision;
 use super::outcome::{LEAST_GAIN, Outcome};
 use super::progress::Observer;
 use super::quality::{self, Judge};
-use super::raster::Raster;
 use super::rate_model;
 use super::rdo::SearchWork;
 use super::sensitivity::Sensitivity;
 use super::shortfall::{Reached, Shortfall};
+use super::tiled_source::TiledSource;
 use super::verify::Verified;
 use super::{entropy, packed, verify};
 
@@ -140,12 +140,12 @@ fn encode_for_target(
     let Job { source, precision, training, .. } = *job;
     let preparation = job.workload(0).preparation();
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
-    let raster = Raster::new(source, job.tune, observer)?;
+    let tiled = TiledSource::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, raster.mean, kernel, parameterization, job.metadata);
+    let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata);
 
     let asked = job.aim;
-    let (aim, budget) = within_reach(job, &layout, &raster, observer)?;
+    let (aim, budget) = within_reach(job, &layout, &tiled, observer)?;
     let job = &Job { aim, ..*job };
     let budget = count.map_or(budget, Budget::Count);
     let expected = match budget {
@@ -155,22 +155,22 @@ fn encode_for_target(
     };
     observer.advance(preparation)?;
     observer.expect(work_from_training(job, expected));
-    let preparing = raster.memory() + raster.scratch_memory;
+    let preparing = tiled.memory() + tiled.scratch_memory;
     let peak_before = work.peak_memory.max(preparing);
     let work = Work { peak_memory: 0, ..work };
-    let mut fit = Fit::new(&raster, training, budget, precision, layout.base(), job.seed, work);
+    let mut fit = Fit::new(&tiled, training, budget, precision, layout.base(), job.seed, work);
     fit.run(job.workload(expected), observer)?;
     let is_lost_to_rounding = fit.is_lost_to_rounding();
 
     let (file, mut work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, judge, budget, &raster, &layout, observer),
+        Precision::Entropy => entropy::finish(fit, job, judge, budget, &tiled, &layout, observer),
         Precision::Packed | Precision::Float => {
             packed::finish(fit, job, judge, budget, &layout, observer)
         }
     }?;
 
     // The decoder needs memory, too.
-    drop(raster);
+    drop(tiled);
     let verified = Verified::within(&file, source, job.limits, observer)?;
     let gaussians = verified.gaussians();
     let workload = job.workload(gaussians as usize);
@@ -211,7 +211,7 @@ fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
 fn within_reach(
     job: &Job<'_>,
     layout: &FileLayout<'_>,
-    raster: &Raster,
+    tiled: &TiledSource,
     observer: &mut Observer<'_>,
 ) -> Result<(Aim, Budget), EncodeError> {
     let is_coded = job.precision == Precision::Entropy;
@@ -238,14 +238,14 @@ fn within_reach(
         }
         Aim::File(FileAim::Psnr(psnr)) => {
             let share = if is_coded { rate_model::SHARE_OF_FIT } else { 1.0 };
-            Budget::SquaredError(share * raster.error_of(psnr))
+            Budget::SquaredError(share * tiled.error_of(psnr))
         }
         Aim::File(FileAim::Quality(quality)) => {
-            let [fine, .., coarse] = match &raster.sensitivity {
+            let [fine, .., coarse] = match &tiled.sensitivity {
                 Some(sensitivity) => sensitivity.means,
                 None => Sensitivity::new(job.source, observer)?.means,
             };
-            Budget::Count(quality::count_for(quality, raster.pixels(), [fine, coarse]))
+            Budget::Count(quality::count_for(quality, tiled.pixels(), [fine, coarse]))
         }
     };
     Ok((job.aim, budget))

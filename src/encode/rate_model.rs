@@ -1,14 +1,14 @@
-//! The rate model of the entropy coding: what training, rounding to the lattice and the choice of
+//! The rate model of the entropy coding: what training, rounding to the quantization grid and the choice of
 //! codes assume about rate (bits) and distortion (squared error, where a full sample is 1, weighted
 //! by the eye's sensitivity if the encoder is tuned for it).
 //!
 //! All steps follow from one, the step of colour, which is proportional to the square root of the
-//! distortion per Gaussian. The *strength* of a Gaussian is the Euclidean length of its colour
-//! times the square root of its area l11 l22: the squared strength is proportional to the sum of
+//! distortion per Gaussian. The *norm* of a Gaussian is the Euclidean length of its colour
+//! times the square root of its area l11 l22: its square, the *energy*, is proportional to the sum of
 //! the squares that it adds to the picture.
 
 use super::options::Tune;
-use crate::coding::entropy::{Lattice, MAX_CLASS, MOST_CODE, to_axes};
+use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
@@ -28,7 +28,7 @@ const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
 /// little finer lowers the distortion by as much as lambda times the bits that it adds.
 pub(crate) const LAMBDA: f32 = 0.322;
 /// Steps of geometry whose quantization adds as much distortion as that of a step of colour, for a
-/// Gaussian of strength 1: from integrals of the quartic kernel's derivatives.
+/// Gaussian of norm 1: from integrals of the quartic kernel's derivatives.
 const POSITION_STEP: f32 = 1.095;
 const SIZE_STEP: f32 = 0.775;
 const RATIO_STEP: f32 = 0.866;
@@ -46,9 +46,9 @@ pub(crate) fn bits_per_gaussian(tune: Tune, component_bits: f64) -> f64 {
 }
 
 /// The bits that a component of a Gaussian is taken to cost: log2(1 + s^2) / 2, where s is the
-/// Gaussian's strength in steps of colour, because the steps of geometry get finer as it grows.
+/// Gaussian's norm in steps of colour, because the steps of geometry get finer as it grows.
 pub(crate) fn component_bits(gaussian: &Gaussian, color_step: f64) -> f64 {
-    0.5 * (1.0 + f64::from(gaussian.importance()) / (color_step * color_step)).log2()
+    0.5 * (1.0 + f64::from(gaussian.energy()) / (color_step * color_step)).log2()
 }
 
 /// The step of colour with this base-2 logarithm, in the range of steps.
@@ -64,13 +64,13 @@ pub(crate) fn step_for(distortion: f64, count: usize) -> f64 {
 
 /// The base-2 logarithm of the least step of colour with which all of these Gaussians have codes.
 pub(crate) fn least_step(gaussians: &[Gaussian], model: ColorModel) -> f64 {
-    let strength = |gaussian: &Gaussian| {
+    let norm = |gaussian: &Gaussian| {
         let [l11, _, l22] = gaussian.cholesky;
         let axes = to_axes(gaussian.color, model);
         axes.iter().fold(0.0, |most: f32, axis| most.max(axis.abs())) * (l11 * l22).sqrt()
     };
-    let strongest = gaussians.iter().map(strength).fold(0.0, f32::max);
-    f64::from(strongest / MOST_CODE).log2()
+    let largest = gaussians.iter().map(norm).fold(0.0, f32::max);
+    f64::from(largest / MOST_CODE).log2()
 }
 
 /// The base-2 logarithm of the step of colour for a Lagrange multiplier in squared error per bit,
@@ -84,29 +84,32 @@ pub(crate) fn distortion_per_gaussian(step: f64) -> f64 {
     (2.0 * step).exp2() / SQUARED_STEP
 }
 
-/// The lattice for a step of colour, given by its base-2 logarithm.
-pub(crate) fn lattice(step: f64, model: ColorModel) -> Lattice {
+/// The quantization grid for a step of colour, given by its base-2 logarithm.
+pub(crate) fn quantization(step: f64, model: ColorModel) -> Quantization {
     let step = color_step(step) as f32;
-    Lattice::new([POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP], vec![step; model.channels()])
+    Quantization::new(
+        [POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP],
+        vec![step; model.channels()],
+    )
 }
 
-/// The Lagrange multiplier lambda for a lattice: squared error per bit.
-pub(crate) fn lambda(lattice: &Lattice) -> f32 {
-    LAMBDA * lattice.color[0] * lattice.color[0]
+/// The Lagrange multiplier lambda for a quantization grid: squared error per bit.
+pub(crate) fn lambda(quantization: &Quantization) -> f32 {
+    LAMBDA * quantization.color[0] * quantization.color[0]
 }
 
-/// The precision class for a Gaussian where squared errors count `sensitivity` times: the base-2
-/// logarithm of its strength in steps of colour, rounded and clamped to 0 to [`MAX_CLASS`].
-pub(crate) fn class_of(
+/// The step exponent for a Gaussian where squared errors count `sensitivity` times: the base-2
+/// logarithm of its norm in steps of colour, rounded and clamped to 0 to [`MAX_EXPONENT`].
+pub(crate) fn step_exponent(
     gaussian: &Gaussian,
     sensitivity: f32,
-    lattice: &Lattice,
+    quantization: &Quantization,
     model: ColorModel,
 ) -> u32 {
     let [l11, _, l22] = gaussian.cholesky;
     let squared = to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
-    let steps = (squared * l11 * l22 * sensitivity).sqrt() / lattice.color[0];
-    steps.max(1.0).log2().round().min(MAX_CLASS as f32) as u32
+    let steps = (squared * l11 * l22 * sensitivity).sqrt() / quantization.color[0];
+    steps.max(1.0).log2().round().min(MAX_EXPONENT as f32) as u32
 }
 
 #[cfg(test)]
@@ -120,7 +123,7 @@ mod tests {
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
             component_bits(&gaussian, 2.0)
         };
-        // Strengths of 0, 1 and the root of 3 steps.
+        // Norms of 0, 1 and the root of 3 steps.
         for (color, expected) in [(0.0, 0.0), (1.0, 0.5), (3.0_f32.sqrt(), 1.0)] {
             assert!((bits(color) - expected).abs() < 1e-6, "{color}");
         }
@@ -132,13 +135,16 @@ mod tests {
     }
 
     #[test]
-    fn each_class_is_for_twice_the_strength() {
-        let lattice = lattice(0.0, ColorModel::Gray);
-        let class = |color: f32| {
+    fn each_exponent_is_for_twice_the_norm() {
+        let quantization = quantization(0.0, ColorModel::Gray);
+        let exponent = |color: f32| {
             let cholesky = [4.0, 1.0, 1.0];
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
-            class_of(&gaussian, 1.0, &lattice, ColorModel::Gray)
+            step_exponent(&gaussian, 1.0, &quantization, ColorModel::Gray)
         };
-        assert_eq!([0.0, 0.1, 0.5, 1.0, 2.0, 4.0, 1e6].map(class), [0, 0, 0, 1, 2, 3, MAX_CLASS]);
+        assert_eq!(
+            [0.0, 0.1, 0.5, 1.0, 2.0, 4.0, 1e6].map(exponent),
+            [0, 0, 0, 1, 2, 3, MAX_EXPONENT]
+        );
     }
 }

@@ -78,9 +78,9 @@ fn encode_info_decode_compare() {
     assert_eq!(sum + 8, bytes, "the chunks and the signature are the whole file");
     assert_eq!(info["coding"], "entropy");
     for step in ["position", "size", "ratio", "slant"] {
-        assert!(info["lattice_steps"][step].is_number(), "{step}: {info}");
+        assert!(info["quantization_steps"][step].is_number(), "{step}: {info}");
     }
-    assert_eq!(info["lattice_steps"]["color"].as_array().expect("an array").len(), 3);
+    assert_eq!(info["quantization_steps"]["color"].as_array().expect("an array").len(), 3);
     let bits = |info: &Value, names: &[&str]| -> f64 {
         let bits = &info["bits_per_gaussian"];
         names.iter().map(|&name| bits[name].as_f64().expect("a number")).sum()

@@ -10,8 +10,8 @@ pub(crate) type Steps = [f32];
 /// One Gaussian as it is coded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Code {
-    /// The precision class.
-    pub(crate) class: u32,
+    /// The step exponent.
+    pub(crate) exponent: u32,
     /// The colour axes, as many as channels.
     pub(crate) axes: Vec<i32>,
     /// By how much the size exceeds the one that is expected in its cell.
@@ -99,7 +99,7 @@ fn range_bits([low, high]: [u64; 2]) -> u32 {
 }
 
 /// The context of a colour axis after the first.
-fn axis_context(axis: usize, class: u32, before: i32) -> u32 {
+fn axis_context(axis: usize, exponent: u32, before: i32) -> u32 {
     let m = match before.unsigned_abs() {
         0 => 0,
         1 => 1,
@@ -107,22 +107,22 @@ fn axis_context(axis: usize, class: u32, before: i32) -> u32 {
         4..8 => 3,
         _ => 4,
     };
-    9 + 40 * (axis as u32 - 1) + 5 * class + m
+    9 + 40 * (axis as u32 - 1) + 5 * exponent + m
 }
 
-fn slant_context(class: u32, ratio: i32) -> u32 {
-    let q = if class <= 2 { ratio << (2 - class) } else { ratio >> (class - 2) };
+fn slant_context(exponent: u32, ratio: i32) -> u32 {
+    let q = if exponent <= 2 { ratio << (2 - exponent) } else { ratio >> (exponent - 2) };
     let j = (q.div_euclid(3) + 3).clamp(0, 6);
-    135 + 7 * class.min(2) + j as u32
+    135 + 7 * exponent.min(2) + j as u32
 }
 
-fn fine(class: u32) -> f32 {
-    1.0 / (1 << class) as f32
+fn fine(exponent: u32) -> f32 {
+    1.0 / (1 << exponent) as f32
 }
 
 /// How large a Gaussian is expected to be in a cell.
-fn expected_size(steps: &Steps, class: u32, level: u32) -> i32 {
-    ((0.1 + 0.19 * level as f32) / (steps[1] * fine(class))) as i32
+fn expected_size(steps: &Steps, exponent: u32, level: u32) -> i32 {
+    ((0.1 + 0.19 * level as f32) / (steps[1] * fine(exponent))) as i32
 }
 
 /// Section 7.5, without what depends on the position.
@@ -134,7 +134,7 @@ struct Shape {
 impl Shape {
     /// With the whole size of `code`.
     fn new(steps: &Steps, code: &Code, size: i32) -> Self {
-        let fine = fine(code.class);
+        let fine = fine(code.exponent);
         let e = |x: f32| exp(x.clamp(-20.0, 20.0));
         let s = e(size as f32 * (steps[1] * fine));
         let t = e(code.ratio as f32 * (steps[2] * fine));
@@ -144,10 +144,10 @@ impl Shape {
     }
 
     /// How many plain bits the position in this cell has along each axis.
-    fn position_bits(&self, steps: &Steps, class: u32, cell: &Cell) -> [u32; 2] {
+    fn position_bits(&self, steps: &Steps, exponent: u32, cell: &Cell) -> [u32; 2] {
         [0, 1].map(|axis| {
             let l = self.cholesky[2 * axis];
-            let d = ((steps[0] * fine(class)) * l) * core::f32::consts::SQRT_2;
+            let d = ((steps[0] * fine(exponent)) * l) * core::f32::consts::SQRT_2;
             let exponent = (d.to_bits() >> 23) as i32 - 127;
             // The position interval is 2^-f pixels.
             let f = (-exponent).min(6);
@@ -212,12 +212,12 @@ fn write_count(encoder: &mut Encoder, count: u32, first: u32) {
 }
 
 fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code) {
-    let class = code.class;
-    encoder.symbol(0, class);
-    let shift = class.saturating_sub(3);
+    let exponent = code.exponent;
+    encoder.symbol(0, exponent);
+    let shift = exponent.saturating_sub(3);
     let first = code.axes[0];
     let h = first.unsigned_abs() >> shift;
-    encoder.symbol(1 + class, h.min(15));
+    encoder.symbol(1 + exponent, h.min(15));
     if h >= 15 {
         encoder.excess(h as i32 - 15);
     }
@@ -226,17 +226,17 @@ fn write_code(encoder: &mut Encoder, steps: &Steps, cell: &Cell, code: &mut Code
         encoder.bits(1, u32::from(first < 0));
     }
     for axis in 1..code.axes.len() {
-        let context = axis_context(axis, class, code.axes[axis - 1]);
+        let context = axis_context(axis, exponent, code.axes[axis - 1]);
         let value = code.axes[axis];
         encoder.signed(context, shift, if first < 0 { -value } else { value });
     }
-    let (r, shift) = (class.min(2), class.saturating_sub(2));
+    let (r, shift) = (exponent.min(2), exponent.saturating_sub(2));
     encoder.signed(129 + r, shift, code.size);
     encoder.signed(132 + r, shift, code.ratio);
-    encoder.signed(slant_context(class, code.ratio), shift, code.slant);
+    encoder.signed(slant_context(exponent, code.ratio), shift, code.slant);
 
-    let size = code.size.wrapping_add(expected_size(steps, class, cell.level()));
-    let bits = Shape::new(steps, code, size).position_bits(steps, class, cell);
+    let size = code.size.wrapping_add(expected_size(steps, exponent, cell.level()));
+    let bits = Shape::new(steps, code, size).position_bits(steps, exponent, cell);
     for (axis, bits) in bits.into_iter().enumerate() {
         let part = part(cell, axis, bits);
         let corner = cell.corner[axis] * 128;
@@ -317,12 +317,12 @@ fn read_code(
     steps: &Steps,
     cell: &Cell,
 ) -> Result<(Code, Vec<f32>), Flaw> {
-    let class = decoder.symbol(0)?;
-    if class > 7 {
-        return Err("a class over 7");
+    let exponent = decoder.symbol(0)?;
+    if exponent > 7 {
+        return Err("an exponent over 7");
     }
-    let shift = class.saturating_sub(3);
-    let mut first = decoder.symbol(1 + class)? as i32;
+    let shift = exponent.saturating_sub(3);
+    let mut first = decoder.symbol(1 + exponent)? as i32;
     if first == 15 {
         first += decoder.excess()?;
     }
@@ -331,18 +331,18 @@ fn read_code(
     let signed = |value: i32| if negative { value.wrapping_neg() } else { value };
     let mut axes = vec![signed(first)];
     for axis in 1..steps.len() - 4 {
-        let context = axis_context(axis, class, axes[axis - 1]);
+        let context = axis_context(axis, exponent, axes[axis - 1]);
         axes.push(signed(decoder.signed(context, shift)?));
     }
-    let (r, shift) = (class.min(2), class.saturating_sub(2));
+    let (r, shift) = (exponent.min(2), exponent.saturating_sub(2));
     let size = decoder.signed(129 + r, shift)?;
     let ratio = decoder.signed(132 + r, shift)?;
-    let slant = decoder.signed(slant_context(class, ratio), shift)?;
-    let mut code = Code { class, axes, size, ratio, slant, center: [0; 2] };
+    let slant = decoder.signed(slant_context(exponent, ratio), shift)?;
+    let mut code = Code { exponent, axes, size, ratio, slant, center: [0; 2] };
 
-    let whole_size = size.wrapping_add(expected_size(steps, class, cell.level()));
+    let whole_size = size.wrapping_add(expected_size(steps, exponent, cell.level()));
     let shape = Shape::new(steps, &code, whole_size);
-    let bits = shape.position_bits(steps, class, cell);
+    let bits = shape.position_bits(steps, exponent, cell);
     for (axis, bits) in bits.into_iter().enumerate() {
         let part = part(cell, axis, bits);
         code.center[axis] = cell.corner[axis] * 128 + decoder.bits(bits)? * part + part / 2;

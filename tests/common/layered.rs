@@ -27,7 +27,7 @@ fn sample() -> File {
             let axes = vec![within(20), within(9), within(9)];
             let [size, ratio, slant] = [within(6), within(3), within(3)];
             let center = grid.units([x + random.range(0.0, 50.0), y + random.range(0.0, 50.0)]);
-            Code { class: 2, axes, size, ratio, slant, center }
+            Code { exponent: 2, axes, size, ratio, slant, center }
         };
         (0..IN_A_LAYER).map(&mut code).collect()
     };

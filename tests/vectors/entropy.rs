@@ -18,11 +18,11 @@ fn usual_steps(color: u8) -> Vec<f32> {
 const LEAST_STEP: f32 = 1.0 / 1_048_576.0;
 const MOST_STEP: f32 = 1024.0;
 
-/// A Gaussian of precision class 2 at a point of the picture, as large as its cell lets expect, not slanted.
+/// A Gaussian of step exponent 2 at a point of the picture, as large as its cell lets expect, not slanted.
 fn at(header: &Ghdr, point: [f32; 2], first: i32) -> Code {
     let mut axes = vec![0; header.channels()];
     axes[0] = first;
-    Code { class: 2, axes, center: Grid::new(header.sides()).units(point), ..Code::default() }
+    Code { exponent: 2, axes, center: Grid::new(header.sides()).units(point), ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the picture.
@@ -31,13 +31,13 @@ fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
     let grid = Grid::new(header.sides());
     let sides = [header.width as f32, header.height as f32];
     let one = |_| {
-        let class = 1 + (random.next() % 5) as u32;
+        let exponent = 1 + (random.next() % 5) as u32;
         let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
-        let (color, shape) = (6 << class.saturating_sub(3), 1 << class.saturating_sub(1));
+        let (color, shape) = (6 << exponent.saturating_sub(3), 1 << exponent.saturating_sub(1));
         let axes = (0..header.channels()).map(|_| within(color)).collect();
         let [size, ratio, slant] = [within(shape), within(shape), within(shape)];
         let center = grid.units(sides.map(|side| random.range(0.0, side)));
-        Code { class, axes, size, ratio, slant, center }
+        Code { exponent, axes, size, ratio, slant, center }
     };
     (0..count).map(one).collect()
 }
@@ -52,7 +52,7 @@ fn dense(count: usize) -> File {
     let header = header(GRAY, 24, 16);
     let mut steps = usual_steps(GRAY);
     steps[0] = MOST_STEP;
-    let code = Code { class: 1, ..at(&header, [4.0, 8.0], 0) };
+    let code = Code { exponent: 1, ..at(&header, [4.0, 8.0], 0) };
     File::of_entropy_coded(header, steps, vec![vec![code; count]])
 }
 
@@ -74,12 +74,12 @@ pub(super) fn valid() -> Vec<Vector> {
     let bounded = layers.clone().with(b"bNDS", &layers.bounds());
     let classes = {
         let header = header(RGBA, 32, 16);
-        let of_class = |class: u32| {
+        let with_exponent = |exponent: u32| {
             // One step of a symbol is this much. Codes beside its multiples need the plain bits, too.
-            let (color, shape) = (1 << class.saturating_sub(3), 1 << class.saturating_sub(2));
-            let base = at(&header, [4.0 * class as f32 + 1.5, 9.2], 5 * color + class as i32);
+            let (color, shape) = (1 << exponent.saturating_sub(3), 1 << exponent.saturating_sub(2));
+            let base = at(&header, [4.0 * exponent as f32 + 1.5, 9.2], 5 * color + exponent as i32);
             let axes = vec![base.axes[0], 2 * color + 1, -3 * color - 1, 4 * color];
-            let more = Code { class, axes, size: shape + 1, ..base };
+            let more = Code { exponent, axes, size: shape + 1, ..base };
             let less = Code {
                 axes: more.axes.iter().map(|axis| -axis / 2).collect(),
                 size: -shape - 1,
@@ -90,13 +90,13 @@ pub(super) fn valid() -> Vec<Vector> {
             };
             [more, less]
         };
-        usual(header, (0..8).flat_map(of_class).collect())
+        usual(header, (0..8).flat_map(with_exponent).collect())
     };
     let excess = {
         let header = header(RGB, 24, 16);
-        let code = |n: u32, class: u32, axes: [i32; 3], [size, ratio, slant]: [i32; 3]| Code {
+        let code = |n: u32, exponent: u32, axes: [i32; 3], [size, ratio, slant]: [i32; 3]| Code {
             axes: axes.to_vec(),
-            class,
+            exponent,
             size,
             ratio,
             slant,
@@ -116,8 +116,8 @@ pub(super) fn valid() -> Vec<Vector> {
     let crowd = {
         let point = [9.3, 7.7];
         let mut codes: Vec<Code> = (-4..5).map(|first| at(&gray, point, first)).collect();
-        // Their precision classes differ, and so do their position intervals.
-        codes.iter_mut().zip(0..).for_each(|(code, class)| code.class = class % 8);
+        // Their step exponents differ, and so do their position intervals.
+        codes.iter_mut().zip(0..).for_each(|(code, exponent)| code.exponent = exponent % 8);
         codes.push(at(&gray, [9.3, 8.2], 3));
         usual(gray, codes)
     };
@@ -129,7 +129,7 @@ pub(super) fn valid() -> Vec<Vector> {
             let left = random.next() & 1 == 1;
             let x = if left { random.range(0.0, 8.0) } else { random.range(8.0, 64.0) };
             let first = (random.next() % 3) as i32 - 1;
-            Code { class: 1, ..at(&header, [x, random.range(0.0, 48.0)], first) }
+            Code { exponent: 1, ..at(&header, [x, random.range(0.0, 48.0)], first) }
         });
         usual(header, codes.collect())
     };
@@ -164,19 +164,19 @@ pub(super) fn valid() -> Vec<Vector> {
             Code { size: 60, ratio: -40, ..sound(8.0) },
             Code { size: -36, ratio: 40, ..sound(11.0) },
             Code { size: 80, slant: 65_542, ..sound(14.0) },
-            Code { size: -30, axes: vec![65_549], class: 0, ..sound(17.0) },
+            Code { size: -30, axes: vec![65_549], exponent: 0, ..sound(17.0) },
             sound(20.0),
         ];
         usual(gray, codes)
     };
     let least = {
         let sides = header(RGB, 24, 16);
-        let large = |x: f32, class: u32, axes: [i32; 3], size: i32| Code {
-            class,
+        let large = |x: f32, exponent: u32, axes: [i32; 3], size: i32| Code {
+            exponent,
             axes: axes.to_vec(),
             size,
-            ratio: 65_000 << class.saturating_sub(2),
-            slant: -30_000 << class.saturating_sub(2),
+            ratio: 65_000 << exponent.saturating_sub(2),
+            slant: -30_000 << exponent.saturating_sub(2),
             ..at(&sides, [x, 8.0], 0)
         };
         let codes = vec![
@@ -188,8 +188,8 @@ pub(super) fn valid() -> Vec<Vector> {
     };
     let most = {
         let sides = header(RGB, 24, 16);
-        let one = |x: f32, class: u32, ratio: i32| Code {
-            class,
+        let one = |x: f32, exponent: u32, ratio: i32| Code {
+            exponent,
             axes: vec![1, 0, -1],
             ratio,
             ..at(&sides, [x, 8.0], 0)
@@ -268,8 +268,8 @@ pub(super) fn valid() -> Vec<Vector> {
             Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
         ]),
         Vector::valid(
-            "entropy-classes",
-            "entropy coding: all precision classes; the higher ones have plain bits below their symbols",
+            "entropy-exponents",
+            "entropy coding: all step exponents; the higher ones have plain bits below their symbols",
             classes,
         ),
         Vector::valid(
@@ -422,16 +422,16 @@ pub(super) fn invalid() -> Vec<Vector> {
             dense(217).bytes()
         }),
         refused(
-            "xentropy-class-8",
-            "entropy coding: precision class 8",
+            "xentropy-exponent-8",
+            "entropy coding: step exponent 8",
             &with_symbol(&|context| context == 0, 8),
-            "a class over 7",
+            "an exponent over 7",
         ),
         refused(
-            "xentropy-class-15",
-            "entropy coding: precision class 15",
+            "xentropy-exponent-15",
+            "entropy coding: step exponent 15",
             &with_symbol(&|context| context == 0, 15),
-            "a class over 7",
+            "an exponent over 7",
         ),
         refused(
             "xentropy-few",

@@ -99,10 +99,10 @@ function attributes({ attributeBits }, arrived) {
   );
 }
 
-function steps({ latticeSteps }) {
-  if (!latticeSteps) return null;
+function steps({ quantizationSteps }) {
+  if (!quantizationSteps) return null;
   const number = (value) => value.toPrecision(3);
-  const { position, size, ratio, slant, color } = latticeSteps;
+  const { position, size, ratio, slant, color } = quantizationSteps;
   return element('details', {}, element('summary', {}, 'Quantization steps'), facts([
     ['Position', number(position)],
     ['Size', number(size)],

@@ -128,7 +128,7 @@ export interface Statistics {
   /** The bits of all Gaussians by attribute; `null` without the option `statistics`. */
   attributeBits: { position: number; precision: number; shape: number; color: number } | null;
   /** The quantization steps of the entropy coding; `null` with the packed coding. */
-  latticeSteps: {
+  quantizationSteps: {
     position: number;
     size: number;
     ratio: number;

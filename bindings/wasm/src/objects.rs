@@ -1,7 +1,7 @@
 //! Header, metadata and statistics as plain objects, which can be sent between threads.
 
 use image_gip::{
-    Coding, ColorModel, Header, Kernel, LatticeSteps, Metadata, Parameterization, StreamDecoder,
+    Coding, ColorModel, Header, Kernel, QuantizationSteps, Metadata, Parameterization, StreamDecoder,
 };
 use js_sys::{Array, Float64Array, Object, Reflect, Uint8Array};
 use wasm_bindgen::prelude::*;
@@ -84,7 +84,7 @@ pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
 }
 
 /// The chunks that are complete, the layers, the bits of each attribute, and the steps of the
-/// lattice.
+/// quantization grid.
 pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -> JsValue {
     let chunks: Array = (stream.chunks().iter())
         .map(|chunk| {
@@ -108,8 +108,8 @@ pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -
             ("color", bits.color.into()),
         ])
     });
-    let steps = stream.lattice_steps().map_or(JsValue::NULL, |steps| {
-        let LatticeSteps { position, size, ratio, slant, color, .. } = steps;
+    let steps = stream.quantization_steps().map_or(JsValue::NULL, |steps| {
+        let QuantizationSteps { position, size, ratio, slant, color, .. } = steps;
         let color: Vec<f64> = color.into_iter().map(f64::from).collect();
         object([
             ("position", position.into()),
@@ -123,6 +123,6 @@ pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -
         ("chunks", chunks.into()),
         ("layers", layers.into()),
         ("attributeBits", bits),
-        ("latticeSteps", steps),
+        ("quantizationSteps", steps),
     ])
 }

@@ -68,7 +68,7 @@ test('header, metadata and statistics', () => {
   assert.equal(end.end + 12, bytes.length, 'all but the last chunk');
   assert.equal(statistics.chunks.reduce((sum, chunk) => sum + chunk.bytes, 8), bytes.length);
   assert.deepEqual(statistics.attributeBits, { position: 448, precision: 0, shape: 672, color: 672 });
-  assert.equal(statistics.latticeSteps, null);
+  assert.equal(statistics.quantizationSteps, null);
   decoder.close();
 });
 

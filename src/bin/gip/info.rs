@@ -50,7 +50,7 @@ struct FileInfo {
     /// Of the packed coding; empty with the entropy coding.
     components: Vec<Component>,
     /// Of the entropy coding; `None` with the packed coding.
-    lattice_steps: Option<StepSizes>,
+    quantization_steps: Option<StepSizes>,
     metadata: MetadataSizes,
 }
 
@@ -96,9 +96,9 @@ struct StepSizes {
     color: Vec<f32>,
 }
 
-impl From<image_gip::LatticeSteps> for StepSizes {
-    fn from(steps: image_gip::LatticeSteps) -> Self {
-        let image_gip::LatticeSteps { position, size, ratio, slant, color, .. } = steps;
+impl From<image_gip::QuantizationSteps> for StepSizes {
+    fn from(steps: image_gip::QuantizationSteps) -> Self {
+        let image_gip::QuantizationSteps { position, size, ratio, slant, color, .. } = steps;
         Self { position, size, ratio, slant, color }
     }
 }
@@ -182,7 +182,7 @@ impl FileInfo {
                 .collect(),
             bits_per_gaussian,
             components,
-            lattice_steps: stream.lattice_steps().map(StepSizes::from),
+            quantization_steps: stream.quantization_steps().map(StepSizes::from),
             metadata: MetadataSizes {
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
@@ -266,7 +266,7 @@ impl Display for FileInfo {
         if let Some(coded) = bits.coded {
             row("  with framing", &format_args!("{coded:.2}"))?;
         }
-        if let Some(StepSizes { position, size, ratio, slant, color }) = &self.lattice_steps {
+        if let Some(StepSizes { position, size, ratio, slant, color }) = &self.quantization_steps {
             row(
                 "  steps",
                 &format_args!(

@@ -3,13 +3,13 @@
 //! As everywhere in this coding, the same functions encode and decode. Only an encoder uses the
 //! codes that are `known`.
 
-use super::contexts::{self, CLASSES, MAGNITUDES, RATIOS, SHAPE_CLASSES};
-use super::lattice::{Code, Lattice, MAX_CLASS, class_scale};
+use super::contexts::{self, EXPONENTS, MAGNITUDES, RATIOS, SHAPE_EXPONENTS};
 use super::numbers::{ESCAPE, excess, plain, signed};
+use super::quantization::{Code, MAX_EXPONENT, Quantization, step_scale};
 use super::rans::{Attribute, SymbolCoder};
 
-/// The last precision class whose colours are coded without plain bits.
-const COLOR_CLASS: u32 = 3;
+/// The last step exponent whose colours are coded without plain bits.
+const COLOR_EXPONENT: u32 = 3;
 /// The expected logarithm of a Gaussian's size, from the level of its cell: in a cell of one pixel,
 /// and what each doubling of the cell's area adds.
 const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
@@ -18,51 +18,51 @@ const EXPECTED_SIZE: [f32; 2] = [0.1, 0.19];
 #[inline(always)]
 pub(super) fn attributes(
     coder: &mut impl SymbolCoder,
-    lattice: &Lattice,
+    quantization: &Quantization,
     channels: usize,
     level: u32,
     known: Code,
 ) -> Code {
-    let class = precision(coder, known.class);
+    let exponent = precision(coder, known.exponent);
     coder.begin(Attribute::Color);
-    let color = color(coder, channels, class as usize, known.color);
+    let color = color(coder, channels, exponent as usize, known.color);
     coder.begin(Attribute::Shape);
     let [size, ratio, slant] =
-        shape(coder, lattice, level, class, [known.size, known.ratio, known.slant]);
-    Code { class, color, size, ratio, slant, center: known.center }
+        shape(coder, quantization, level, exponent, [known.size, known.ratio, known.slant]);
+    Code { exponent, color, size, ratio, slant, center: known.center }
 }
 
-/// Codes the precision class.
+/// Codes the step exponent.
 #[inline(always)]
 pub(super) fn precision(coder: &mut impl SymbolCoder, known: u32) -> u32 {
     coder.begin(Attribute::Precision);
-    let class = coder.symbol(contexts::CLASS, known);
-    if class > MAX_CLASS {
+    let exponent = coder.symbol(contexts::EXPONENT, known);
+    if exponent > MAX_EXPONENT {
         coder.refuse();
-        return MAX_CLASS;
+        return MAX_EXPONENT;
     }
-    class
+    exponent
 }
 
-/// Codes size, ratio and slant for a precision class.
+/// Codes size, ratio and slant for a step exponent.
 #[inline(always)]
 pub(super) fn shape(
     coder: &mut impl SymbolCoder,
-    lattice: &Lattice,
+    quantization: &Quantization,
     level: u32,
-    class: u32,
+    exponent: u32,
     [size, ratio, slant]: [i32; 3],
 ) -> [i32; 3] {
-    let shift = class.saturating_sub(SHAPE_CLASSES as u32 - 1);
-    let rank = (class as usize).min(SHAPE_CLASSES - 1);
-    let step = lattice.size.step() * class_scale(class);
+    let shift = exponent.saturating_sub(SHAPE_EXPONENTS as u32 - 1);
+    let rank = (exponent as usize).min(SHAPE_EXPONENTS - 1);
+    let step = quantization.size.step() * step_scale(exponent);
     let expected = EXPECTED_SIZE[0] + EXPECTED_SIZE[1] * level as f32;
     let expected = (expected / step) as i32;
     let size = size.wrapping_sub(expected);
     let size = signed(coder, contexts::SIZE + rank, shift, size).wrapping_add(expected);
     let ratio = signed(coder, contexts::RATIO + rank, shift, ratio);
-    // In steps of class 2, whatever the class.
-    let coarse = if class < 2 { ratio << (2 - class) } else { ratio >> shift };
+    // In steps of exponent 2, whatever it is.
+    let coarse = if exponent < 2 { ratio << (2 - exponent) } else { ratio >> shift };
     let range = (coarse.div_euclid(3) + RATIOS as i32 / 2).clamp(0, RATIOS as i32 - 1);
     let context = contexts::SLANT + rank * RATIOS + range as usize;
     [size, ratio, signed(coder, context, shift, slant)]
@@ -74,13 +74,13 @@ pub(super) fn shape(
 pub(super) fn color(
     coder: &mut impl SymbolCoder,
     channels: usize,
-    class: usize,
+    exponent: usize,
     known: [i32; 4],
 ) -> [i32; 4] {
-    let shift = (class as u32).saturating_sub(COLOR_CLASS);
+    let shift = (exponent as u32).saturating_sub(COLOR_EXPONENT);
     let mut color = [0; 4];
     let first = known[0].unsigned_abs();
-    let symbol = coder.symbol(contexts::FIRST_AXIS + class, (first >> shift).min(ESCAPE));
+    let symbol = coder.symbol(contexts::FIRST_AXIS + exponent, (first >> shift).min(ESCAPE));
     let mut high = symbol;
     if symbol == ESCAPE {
         high += excess(coder, (first >> shift).wrapping_sub(ESCAPE));
@@ -91,7 +91,8 @@ pub(super) fn color(
     color[0] = sign * magnitude;
     for axis in 1..channels {
         let range = magnitude_range(color[axis - 1]);
-        let context = contexts::OTHER_AXES + ((axis - 1) * CLASSES + class) * MAGNITUDES + range;
+        let context =
+            contexts::OTHER_AXES + ((axis - 1) * EXPONENTS + exponent) * MAGNITUDES + range;
         color[axis] = sign * signed(coder, context, shift, sign * known[axis]);
     }
     color

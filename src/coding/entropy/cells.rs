@@ -1,4 +1,4 @@
-//! The grid of roots and the tree of cells, in which centres are coded (spec, section 7.4).
+//! The grid of roots and the k-d tree of cells, in which centres are coded (spec, section 7.4).
 
 /// Coordinates are in units of 1/128 pixel, counted from the corner of the grid.
 const UNITS_PER_PIXEL: u32 = 128;

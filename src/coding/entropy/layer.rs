@@ -1,5 +1,5 @@
 //! A layer of the entropy coding: the number of its Gaussians, then the Gaussians in the order of a
-//! tree of cells (spec, section 7.4).
+//! k-d tree of cells (spec, section 7.4).
 
 use core::ops::Range;
 
@@ -11,8 +11,8 @@ use fearless_simd::{Level, Simd};
 
 use super::attributes;
 use super::cells::{Cell, CenterGrid};
-use super::lattice::{Code, Lattice, Shape};
 use super::numbers::plain;
+use super::quantization::{Code, Quantization, Shape};
 use super::rans::{Attribute, RansDecoder, SymbolCoder};
 #[cfg(feature = "encode")]
 use super::rans::{CostCounter, Model, RansEncoder, SymbolCosts};
@@ -48,16 +48,16 @@ pub(crate) struct EncodedLayer {
 /// Reads and writes layers, and computes the cost of Gaussians in them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerCoder<'a> {
-    pub(crate) lattice: &'a Lattice,
+    pub(crate) quantization: &'a Quantization,
     pub(crate) grid: CenterGrid,
     pub(crate) channels: usize,
 }
 
 impl<'a> LayerCoder<'a> {
     /// For the layers of a file with this header.
-    pub(crate) fn new(lattice: &'a Lattice, header: &Header) -> Self {
+    pub(crate) fn new(quantization: &'a Quantization, header: &Header) -> Self {
         let grid = CenterGrid::new(header.width, header.height);
-        Self { lattice, grid, channels: header.color.channels() }
+        Self { quantization, grid, channels: header.color.channels() }
     }
 
     /// Splits the payload of a layer into the number of its Gaussians, which is 1 to `allowed`, and
@@ -190,10 +190,10 @@ impl<'a> LayerCoder<'a> {
         costs: &SymbolCosts,
     ) -> f32 {
         let mut cost = CostCounter { costs, bits: 0.0 };
-        attributes::precision(&mut cost, code.class);
+        attributes::precision(&mut cost, code.exponent);
         let values = [code.size, code.ratio, code.slant];
-        attributes::shape(&mut cost, self.lattice, level, code.class, values);
-        let fraction_bits = self.lattice.fraction_bits(code.class, shape);
+        attributes::shape(&mut cost, self.quantization, level, code.exponent, values);
+        let fraction_bits = self.quantization.fraction_bits(code.exponent, shape);
         // Cells are square, or twice as high as wide.
         let sides = [level / 2, level.div_ceil(2)].map(|side| side as i32);
         let bits = sides.iter().zip(fraction_bits).map(|(&side, bits)| (side + bits).max(0));
@@ -204,7 +204,7 @@ impl<'a> LayerCoder<'a> {
     #[cfg(feature = "encode")]
     pub(crate) fn color_cost(&self, code: &Code, costs: &SymbolCosts) -> f32 {
         let mut cost = CostCounter { costs, bits: 0.0 };
-        attributes::color(&mut cost, self.channels, code.class as usize, code.color);
+        attributes::color(&mut cost, self.channels, code.exponent as usize, code.color);
         cost.bits
     }
 
@@ -212,8 +212,8 @@ impl<'a> LayerCoder<'a> {
     #[inline(always)]
     fn gaussian(&self, coder: &mut impl SymbolCoder, cell: &Cell, known: Code) -> (Code, Shape) {
         let mut code = self.attributes(coder, cell.level, known);
-        let shape = self.lattice.shape(&code);
-        let fraction_bits = self.lattice.fraction_bits(code.class, &shape);
+        let shape = self.quantization.shape(&code);
+        let fraction_bits = self.quantization.fraction_bits(code.exponent, &shape);
         coder.begin(Attribute::Position);
         let bits = cell.position_bits(fraction_bits);
         code.center = core::array::from_fn(|axis| {
@@ -226,7 +226,7 @@ impl<'a> LayerCoder<'a> {
 
     #[inline(always)]
     fn attributes(&self, coder: &mut impl SymbolCoder, level: u32, known: Code) -> Code {
-        attributes::attributes(coder, self.lattice, self.channels, level, known)
+        attributes::attributes(coder, self.quantization, self.channels, level, known)
     }
 }
 
@@ -303,7 +303,7 @@ fn partition(codes: &mut [Code], axis: usize, middle: u32, scratch: &mut Vec<Cod
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::*;
-    use crate::coding::entropy::lattice::MAX_CLASS;
+    use crate::coding::entropy::quantization::MAX_EXPONENT;
     use crate::testing::config;
     use proptest::prelude::*;
 
@@ -311,22 +311,26 @@ mod tests {
         let value = prop_oneof![-3_i32..3, -40_i32..40, -60_000_i32..60_000];
         let geometry = [value.clone(), value.clone(), value.clone()];
         let center = [0_u32..98_304, 0_u32..65_536];
-        let code = (0..=MAX_CLASS, prop::collection::vec(value, channels), geometry, center);
-        let code = code.prop_map(|(class, axes, [size, ratio, slant], center)| {
+        let code = (0..=MAX_EXPONENT, prop::collection::vec(value, channels), geometry, center);
+        let code = code.prop_map(|(exponent, axes, [size, ratio, slant], center)| {
             let mut color = [0; 4];
             color[..axes.len()].copy_from_slice(&axes);
-            Code { class, color, size, ratio, slant, center }
+            Code { exponent, color, size, ratio, slant, center }
         });
         prop::collection::vec(code, 1..80)
     }
 
-    fn lattice(channels: usize) -> Lattice {
+    fn quantization(channels: usize) -> Quantization {
         let color = vec![0.1; channels];
-        Lattice::new([1.25, 0.66, 0.9, 1.9], color)
+        Quantization::new([1.25, 0.66, 0.9, 1.9], color)
     }
 
-    fn coder(lattice: &Lattice) -> LayerCoder<'_> {
-        LayerCoder { lattice, grid: CenterGrid::new(700, 400), channels: lattice.color.len() }
+    fn coder(quantization: &Quantization) -> LayerCoder<'_> {
+        LayerCoder {
+            quantization,
+            grid: CenterGrid::new(700, 400),
+            channels: quantization.color.len(),
+        }
     }
 
     proptest! {
@@ -336,14 +340,14 @@ mod tests {
         fn what_is_written_is_read(
             (channels, mut codes) in (1_usize..=4).prop_flat_map(|n| (Just(n), codes(n))),
         ) {
-            let lattice = lattice(channels);
-            let coder = coder(&lattice);
+            let quantization = quantization(channels);
+            let coder = coder(&quantization);
             let sent = codes.clone();
             let EncodedLayer { payload, levels, .. } = coder.write(&mut codes);
             prop_assert_eq!(levels.len(), codes.len());
             // Centres move within their position intervals, all else stays.
             let sorted = |codes: &[Code]| {
-                let key = |c: &Code| (c.class, c.color, c.size, c.ratio, c.slant);
+                let key = |c: &Code| (c.exponent, c.color, c.size, c.ratio, c.slant);
                 let mut keys: Vec<_> = codes.iter().map(key).collect();
                 keys.sort_unstable();
                 keys
@@ -360,8 +364,8 @@ mod tests {
 
         #[test]
         fn a_cut_follows_the_order_of_the_file(mut codes in codes(3), share in 0.0..=1.0) {
-            let lattice = lattice(3);
-            let coder = coder(&lattice);
+            let quantization = quantization(3);
+            let coder = coder(&quantization);
             coder.write(&mut codes);
             let first = (share * codes.len() as f64) as usize;
             // Gaussians in the same pixel have no order.
@@ -383,8 +387,8 @@ mod tests {
             bytes in prop::collection::vec(any::<u8>(), 0..400),
             count in prop_oneof![0_u32..2000, any::<u32>()],
         ) {
-            let lattice = lattice(3);
-            let coder = coder(&lattice);
+            let quantization = quantization(3);
+            let coder = coder(&quantization);
             let payload = [&count.to_le_bytes(), &bytes[..]].concat();
             let counted = LayerCoder::read_count(&payload, 1000);
             let is_allowed = (1..=1000).contains(&count) && count as usize <= 4 * bytes.len();
@@ -397,7 +401,7 @@ mod tests {
                 prop_assert_eq!(codes.len(), declared);
                 let sides = coder.grid.whole().sides;
                 for code in &codes {
-                    prop_assert!(code.class <= MAX_CLASS, "{:?}", code);
+                    prop_assert!(code.exponent <= MAX_EXPONENT, "{:?}", code);
                     prop_assert!((0..2).all(|axis| code.center[axis] < sides[axis]), "{:?}", code);
                 }
                 // A state and whole words.

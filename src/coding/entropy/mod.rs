@@ -6,9 +6,9 @@ mod cells;
 mod contexts;
 #[cfg(all(fuzzing, feature = "encode"))]
 pub mod fuzzing;
-mod lattice;
 mod layer;
 mod numbers;
+mod quantization;
 mod rans;
 mod statistics;
 mod symbol;
@@ -19,13 +19,13 @@ mod tree_walk;
 
 #[cfg(feature = "encode")]
 pub(crate) use cells::CenterGrid;
-pub(crate) use lattice::Lattice;
-pub use lattice::LatticeSteps;
-#[cfg(feature = "encode")]
-pub(crate) use lattice::{Code, LatticeCodes, MAX_CLASS, MOST_CODE, to_axes};
 #[cfg(feature = "encode")]
 pub(crate) use layer::EncodedLayer;
 pub(crate) use layer::{LAYER_PREFIX, LayerCoder};
+pub(crate) use quantization::Quantization;
+pub use quantization::QuantizationSteps;
+#[cfg(feature = "encode")]
+pub(crate) use quantization::{Code, MAX_EXPONENT, MOST_CODE, QuantizedCodes, to_axes};
 #[cfg(feature = "encode")]
 pub(crate) use rans::SymbolCosts;
 pub use statistics::AttributeBits;

@@ -9,9 +9,9 @@ use super::rans::{Attribute, RansDecoder, SymbolCoder};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct AttributeBits {
-    /// Bits of the centres, the tree of cells included.
+    /// Bits of the centres, the k-d tree of cells included.
     pub position: f64,
-    /// Bits of the precision classes; 0 with [`Coding::Packed`](crate::Coding).
+    /// Bits of the step exponents; 0 with [`Coding::Packed`](crate::Coding).
     pub precision: f64,
     /// Bits of the covariances.
     pub shape: f64,

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::contexts;
-use super::lattice::Lattice;
 use super::layer::LayerCoder;
+use super::quantization::Quantization;
 use super::rans::{Model, RansDecoder, SymbolCoder};
 use super::symbol::SYMBOLS;
 use super::tables;
@@ -73,8 +73,8 @@ fn counts(file: &[u8]) -> SymbolCounts {
     let header = Header::parse(of(b"GHDR").next().expect("a header").1).expect("a valid header");
     let channels = header.color.channels();
     let steps = of(b"QNTZ").next().expect("steps").1;
-    let lattice = Lattice::parse(steps, channels).expect("valid steps");
-    let coder = LayerCoder::new(&lattice, &header);
+    let quantization = Quantization::parse(steps, channels).expect("valid steps");
+    let coder = LayerCoder::new(&quantization, &header);
     let mut counts = vec![[0.0; SYMBOLS]; contexts::COUNT];
     for (_, payload) in of(b"GAUS") {
         let mut models = tables::initial_models();

@@ -1,4 +1,4 @@
-//! The walk over the tree of cells, in the order of the file (spec, section 7.4).
+//! The walk over the k-d tree of cells, in the order of the file (spec, section 7.4).
 
 use core::ops::Range;
 

@@ -75,8 +75,8 @@ pub(super) fn bounds_payload(
     let work = WORK_OF_BOUNDS * codes.len() as f64 / layers.len() as f64;
     let bounds = observer.map(work, layers_of_codes, |codes| {
         let gaussians = codes.iter().map(|code| {
-            let shape = coder.lattice.shape(code);
-            coder.lattice.gaussian(code, &shape, &coder.grid, header.color)
+            let shape = coder.quantization.shape(code);
+            coder.quantization.gaussian(code, &shape, &coder.grid, header.color)
         });
         LayerBounds::of(gaussians, header).to_entry()
     })?;
@@ -93,7 +93,7 @@ fn divide<'a>(
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
     observer.poll()?;
-    codes.par_sort_by_key(|code| core::cmp::Reverse(code.strength()));
+    codes.par_sort_by_key(|code| core::cmp::Reverse(code.energy()));
     observer.poll()?;
     let mut parts = Vec::new();
     let mut rest = codes;
@@ -144,8 +144,12 @@ mod tests {
 
     #[test]
     fn about_half_of_the_gaussians_are_in_the_largest_layer_but_not_too_many() {
-        let lattice = rate_model::lattice(0.0, ColorModel::Rgb);
-        let coder = LayerCoder { lattice: &lattice, grid: CenterGrid::new(640, 480), channels: 3 };
+        let quantization = rate_model::quantization(0.0, ColorModel::Rgb);
+        let coder = LayerCoder {
+            quantization: &quantization,
+            grid: CenterGrid::new(640, 480),
+            channels: 3,
+        };
         for (count, largest, number) in [
             (0, 0, 0),
             (249, 249, 1),

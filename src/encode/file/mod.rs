@@ -8,7 +8,7 @@ use super::error::{EncodeError, OptionError};
 use super::progress::Observer;
 use super::source::Source;
 use crate::chunk::{ChunkType, FRAMING};
-use crate::coding::entropy::{Code, EncodedLayer, Lattice, LatticeCodes, LayerCoder};
+use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
 use crate::coding::packed::PackedCodes;
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
@@ -18,7 +18,7 @@ use crate::kernel::Kernel;
 /// make.
 #[derive(Debug)]
 pub(crate) struct CodedLayers {
-    pub(crate) lattice: Lattice,
+    pub(crate) quantization: Quantization,
     pub(crate) codes: Vec<Code>,
     pub(crate) layers: Vec<EncodedLayer>,
 }
@@ -93,12 +93,12 @@ impl<'a> FileLayout<'a> {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn coded(
         &self,
-        LatticeCodes { lattice, mut codes }: LatticeCodes,
+        QuantizedCodes { quantization, mut codes }: QuantizedCodes,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers, EncodeError> {
-        let coder = LayerCoder::new(&lattice, &self.header);
+        let coder = LayerCoder::new(&quantization, &self.header);
         let layers = layers::write_entropy_layers(&coder, &mut codes, observer)?;
-        Ok(CodedLayers { lattice, codes, layers })
+        Ok(CodedLayers { quantization, codes, layers })
     }
 
     /// A file with the entropy coding.
@@ -110,17 +110,17 @@ impl<'a> FileLayout<'a> {
         coded: &CodedLayers,
         observer: &mut Observer<'_>,
     ) -> Result<Vec<u8>, EncodeError> {
-        let CodedLayers { lattice, codes, layers } = coded;
+        let CodedLayers { quantization, codes, layers } = coded;
         let header = Header {
             coding: Coding::Entropy,
             parameterization: Parameterization::Cholesky,
             gaussians: codes.len() as u32,
             ..self.header.clone()
         };
-        let coder = LayerCoder::new(lattice, &header);
+        let coder = LayerCoder::new(quantization, &header);
         let bounds = layers::bounds_payload(&coder, codes, layers, &header, observer)?;
         let payloads = layers.iter().map(|layer| &layer.payload[..]);
-        Ok(self.write(&header, &lattice.to_payload(), bounds, payloads))
+        Ok(self.write(&header, &quantization.to_payload(), bounds, payloads))
     }
 
     /// A file of either coding, from the payloads of its chunks.
@@ -162,7 +162,7 @@ impl<'a> FileLayout<'a> {
         Ok(())
     }
 
-    /// The codes sorted by the importance of their Gaussians, largest first, so that every prefix
+    /// The codes sorted by the energy of their Gaussians, largest first, so that every prefix
     /// of the file is a picture.
     pub(crate) fn ordered(&self, fitted: &PackedCodes) -> PackedCodes {
         let mut order: Vec<_> = fitted
@@ -177,7 +177,7 @@ impl<'a> FileLayout<'a> {
                 }
                 let values = &values[..fitted.quantizers.len()];
                 let gaussian = Gaussian::from_components(values, self.header.parameterization);
-                (gaussian.importance(), codes)
+                (gaussian.energy(), codes)
             })
             .collect();
         order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
@@ -216,7 +216,7 @@ mod tests {
         let grid = CenterGrid::new(width, height);
         let mut random = fastrand::Rng::with_seed(3);
         let mut code = || Code {
-            class: 2,
+            exponent: 2,
             color: [random.i32(-20..=20), 0, 0, 0],
             size: random.i32(-6..=6),
             ratio: random.i32(-3..=3),
@@ -224,9 +224,9 @@ mod tests {
             center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
         };
         let codes = (0..count).map(|_| code()).collect();
-        let lattice = rate_model::lattice(0.0, ColorModel::Gray);
+        let quantization = rate_model::quantization(0.0, ColorModel::Gray);
         unobserved(|observer| {
-            let coded = layout.coded(LatticeCodes { lattice, codes }, observer)?;
+            let coded = layout.coded(QuantizedCodes { quantization, codes }, observer)?;
             layout.write_entropy(&coded, observer)
         })
     }

@@ -6,14 +6,14 @@ use super::lsq::{LsqQuantizers, QuantizerGradients, add, decoded};
 use super::parameterization::{self, OwnFrame};
 use super::pass::{Pass, SplatGradient};
 use super::rate_term::RateTerm;
-use crate::encode::raster::Raster;
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 
 /// A pass, and what its gradients depend on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Backward<'a> {
     pub(super) pass: &'a Pass,
-    pub(super) raster: &'a Raster,
+    pub(super) tiled: &'a TiledSource,
     pub(super) bounds: Bounds,
     pub(super) rate_term: Option<RateTerm>,
     pub(super) quantizers: Option<&'a LsqQuantizers>,
@@ -24,7 +24,7 @@ impl Backward<'_> {
     #[inline(always)]
     pub(super) fn by_splat(&self, index: usize, values: &Components) -> Slope<SplatGradient> {
         let Gaussian { center, cholesky, .. } = values.gaussian(self.bounds.parameterization);
-        let sensitivity = self.raster.sensitivity_under(center, cholesky);
+        let sensitivity = self.tiled.sensitivity_under(center, cholesky);
         Slope { gradient: self.pass.gradient(index, self.bounds.channels), sensitivity }
     }
 

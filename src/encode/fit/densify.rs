@@ -9,7 +9,7 @@ use super::pass::Rendered;
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
+use crate::encode::tiled_source::{TILE_WIDTH, TilePlane, TiledSource};
 use crate::gaussian::Parameterization;
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -85,7 +85,7 @@ impl Densifier<'_> {
         rng: &mut fastrand::Rng,
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Components>, EncodeError> {
-        let raster = self.pass.raster;
+        let tiled = self.pass.tiled;
         let positions = match self.options.placement {
             Placement::Top => {
                 let mut positions = top(count, &self.distortion_map(observer)?);
@@ -97,13 +97,13 @@ impl Densifier<'_> {
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.pass.distortions());
                 let tiles = |tile| self.errors(tile);
-                spread(count, raster.width, grid, rng.f64(), sums, tiles, observer)?
+                spread(count, tiled.width, grid, rng.f64(), sums, tiles, observer)?
             }
         };
         let total = self.count + positions.len();
         let variance = self
             .filter
-            .variance(raster.pixels(), total)
+            .variance(tiled.pixels(), total)
             .expect("`Training::check` accepted the filter");
         let mut new = Vec::with_capacity(positions.len());
         for positions in positions.chunks(PART) {
@@ -137,7 +137,7 @@ impl Densifier<'_> {
 
     /// Column and row of the pixel at a position.
     fn pixel(&self, position: &NewPosition) -> (usize, usize) {
-        let (pixel, width) = (position.pixel as usize, self.pass.raster.width);
+        let (pixel, width) = (position.pixel as usize, self.pass.tiled.width);
         (pixel % width, pixel / width)
     }
 
@@ -146,9 +146,9 @@ impl Densifier<'_> {
         let (x, y) = self.pixel(position);
         match self.options.color {
             NewColor::Zero => [0.0; 4],
-            NewColor::Source => self.pass.raster.sample(x, y),
+            NewColor::Source => self.pass.tiled.sample(x, y),
             NewColor::Residual(share) => {
-                let sensitivity = self.pass.raster.sensitivity(x, y);
+                let sensitivity = self.pass.tiled.sensitivity(x, y);
                 position.missing.map(|missing| share * missing / sensitivity)
             }
         }
@@ -177,7 +177,7 @@ impl Densifier<'_> {
 
     /// Numbers of columns and rows of tiles.
     fn tile_grid(&self) -> [usize; 2] {
-        let Raster { width, height, .. } = self.pass.raster;
+        let TiledSource { width, height, .. } = self.pass.tiled;
         [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
     }
 
@@ -186,21 +186,21 @@ impl Densifier<'_> {
         let [columns, _] = self.tile_grid();
         let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
         let residuals = self.pass.residuals(tile);
-        let (raster, measure) = (self.pass.raster, self.options.distortion);
-        let distortions = distortion_map::of_tile(raster, corner, &residuals, measure);
+        let (tiled, measure) = (self.pass.tiled, self.options.distortion);
+        let distortions = distortion_map::of_tile(tiled, corner, &residuals, measure);
         TileErrors { distortions, residuals }
     }
 
     /// The distortion of every pixel, row by row.
     fn distortion_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
-        let raster = self.pass.raster;
-        let mut map = vec![0.0; raster.pixels()];
+        let tiled = self.pass.tiled;
+        let mut map = vec![0.0; tiled.pixels()];
         let [columns, _] = self.tile_grid();
-        let rows = map.chunks_mut(raster.width * TILE_HEIGHT).enumerate();
+        let rows = map.chunks_mut(tiled.width * TILE_HEIGHT).enumerate();
         observer.map(WORK * columns as f64, rows, |(row, lines)| {
             for column in 0..columns {
                 let distortions = self.errors(row * columns + column).distortions;
-                let lines = lines.chunks_exact_mut(raster.width).zip(&distortions);
+                let lines = lines.chunks_exact_mut(tiled.width).zip(&distortions);
                 for (line, values) in lines {
                     let line = &mut line[column * TILE_WIDTH..];
                     let length = line.len().min(TILE_WIDTH);

@@ -2,8 +2,8 @@
 //! Driven Densification").
 
 use super::training::Distortion;
-use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
 use crate::encode::sensitivity::BLOCK;
+use crate::encode::tiled_source::{TILE_WIDTH, TilePlane, TiledSource};
 use crate::render::tile_grid::TILE_HEIGHT;
 
 /// The distortion of every pixel of a tile, of which the first pixel is (left, top) and the residuals are
@@ -13,7 +13,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// planes have them times the sensitivity itself, which would leave next to nothing to places of low
 /// sensitivity (docs/tuning.md, "Growth").
 pub(super) fn of_tile(
-    raster: &Raster,
+    tiled: &TiledSource,
     [left, top]: [usize; 2],
     planes: &[TilePlane],
     measure: Distortion,
@@ -33,10 +33,10 @@ pub(super) fn of_tile(
     };
     for y in (0..TILE_HEIGHT).step_by(BLOCK) {
         for x in (0..TILE_WIDTH).step_by(BLOCK) {
-            let sensitivity = raster.sensitivity_near([(left + x) as f32, (top + y) as f32]);
+            let sensitivity = tiled.sensitivity_near([(left + x) as f32, (top + y) as f32]);
             // A residual of less than half a quantization step disappears when samples are
             // rounded.
-            let exact = raster.half_step * sensitivity;
+            let exact = tiled.half_step * sensitivity;
             let weight = match measure {
                 Distortion::L1 => 1.0 / sensitivity.sqrt(),
                 Distortion::L3 => 1.0 / (sensitivity * sensitivity.sqrt()),

@@ -2,7 +2,7 @@
 //!
 //! The curvature is that of a Gaussian alone. Those that overlap take their steps at the same time, and
 //! together they would go too far, or, where they share the way, not far enough. So every Gaussian has
-//! a pace of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
+//! a step size of its own, a factor on its steps: it rises while gradients point where earlier ones did, and
 //! falls when they turn round (as in Rprop; Riedmiller and Braun, 1993).
 //!
 //! Steps are taken in the own frame of a Gaussian: its Cholesky factor L becomes L (I - D), whatever the
@@ -28,15 +28,15 @@ use crate::render::splat::Splat;
 use crate::simd::LANES;
 
 // Constants: docs/tuning.md, "Steps of training".
-/// The pace of a new Gaussian: it is born with others that see the same residuals, and at full pace
-/// all of them would take the same step, and never come to rest.
-const FIRST_PACE: f32 = 0.4;
-/// The change of the pace, and its range.
+/// The step size of a new Gaussian: it is born with others that see the same residuals, and at the full
+/// size all of them would take the same step, and never come to rest.
+const FIRST_STEP_SIZE: f32 = 0.4;
+/// The change of the step size, and its range.
 const FASTER: f32 = 1.2;
 const SLOWER: f32 = 0.8;
 const MUCH_SLOWER: f32 = 0.25;
-const LEAST_PACE: f32 = 0.02;
-const MOST_PACE: f32 = 3.0;
+const LEAST_STEP_SIZE: f32 = 0.02;
+const MOST_STEP_SIZE: f32 = 3.0;
 
 /// The state for one Gaussian.
 #[derive(Clone, Copy, Debug)]
@@ -44,22 +44,23 @@ pub(super) struct State {
     /// Moving average of the gradient in the own frame: by the centre; by the logarithms of size and
     /// ratio, and by the shear; by the colour.
     mean: Components,
-    /// The factor on steps.
-    pace: f32,
+    /// The factor on its steps.
+    step_size: f32,
     /// The sum of the weights in the moving average, for the bias correction: 0 before the first step.
     weight: f32,
 }
 
 impl State {
-    pub(super) const NEW: Self = Self { mean: Components::ZERO, pace: FIRST_PACE, weight: 0.0 };
+    pub(super) const NEW: Self =
+        Self { mean: Components::ZERO, step_size: FIRST_STEP_SIZE, weight: 0.0 };
 
     /// Makes the next steps smaller after a setback, without waiting for the gradient to turn round.
     pub(super) fn slow_down(&mut self) {
-        self.pace *= MUCH_SLOWER;
+        self.step_size *= MUCH_SLOWER;
     }
 }
 
-/// The reciprocals of the curvatures for a strength or an area of 1.
+/// The reciprocals of the curvatures for an energy or an area of 1.
 const RECIPROCALS: Components = Components {
     center: [1.0 / CENTER_CURVATURE; 2],
     shape: [1.0 / SIZE_CURVATURE, 1.0 / RATIO_CURVATURE, 1.0 / SHEAR_CURVATURE],
@@ -206,7 +207,7 @@ impl Step<'_> {
             old[index] = f32x16::from_fn(simd, |lane| values[lane].to_array()[index]);
             mean[index] = f32x16::from_fn(simd, |lane| states[lane].mean.to_array()[index]);
         }
-        let pace = f32x16::from_fn(simd, |lane| states[lane].pace);
+        let step_size = f32x16::from_fn(simd, |lane| states[lane].step_size);
         let weight = f32x16::from_fn(simd, |lane| states[lane].weight);
         let sensitivity = f32x16::from_fn(simd, |lane| slopes[lane].sensitivity);
 
@@ -234,9 +235,9 @@ impl Step<'_> {
 
         let area = area * sensitivity;
         let damping = self.options.damping * self.options.damping;
-        let by_strength = one / ((squared_color + damping) * area);
+        let by_energy = one / ((squared_color + damping) * area);
         let by_area = one / area;
-        let parts = Components::by_attribute(by_strength, by_strength, by_area).to_array();
+        let parts = Components::by_attribute(by_energy, by_energy, by_area).to_array();
         let mut reciprocals = [zero; MAX_COMPONENTS];
         // 0 if all are finite, else NaN.
         let (mut agreement, mut finite) = (zero, zero);
@@ -252,11 +253,11 @@ impl Step<'_> {
         let change = agreement
             .simd_lt(zero)
             .select(f32x16::splat(simd, SLOWER), f32x16::splat(simd, FASTER));
-        let changed = (pace * change).max(LEAST_PACE).min(MOST_PACE);
-        let new_pace = weight.simd_gt(zero).select(changed, pace);
+        let changed = (step_size * change).max(LEAST_STEP_SIZE).min(MOST_STEP_SIZE);
+        let new_step_size = weight.simd_gt(zero).select(changed, step_size);
         let momentum = self.options.momentum;
         let new_weight = weight * momentum + (1.0 - momentum);
-        let rate = new_pace * (self.options.rate * self.factor) / new_weight;
+        let rate = new_step_size * (self.options.rate * self.factor) / new_weight;
         let mut new_mean = [zero; MAX_COMPONENTS];
         let mut steps = [zero; MAX_COMPONENTS];
         for index in 0..MAX_COMPONENTS {
@@ -300,10 +301,10 @@ impl Step<'_> {
             values[lane] = lane_of(&by_component, lane);
             states[lane].mean = lane_of(&averages, lane);
         }
-        let pace = stepped.select(new_pace, pace).to_array();
+        let step_size = stepped.select(new_step_size, step_size).to_array();
         let weight = stepped.select(new_weight, weight).to_array();
         for lane in 0..LANES {
-            states[lane].pace = pace[lane];
+            states[lane].step_size = step_size[lane];
             states[lane].weight = weight[lane];
         }
 

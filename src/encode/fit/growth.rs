@@ -66,7 +66,7 @@ impl Fit<'_> {
         }
         let pass = Rendered {
             pass: &self.pass,
-            raster: self.raster,
+            tiled: self.tiled,
             splats: &self.splats,
             kernel: self.training.kernel,
             base: self.base,
@@ -88,7 +88,7 @@ impl Fit<'_> {
         Ok(())
     }
 
-    /// Culling: removes the `count` Gaussians of least importance.
+    /// Culling: removes the `count` Gaussians of least energy.
     pub(super) fn cull(
         &mut self,
         count: usize,
@@ -100,13 +100,13 @@ impl Fit<'_> {
         }
         let parameterization = self.bounds.parameterization;
         let chunks = self.parameters.values.chunks(CHUNK).enumerate();
-        // In the order of importance, and of equal ones in that of the Gaussians.
+        // In the order of energy, and of equal ones in that of the Gaussians.
         let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, values)| {
             let key = |(index, values): (usize, &Components)| {
                 let gaussian = values.gaussian(parameterization);
                 let Gaussian { center, cholesky, .. } = gaussian;
-                let sensitivity = self.raster.sensitivity_under(center, cholesky);
-                u64::from(ordered(gaussian.importance() * sensitivity)) << 32 | index as u64
+                let sensitivity = self.tiled.sensitivity_under(center, cholesky);
+                u64::from(ordered(gaussian.energy() * sensitivity)) << 32 | index as u64
             };
             (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
         })?;

@@ -18,7 +18,7 @@ use super::training_tile::{RenderingError, Slot, TileState, TrainingTile, slots_
 use crate::encode::error::EncodeError;
 use crate::encode::own_frame::GeometrySums;
 use crate::encode::progress::Observer;
-use crate::encode::raster::{Raster, TILE_WIDTH, TilePlane};
+use crate::encode::tiled_source::{TILE_WIDTH, TilePlane, TiledSource};
 use crate::kernel::Kernel;
 use crate::region::Region;
 use crate::render::splat::Splat;
@@ -63,16 +63,15 @@ pub(crate) struct Pass {
 }
 
 impl Pass {
-    pub(crate) fn new(raster: &Raster) -> Self {
-        let rows = raster.height.div_ceil(TILE_HEIGHT);
-        let region =
-            Region { x: 0, y: 0, width: raster.width as u32, height: raster.height as u32 };
+    pub(crate) fn new(tiled: &TiledSource) -> Self {
+        let rows = tiled.height.div_ceil(TILE_HEIGHT);
+        let region = Region { x: 0, y: 0, width: tiled.width as u32, height: tiled.height as u32 };
         Self {
             level: Level::new(),
             bins: RowBins::new(region),
             slots: Vec::new(),
             distortions: Vec::new(),
-            tile_distortions: vec![0.0; rows * raster.width.div_ceil(TILE_WIDTH)],
+            tile_distortions: vec![0.0; rows * tiled.width.div_ceil(TILE_WIDTH)],
             row_errors: vec![RenderingError::default(); rows],
         }
     }
@@ -84,7 +83,7 @@ impl Pass {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn bin(
         &mut self,
-        raster: &Raster,
+        tiled: &TiledSource,
         splats: &[Splat],
         kernel: Kernel,
         observer: &mut Observer<'_>,
@@ -93,8 +92,7 @@ impl Pass {
         self.slots = Vec::new();
         self.bins.rebuild(splats, kernel.cutoff(), observer)?;
         // Memory that the system clears page by page when it is used, on all threads.
-        self.slots =
-            vec![Slot::default(); self.bins.span_count() * slots_per_span(raster.channels)];
+        self.slots = vec![Slot::default(); self.bins.span_count() * slots_per_span(tiled.channels)];
         Ok(())
     }
 
@@ -123,18 +121,18 @@ impl Pass {
     /// milliseconds.
     pub(crate) fn run(
         &mut self,
-        raster: &Raster,
+        tiled: &TiledSource,
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
         measure: Option<Distortion>,
         observer: &mut Observer<'_>,
     ) -> Result<RenderingError, EncodeError> {
-        match raster.channels {
-            1 => self.run_of::<1>(raster, splats, kernel, base, measure, observer),
-            2 => self.run_of::<2>(raster, splats, kernel, base, measure, observer),
-            3 => self.run_of::<3>(raster, splats, kernel, base, measure, observer),
-            _ => self.run_of::<4>(raster, splats, kernel, base, measure, observer),
+        match tiled.channels {
+            1 => self.run_of::<1>(tiled, splats, kernel, base, measure, observer),
+            2 => self.run_of::<2>(tiled, splats, kernel, base, measure, observer),
+            3 => self.run_of::<3>(tiled, splats, kernel, base, measure, observer),
+            _ => self.run_of::<4>(tiled, splats, kernel, base, measure, observer),
         }?;
         Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
@@ -192,7 +190,7 @@ impl Pass {
 
     fn run_of<const CHANNELS: usize>(
         &mut self,
-        raster: &Raster,
+        tiled: &TiledSource,
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
@@ -229,7 +227,7 @@ impl Pass {
             *error = RenderingError::default();
             for (column, by_tile) in by_tile.iter_mut().enumerate() {
                 let indices = tiles.spans(column);
-                let tile = TrainingTile::new(raster, [column, row], base, of_row, indices);
+                let tile = TrainingTile::new(tiled, [column, row], base, of_row, indices);
                 if states.len() < indices.len() {
                     states.resize(indices.len(), TileState::ZERO);
                 }
@@ -239,7 +237,7 @@ impl Pass {
                 *error = *error + of_tile;
                 if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
                     let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
-                    let plane = distortion_map::of_tile(raster, corner, &planes, measure);
+                    let plane = distortion_map::of_tile(tiled, corner, &planes, measure);
                     *sum = plane.as_flattened().iter().sum();
                 }
             }
@@ -252,7 +250,7 @@ impl Pass {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rendered<'a> {
     pub(crate) pass: &'a Pass,
-    pub(crate) raster: &'a Raster,
+    pub(crate) tiled: &'a TiledSource,
     pub(crate) splats: &'a [Splat],
     pub(crate) kernel: Kernel,
     pub(crate) base: [f32; 4],
@@ -264,7 +262,7 @@ impl Rendered<'_> {
     /// source is black or white and the rendering lies beyond it, because the output is clamped, and
     /// outside the picture.
     pub(crate) fn residuals(&self, tile: usize) -> Vec<TilePlane> {
-        match self.raster.channels {
+        match self.tiled.channels {
             1 => self.residuals_of::<1>(tile),
             2 => self.residuals_of::<2>(tile),
             3 => self.residuals_of::<3>(tile),
@@ -280,7 +278,7 @@ impl Rendered<'_> {
         let splat = |&span: &u32| self.splats[spans[span as usize].splat as usize];
         let splats: Vec<Splat> = of_tile.iter().map(splat).collect();
         let indices: Vec<u32> = (0..splats.len() as u32).collect();
-        let tile = TrainingTile::new(self.raster, [column, row], self.base, &splats, &indices);
+        let tile = TrainingTile::new(self.tiled, [column, row], self.base, &splats, &indices);
         let mut states = vec![TileState::ZERO; splats.len()];
         let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
         tile.residuals(*level, self.kernel, &mut states, &mut planes);

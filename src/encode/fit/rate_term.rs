@@ -12,7 +12,7 @@ use crate::gaussian::{Gaussian, component_count};
 /// bits.
 const WEIGHT: f32 = 0.55;
 
-/// The rate term. A Gaussian of strength s, in steps of colour, with the Cholesky factor L and the area
+/// The rate term. A Gaussian of norm s, in steps of colour, with the Cholesky factor L and the area
 /// A = l11 l22 is taken to cost these bits, up to a constant:
 ///
 /// - log2(1 + s^2) / 2 for every component, as in
@@ -71,7 +71,7 @@ impl RateTerm {
         area * (self.weight * self.components) / (squared * area + self.squared_step)
     }
 
-    /// The gradients of half the term by size (at constant strength), ratio and shear, each in the
+    /// The gradients of half the term by size (at constant norm), ratio and shear, each in the
     /// Gaussian's own frame, for sixteen Gaussians with these Cholesky factors.
     #[inline(always)]
     pub(super) fn by_shape<S: Simd>(
@@ -96,8 +96,8 @@ mod tests {
     fn bits(values: [f64; 6], squared_step: f64) -> f64 {
         let [l11, l21, l22, color @ ..] = values;
         let area = l11 * l22;
-        let squared_strength = color.iter().map(|color| color * color).sum::<f64>() * area;
-        let components = 8.0 * 0.5 * (1.0 + squared_strength / squared_step).log2();
+        let energy = color.iter().map(|color| color * color).sum::<f64>() * area;
+        let components = 8.0 * 0.5 * (1.0 + energy / squared_step).log2();
         let shape = ((l11 * l11 + l21 * l21 + l22 * l22) / (2.0 * area)).log2();
         components - area.log2() + shape
     }

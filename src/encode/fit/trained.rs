@@ -15,7 +15,7 @@ use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::encode::error::EncodeError;
 use crate::encode::options::{MAX_GAUSSIANS, Precision};
 use crate::encode::progress::Observer;
-use crate::encode::raster::Raster;
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::{Gaussian, component_count};
 use crate::render::splat::Splat;
 
@@ -51,7 +51,7 @@ pub(super) enum Next {
 /// The Gaussians of a picture during training.
 #[derive(Debug)]
 pub(crate) struct Fit<'a> {
-    pub(super) raster: &'a Raster,
+    pub(super) tiled: &'a TiledSource,
     pub(super) training: &'a Training,
     pub(super) budget: Budget,
     pub(super) precision: Precision,
@@ -79,7 +79,7 @@ pub(crate) struct Fit<'a> {
 
 impl<'a> Fit<'a> {
     pub(crate) fn new(
-        raster: &'a Raster,
+        tiled: &'a TiledSource,
         training: &'a Training,
         budget: Budget,
         precision: Precision,
@@ -88,21 +88,21 @@ impl<'a> Fit<'a> {
         work: Work,
     ) -> Self {
         Self {
-            raster,
+            tiled,
             training,
             budget,
             precision,
             base,
             bounds: Bounds::new(
                 training.parameterization,
-                raster.channels,
-                [raster.width as u32, raster.height as u32],
+                tiled.channels,
+                [tiled.width as u32, tiled.height as u32],
             ),
             parameters: Parameters::new(&training.optimizer),
             quantizers: None,
             float_error: 0.0,
             best: None,
-            pass: Pass::new(raster),
+            pass: Pass::new(tiled),
             binned_for: 0,
             splats: Vec::new(),
             has_splats: false,
@@ -123,7 +123,7 @@ impl<'a> Fit<'a> {
                 codes: values.iter().map(|values| quantizers.codes(values).to_array()).collect(),
             },
             None => PackedCodes {
-                quantizers: vec![Quantizer::Float; component_count(self.raster.channels)],
+                quantizers: vec![Quantizer::Float; component_count(self.tiled.channels)],
                 codes: values.iter().map(|values| values.to_array().map(f32::to_bits)).collect(),
             },
         }
@@ -158,13 +158,13 @@ impl<'a> Fit<'a> {
 
     /// Most Gaussians that the picture may get: one per pixel.
     pub(crate) fn most(&self) -> usize {
-        self.raster.pixels().min(MAX_GAUSSIANS as usize)
+        self.tiled.pixels().min(MAX_GAUSSIANS as usize)
     }
 
     /// Whether the last step lost what training had. Codes that flip make the error jump, which is no
     /// loss: the best state is kept in any case.
     pub(super) fn is_lost(&self) -> bool {
-        let samples = self.raster.pixels() * self.raster.channels;
+        let samples = self.tiled.pixels() * self.tiled.channels;
         let best = self.best.as_ref().filter(|_| self.quantizers.is_none());
         best.is_some_and(|best| best.is_lost(self.error, samples))
     }
@@ -182,13 +182,13 @@ impl<'a> Fit<'a> {
         }
         let kernel = self.training.kernel;
         if self.binned_for == 0 {
-            self.pass.bin(self.raster, &self.splats, kernel, observer)?;
+            self.pass.bin(self.tiled, &self.splats, kernel, observer)?;
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
         self.work.evaluations += self.pass.evaluations();
         self.error =
-            self.pass.run(self.raster, &self.splats, kernel, self.base, measure, observer)?;
+            self.pass.run(self.tiled, &self.splats, kernel, self.base, measure, observer)?;
         Ok(())
     }
 
@@ -215,12 +215,12 @@ impl<'a> Fit<'a> {
         next: Next,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        let channels = self.raster.channels;
+        let channels = self.tiled.channels;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
         let backward = Backward {
             pass: &self.pass,
-            raster: self.raster,
+            tiled: self.tiled,
             bounds: self.bounds,
             rate_term,
             quantizers: self.quantizers.as_ref(),
@@ -288,14 +288,14 @@ impl<'a> Fit<'a> {
 
     /// PSNR of the last pass, in dB.
     pub(super) fn psnr(&self) -> f64 {
-        let samples = (self.raster.pixels() * self.raster.channels) as f64;
+        let samples = (self.tiled.pixels() * self.tiled.channels) as f64;
         10.0 * (samples / self.error.squared).log10()
     }
 
     /// Size in bytes.
     pub(super) fn memory(&self) -> usize {
         let best = self.best.as_ref().map_or(0, |best| best.values.capacity());
-        self.raster.memory()
+        self.tiled.memory()
             + self.pass.memory()
             + self.parameters.memory()
             + best * size_of::<Components>()

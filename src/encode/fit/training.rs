@@ -251,7 +251,7 @@ impl Quantization {
 impl Training {
     /// The encoder's defaults, tuned for quality in few iterations. Growth is early, in many steps
     /// and beyond the budget; new Gaussians are spread by the distortion, and the surplus is culled
-    /// by importance. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
+    /// by energy. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
         // Constants: docs/tuning.md, "Growth" and "Steps of training". In a short run there is no time to

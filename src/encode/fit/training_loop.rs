@@ -17,7 +17,7 @@ const FORESEEN: f64 = 0.75;
 /// What an iteration depends on.
 #[derive(Clone, Copy, Debug)]
 struct Iteration {
-    /// For the progress that is told.
+    /// For the progress that is reported.
     work: f64,
     starts_quantization: bool,
     /// Scales all learning rates.
@@ -28,7 +28,7 @@ struct Iteration {
 }
 
 impl Fit<'_> {
-    /// Trains from nothing. `workload` is what was expected of it, for the progress that is told.
+    /// Trains from nothing. `workload` is what was expected of it, for the progress that is reported.
     pub(crate) fn run(
         &mut self,
         workload: Workload,
@@ -83,7 +83,7 @@ impl Fit<'_> {
         self.parameters = Parameters::new(&self.training.optimizer);
         self.quantizers = None;
         self.invalidate();
-        self.run(Workload::new(self.raster.pixels(), count), observer)
+        self.run(Workload::new(self.tiled.pixels(), count), observer)
     }
 
     /// Adds or removes Gaussians of a finished fit, so that there are `count`, and trains all for a
@@ -106,7 +106,7 @@ impl Fit<'_> {
         let planned = self.work.iterations + iterations;
         let quantized_from = (self.training.quantization.warm_up * iterations as f32) as u32;
         let quantized_from = quantized_from.min(iterations - 1);
-        let workload = Workload::new(self.raster.pixels(), self.len());
+        let workload = Workload::new(self.tiled.pixels(), self.len());
         for iteration in 0..iterations {
             let step = Iteration {
                 work: workload.iteration(1.0),

@@ -9,10 +9,10 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::distortion::differentiate;
 use crate::encode::mul_add::MulAdd;
-use crate::encode::raster::{
-    FULL_SCALE, Raster, SampleTile, TILE_WIDTH, TilePlane, centers, visible,
-};
 use crate::encode::sensitivity::Sensitivity;
+use crate::encode::tiled_source::{
+    FULL_SCALE, SampleTile, TILE_WIDTH, TilePlane, TiledSource, centers, visible,
+};
 use crate::gaussian::component_count;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
@@ -133,7 +133,7 @@ pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
 impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
     /// The tile at a column and row of tiles.
     pub(super) fn new(
-        raster: &'a Raster,
+        tiled: &'a TiledSource,
         [column, row]: [usize; 2],
         base: [f32; 4],
         splats: &'a [Splat],
@@ -142,10 +142,10 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         Self {
             x: (column * TILE_WIDTH) as u32,
             y: (row * TILE_HEIGHT) as u32,
-            columns: TILE_WIDTH.min(raster.width - column * TILE_WIDTH),
-            rows: TILE_HEIGHT.min(raster.height - row * TILE_HEIGHT),
-            target: raster.tile(row * raster.width.div_ceil(TILE_WIDTH) + column),
-            sensitivity: raster.sensitivity.as_ref(),
+            columns: TILE_WIDTH.min(tiled.width - column * TILE_WIDTH),
+            rows: TILE_HEIGHT.min(tiled.height - row * TILE_HEIGHT),
+            target: tiled.tile(row * tiled.width.div_ceil(TILE_WIDTH) + column),
+            sensitivity: tiled.sensitivity.as_ref(),
             base,
             splats,
             indices,

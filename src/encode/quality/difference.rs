@@ -11,7 +11,7 @@ use super::rows::{Lanes, Rows};
 /// The Gaussian window of standard deviation 1.5, from its middle.
 const WINDOW: [f32; RADIUS + 1] = [0.266_56, 0.213_44, 0.109_59, 0.036_075, 0.007_615];
 pub(super) const RADIUS: usize = 4;
-/// What keeps the structural dissimilarity of even ground finite.
+/// What keeps the structural distance of even ground finite.
 const LEAST_VARIANCE: f32 = 0.0009;
 /// Vectors of a row that are compared at a time: the rows around them stay in the first-level cache.
 const VECTORS: usize = 32;
@@ -19,7 +19,7 @@ const VECTORS: usize = 32;
 /// Sums over pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sums {
-    /// Of structural dissimilarity, 1 - SSIM.
+    /// Of structural distance, 1 - SSIM.
     pub(super) structure: f64,
     /// Of detail that the rendering has and the source lacks.
     pub(super) artifacts: f64,

@@ -54,7 +54,7 @@ const MOST_DENSITY: f64 = 0.25;
 pub(crate) struct Verdict {
     /// That of SSIMULACRA2, if it measures such small pictures, on an open scale from 0, about
     /// proportional to the squared error.
-    dissimilarity: Option<f64>,
+    distance: Option<f64>,
     /// The same of a small picture among its mirror images.
     mirrored: Option<f64>,
     /// The mean square deviation of smooth areas.
@@ -64,7 +64,7 @@ pub(crate) struct Verdict {
 impl Verdict {
     /// The quality, from 0 to 100.
     pub(crate) fn quality(&self) -> f64 {
-        quality(self.dissimilarity.or(self.mirrored).unwrap_or(0.0)).max(0.0)
+        quality(self.distance.or(self.mirrored).unwrap_or(0.0)).max(0.0)
     }
 
     /// The error as a factor on what a quality from 0 to 100 allows.
@@ -75,12 +75,12 @@ impl Verdict {
 
     /// The same without regard to blotches.
     pub(crate) fn excess_of_structure(&self, wanted: f64) -> f64 {
-        self.worst() / dissimilarity_at(wanted.min(MOST_QUALITY))
+        self.worst() / distance_at(wanted.min(MOST_QUALITY))
     }
 
-    /// The largest dissimilarity.
+    /// The largest distance.
     fn worst(&self) -> f64 {
-        self.dissimilarity.into_iter().chain(self.mirrored).fold(0.0, f64::max)
+        self.distance.into_iter().chain(self.mirrored).fold(0.0, f64::max)
     }
 }
 
@@ -183,8 +183,8 @@ impl<'a> Judgement<'a> {
             self.views.iter().filter_map(found).reduce(f64::max)
         };
         Verdict {
-            dissimilarity: worst(|view| view.metric.as_ref().map(Scales::dissimilarity)),
-            mirrored: worst(|view| view.mirrored.as_ref().map(Scales::dissimilarity)),
+            distance: worst(|view| view.metric.as_ref().map(Scales::distance)),
+            mirrored: worst(|view| view.mirrored.as_ref().map(Scales::distance)),
             blotches: worst(|view| Some(view.blotches / view.smooth.count() as f64)).unwrap_or(0.0),
         }
     }
@@ -213,16 +213,16 @@ impl View<'_> {
     }
 }
 
-/// The quality at a dissimilarity, at most 100.
-fn quality(dissimilarity: f64) -> f64 {
-    let x = dissimilarity;
+/// The quality at a distance, at most 100.
+fn quality(distance: f64) -> f64 {
+    let x = distance;
     let mapped = x * (2.326_765_64 + x * (-0.020_884_52 + x * 6.248_497e-5));
     100.0 - 10.0 * mapped.max(0.0).powf(0.627_633_65)
 }
 
-/// The dissimilarity at a quality from 0 to 100.
-fn dissimilarity_at(wanted: f64) -> f64 {
-    // The quality falls with the dissimilarity, from 100 to less than 0.
+/// The distance at a quality from 0 to 100.
+fn distance_at(wanted: f64) -> f64 {
+    // The quality falls with the distance, from 100 to less than 0.
     let (mut least, mut most) = (0.0, 30.0);
     for _ in 0..50 {
         let middle = 0.5 * (least + most);
@@ -234,8 +234,8 @@ fn dissimilarity_at(wanted: f64) -> f64 {
 /// About how many Gaussians a picture needs for a quality, given the means of the eye's sensitivity to it
 /// on the finest and on the coarsest scale: texture, and above all fine texture, takes Gaussians.
 pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) -> usize {
-    let dissimilarity = dissimilarity_at(wanted.min(MOST_QUALITY));
-    let density = 0.5 * dissimilarity.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);
+    let distance = distance_at(wanted.min(MOST_QUALITY));
+    let density = 0.5 * distance.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);
     // On even ground, sensitivities do not tell how smooth it is.
     let density = density * ((MOST_SENSITIVITY - fine) / EVEN).clamp(LEAST_SHARE, 1.0);
     // The cast saturates.
@@ -322,7 +322,7 @@ mod tests {
     fn the_scale_can_be_inverted() {
         assert_eq!(quality(0.0), 100.0);
         for wanted in [0.0, 20.0, 50.0, 75.0, 90.0, MOST_QUALITY] {
-            assert!((quality(dissimilarity_at(wanted)) - wanted).abs() < 1e-6, "{wanted}");
+            assert!((quality(distance_at(wanted)) - wanted).abs() < 1e-6, "{wanted}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Differences in all channels and on all scales, added up to one dissimilarity.
+//! Differences in all channels and on all scales, added up to one distance.
 
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
@@ -110,7 +110,7 @@ impl Scales {
     }
 
     /// The weighted sum of norms, after the last rows.
-    pub(super) fn dissimilarity(&self) -> f64 {
+    pub(super) fn distance(&self) -> f64 {
         let found = self.measured.iter().zip(&self.comparisons);
         let weighted = found.map(|(measured, Comparison { rows, sums, .. })| {
             measured.weighted(sums, (rows.width * rows.height) as f64)

@@ -1,16 +1,16 @@
-//! The codes of Gaussians for a quantization step: rounding to the lattice, and passes of
+//! The codes of Gaussians for a quantization step: rounding to the quantization grid, and passes of
 //! coordinate descent over the codes.
 
 use super::coordinate_descent::{CodeContext, CoordinateDescent, touched_tiles};
 use super::residuals::Residuals;
-use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, LatticeCodes, LayerCoder};
+use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, LayerCoder, QuantizedCodes};
 use crate::color::ColorModel;
 use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::progress::Observer;
-use crate::encode::raster::Raster;
 use crate::encode::rate_model;
 use crate::encode::strips;
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
@@ -46,10 +46,10 @@ impl Optimized {
     }
 }
 
-/// Rounds Gaussians to a lattice and optimizes their codes, for the file of one picture.
+/// Rounds Gaussians to a quantization grid and optimizes their codes, for the file of one picture.
 #[derive(Debug)]
 pub(super) struct CodeOptimizer<'a> {
-    raster: &'a Raster,
+    tiled: &'a TiledSource,
     layout: &'a FileLayout<'a>,
     grid: CenterGrid,
     model: ColorModel,
@@ -61,17 +61,17 @@ impl<'a> CodeOptimizer<'a> {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn new(
-        raster: &'a Raster,
+        tiled: &'a TiledSource,
         layout: &'a FileLayout<'a>,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
         let header = layout.header();
         let grid = CenterGrid::new(header.width, header.height);
-        let residuals = Residuals::new(raster, observer)?;
-        Ok(Self { raster, layout, grid, model: header.color, residuals })
+        let residuals = Residuals::new(tiled, observer)?;
+        Ok(Self { tiled, layout, grid, model: header.color, residuals })
     }
 
-    /// Rounds `gaussians` to the lattice for a step of colour, given by its base-2 logarithm.
+    /// Rounds `gaussians` to the quantization grid for a step of colour, given by its base-2 logarithm.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -81,14 +81,15 @@ impl<'a> CodeOptimizer<'a> {
         step: f64,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers, EncodeError> {
-        let lattice = rate_model::lattice(step, self.model);
+        let quantization = rate_model::quantization(step, self.model);
         let codes = observer.map(WORK.0, gaussians.iter(), |gaussian| {
             let Gaussian { center, cholesky, .. } = *gaussian;
-            let sensitivity = self.raster.sensitivity_under(center, cholesky);
-            let class = rate_model::class_of(gaussian, sensitivity, &lattice, self.model);
-            lattice.code(gaussian, class, &self.grid, self.model)
+            let sensitivity = self.tiled.sensitivity_under(center, cholesky);
+            let exponent =
+                rate_model::step_exponent(gaussian, sensitivity, &quantization, self.model);
+            quantization.code(gaussian, exponent, &self.grid, self.model)
         })?;
-        self.layout.coded(LatticeCodes { lattice, codes }, observer)
+        self.layout.coded(QuantizedCodes { quantization, codes }, observer)
     }
 
     /// The Gaussians of codes.
@@ -100,13 +101,14 @@ impl<'a> CodeOptimizer<'a> {
         coded: &CodedLayers,
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Gaussian>, EncodeError> {
-        let CodedLayers { lattice, codes, .. } = coded;
-        let gaussian = |code| lattice.gaussian(code, &lattice.shape(code), &self.grid, self.model);
+        let CodedLayers { quantization, codes, .. } = coded;
+        let gaussian =
+            |code| quantization.gaussian(code, &quantization.shape(code), &self.grid, self.model);
         observer.map(WORK.1, codes.iter(), gaussian)
     }
 
     /// Runs a pass of coordinate descent over the codes. The Lagrange multiplier is 2^`lambda` times
-    /// that of the rate model. `work` is that of the pass, for the progress that is told.
+    /// that of the rate model. `work` is that of the pass, for the progress that is reported.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -118,15 +120,15 @@ impl<'a> CodeOptimizer<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Optimized, EncodeError> {
         self.render(&coded, observer)?;
-        let CodedLayers { lattice, codes, layers } = coded;
+        let CodedLayers { quantization, codes, layers } = coded;
         let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
-        let coder = LayerCoder::new(&lattice, self.layout.header());
+        let coder = LayerCoder::new(&quantization, self.layout.header());
         let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
         let parts = codes.chunks(PART).zip(contexts.chunks(PART));
         let sums = observer.map(WORK.2 * PART as f64, parts, |(codes, contexts)| {
             let (mut bits, mut tiles) = (0.0, 0.0);
             for (code, context) in codes.iter().zip(contexts) {
-                let shape = lattice.shape(code);
+                let shape = quantization.shape(code);
                 bits += coder.geometry_cost(code, &shape, context.level, context.costs);
                 bits += coder.color_cost(code, context.costs);
                 tiles += touched_tiles(shape.cholesky);
@@ -142,14 +144,14 @@ impl<'a> CodeOptimizer<'a> {
         let tree_bits = 8.0 * bytes as f32 - attribute_bits;
         let tree_bits = (tree_bits / codes.len().max(1) as f32).max(0.0);
         let tile_bits = DECODING_TIME_BITS * codes.len() as f32 / tiles.max(1.0);
-        let lambda = rate_model::lambda(&lattice) * lambda.exp2() as f32;
+        let lambda = rate_model::lambda(&quantization) * lambda.exp2() as f32;
         let descent =
             CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda, work };
         let by_use = descent.pass(&mut self.residuals, &codes, &contexts, observer)?;
         // Coding needs memory of its own.
         drop((contexts, codes));
         drop(layers);
-        let codes = LatticeCodes { lattice, codes: by_use.clone() };
+        let codes = QuantizedCodes { quantization, codes: by_use.clone() };
         Ok(Optimized { coded: self.layout.coded(codes, observer)?, by_use })
     }
 
@@ -163,11 +165,11 @@ impl<'a> CodeOptimizer<'a> {
         let header = self.layout.header();
         let limits = Limits::none();
         let rendering = Picture::new(header, &gaussians, &limits, 0);
-        let (raster, residuals) = (self.raster, &mut self.residuals);
+        let (tiled, residuals) = (self.tiled, &mut self.residuals);
         strips::render(&rendering, u32::MAX, observer, |region, planes| {
-            residuals.set(raster, region.y as usize, planes);
+            residuals.set(tiled, region.y as usize, planes);
         })?;
-        if let Some(sensitivity) = &raster.sensitivity {
+        if let Some(sensitivity) = &tiled.sensitivity {
             residuals.shift(sensitivity, observer)?;
         }
         Ok(())

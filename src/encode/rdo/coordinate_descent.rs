@@ -1,4 +1,4 @@
-//! Coordinate descent on the lattice: for one Gaussian after the other, the code with the least
+//! Coordinate descent on the quantization grid: for one Gaussian after the other, the code with the least
 //! Lagrangian cost D + lambda R is chosen, where D is the squared error of the picture and R the
 //! rate in bits.
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::residuals::{Band, Residuals, window};
 use super::rounds::{BandEntries, Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
-use crate::coding::entropy::{Code, LayerCoder, MAX_CLASS, SymbolCosts};
+use crate::coding::entropy::{Code, LayerCoder, MAX_EXPONENT, SymbolCosts};
 use crate::color::ColorModel;
 use crate::encode::error::EncodeError;
 use crate::encode::own_frame::{self, GeometryChange};
@@ -32,13 +32,13 @@ const MAX_CANDIDATES: usize = 3;
 pub(crate) struct CoordinateDescent<'a> {
     pub(crate) coder: LayerCoder<'a>,
     pub(crate) model: ColorModel,
-    /// Bits that the tree of cells takes per Gaussian.
+    /// Bits that the k-d tree of cells takes per Gaussian.
     pub(crate) tree_bits: f32,
     /// The penalty in bits for each tile of the decoder that a Gaussian touches.
     pub(crate) tile_bits: f32,
     /// The Lagrange multiplier: squared error per bit.
     pub(crate) lambda: f32,
-    /// The work of the pass, for the progress that is told.
+    /// The work of the pass, for the progress that is reported.
     pub(crate) work: f64,
 }
 
@@ -195,8 +195,8 @@ impl CoordinateDescent<'_> {
     }
 
     fn gaussian(&self, code: &Code) -> Gaussian {
-        let LayerCoder { lattice, grid, .. } = &self.coder;
-        lattice.gaussian(code, &lattice.shape(code), grid, self.model)
+        let LayerCoder { quantization, grid, .. } = &self.coder;
+        quantization.gaussian(code, &quantization.shape(code), grid, self.model)
     }
 
     /// The code of least cost among a code and its candidates; `None` if it costs less to remove
@@ -238,34 +238,35 @@ impl CoordinateDescent<'_> {
         context: CodeContext<'_>,
         present_cost: f32,
     ) -> Cheapest {
-        let (lattice, model) = (self.coder.lattice, self.model);
+        let (quantization, model) = (self.coder.quantization, self.model);
         let slant = gaussian.cholesky[1] / gaussian.cholesky[2];
-        let amplitudes = code.color.iter().zip(&lattice.color);
-        let squared_strength: f32 =
-            amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
-        let squared_strength = squared_strength * gradient.sensitivity;
+        let amplitudes = code.color.iter().zip(&quantization.color);
+        let energy: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
+        let energy = energy * gradient.sensitivity;
         let recolored = self.with_best_colors(&gradient.change, code, context.costs);
-        let error = gradient.change.with_color(recolored.color, lattice.color_units(&recolored));
+        let error =
+            gradient.change.with_color(recolored.color, quantization.color_units(&recolored));
         let mut found = Cheapest::below(present_cost);
         let color_bits = self.coder.color_cost(&recolored, context.costs);
         if recolored != code {
             let bits = self.geometry_bits(&recolored, context) + color_bits;
             found.add(error + self.lambda * bits, recolored);
         }
-        if squared_strength > 0.0 {
+        if energy > 0.0 {
             let mut add = |candidate: Code, color_bits: f32| {
                 let step = self.change(gaussian, &code, &candidate);
-                let change = gradient.by_geometry.error_change(&step, slant, squared_strength);
+                let change = gradient.by_geometry.error_change(&step, slant, energy);
                 let bits = self.geometry_bits(&candidate, context) + color_bits;
                 found.add(error + change + self.lambda * bits, candidate);
             };
             for candidate in self.neighbours(recolored) {
                 add(candidate, color_bits);
             }
-            let step = gradient.by_geometry.minimizer(slant, squared_strength, TRUST_REGION);
+            let step = gradient.by_geometry.minimizer(slant, energy, TRUST_REGION);
             let target = step.applied(&self.gaussian(&recolored));
-            for class in code.class.saturating_sub(1)..=(code.class + 1).min(MAX_CLASS) {
-                let candidate = lattice.code(&target, class, &self.coder.grid, model);
+            for exponent in code.exponent.saturating_sub(1)..=(code.exponent + 1).min(MAX_EXPONENT)
+            {
+                let candidate = quantization.code(&target, exponent, &self.coder.grid, model);
                 add(candidate, self.coder.color_cost(&candidate, context.costs));
             }
         }
@@ -275,7 +276,7 @@ impl CoordinateDescent<'_> {
     /// The change of geometry from a Gaussian with its code to another code.
     fn change(&self, gaussian: &Gaussian, from: &Code, to: &Code) -> GeometryChange {
         let center = self.coder.grid.center(to.center);
-        let [before, after] = [from, to].map(|code| self.coder.lattice.shape_values(code));
+        let [before, after] = [from, to].map(|code| self.coder.quantization.shape_values(code));
         GeometryChange {
             center: own_frame::coordinates(gaussian, center),
             size: after[0] - before[0],
@@ -298,14 +299,14 @@ impl CoordinateDescent<'_> {
             return None;
         }
         let code = self.with_best_colors(&change, code, context.costs);
-        let error = change.with_color(code.color, self.coder.lattice.color_units(&code));
+        let error = change.with_color(code.color, self.coder.quantization.color_units(&code));
         Some(Candidate { code, error, bits: self.bits(&code, context) })
     }
 
     /// A code with the colours of least cost for its geometry, chosen for one colour axis after the
     /// other.
     fn with_best_colors(&self, change: &ErrorChange, mut code: Code, costs: &SymbolCosts) -> Code {
-        let units = self.coder.lattice.color_units(&code);
+        let units = self.coder.quantization.color_units(&code);
         for (axis, &unit) in units.iter().enumerate().take(self.coder.channels) {
             // The increase of the error when the code is 1 away from its minimum.
             let curvature = change.squared_weights * unit * unit;
@@ -343,14 +344,14 @@ impl CoordinateDescent<'_> {
 
     /// The part of the rate that does not depend on the amplitudes.
     fn geometry_bits(&self, code: &Code, context: CodeContext<'_>) -> f32 {
-        let shape = self.coder.lattice.shape(code);
+        let shape = self.coder.quantization.shape(code);
         let bits = self.coder.geometry_cost(code, &shape, context.level, context.costs);
         self.tree_bits + bits + self.tile_bits * touched_tiles(shape.cholesky)
     }
 
     /// The codes that are one step up or down in one component of the geometry.
     fn neighbours(&self, code: Code) -> impl Iterator<Item = Code> {
-        let (lattice, grid) = (self.coder.lattice, self.coder.grid);
+        let (quantization, grid) = (self.coder.quantization, self.coder.grid);
         let center = grid.center(code.center);
         let shapes = [-1, 1].into_iter().flat_map(move |step| {
             (0..3).map(move |component| {
@@ -360,14 +361,14 @@ impl CoordinateDescent<'_> {
                     1 => code.ratio += step,
                     _ => code.slant += step,
                 }
-                code.center = lattice.placed(&code, center, &grid);
+                code.center = quantization.placed(&code, center, &grid);
                 code
             })
         });
         let moves = [(0, false), (0, true), (1, false), (1, true)];
         let moves = moves
             .into_iter()
-            .filter_map(move |(axis, forward)| lattice.moved(&code, axis, forward, &grid));
+            .filter_map(move |(axis, forward)| quantization.moved(&code, axis, forward, &grid));
         shapes.chain(moves)
     }
 }

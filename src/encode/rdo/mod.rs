@@ -2,7 +2,7 @@
 //! target.
 //!
 //! `target_search` searches for the quantization step and the Lagrange multiplier with which a file
-//! meets its target. `code_optimizer` rounds Gaussians to the lattice of a step and improves their
+//! meets its target. `code_optimizer` rounds Gaussians to the quantization grid of a step and improves their
 //! codes by passes of coordinate descent, in the order of `rounds`.
 
 mod code_optimizer;

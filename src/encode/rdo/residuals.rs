@@ -11,8 +11,8 @@ use crate::encode::distortion::differentiate;
 use crate::encode::error::EncodeError;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::progress::Observer;
-use crate::encode::raster::{FULL_SCALE, Raster, SampleLine, TILE_WIDTH, visible};
 use crate::encode::sensitivity::{BLOCK, Sensitivity};
+use crate::encode::tiled_source::{FULL_SCALE, SampleLine, TILE_WIDTH, TiledSource, visible};
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -67,14 +67,17 @@ impl Residuals {
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn new(raster: &Raster, observer: &mut Observer<'_>) -> Result<Self, EncodeError> {
-        let (width, height, channels) = (raster.width, raster.height, raster.channels);
+    pub(crate) fn new(
+        tiled: &TiledSource,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self, EncodeError> {
+        let (width, height, channels) = (tiled.width, tiled.height, tiled.channels);
         let stride = width + LANES;
-        let mut sensitivities = vec![0.0; stride * sensitivity_lines(raster)];
+        let mut sensitivities = vec![0.0; stride * sensitivity_lines(tiled)];
         let lines = sensitivities.chunks_exact_mut(stride).enumerate();
         observer.map(WORK.0 * width as f64, lines, |(row, line)| {
             for (x, value) in line[..width].iter_mut().enumerate() {
-                *value = raster.sensitivity(x, row * BLOCK);
+                *value = tiled.sensitivity(x, row * BLOCK);
             }
         })?;
         let residuals = vec![0; stride * height * channels];
@@ -83,14 +86,14 @@ impl Residuals {
     }
 
     /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
-    pub(crate) fn set(&mut self, raster: &Raster, first: usize, rendering: &[f32]) {
+    pub(crate) fn set(&mut self, tiled: &TiledSource, first: usize, rendering: &[f32]) {
         let (width, channels, level) = (self.width, self.channels, self.level);
         let rows = rendering.len() / (width * channels);
         let lines = self.residuals.par_chunks_mut(self.stride).skip(first * channels);
         lines.take(rows * channels).enumerate().for_each(|(line, residuals)| {
             let (row, channel) = (line / channels, line % channels);
             let rendered = &rendering[(channel * rows + row) * width..][..width];
-            let samples = raster.line(first + row, channel);
+            let samples = tiled.line(first + row, channel);
             for ((values, samples), residuals) in
                 rendered.chunks(TILE_WIDTH).zip(samples).zip(residuals.chunks_mut(LANES))
             {
@@ -158,10 +161,10 @@ impl Residuals {
     }
 
     /// Size in bytes of the residuals of a source.
-    pub(crate) fn memory(raster: &Raster) -> usize {
-        let by_column = raster.height * raster.channels * size_of::<i16>();
-        let sensitivities = sensitivity_lines(raster) * size_of::<f32>();
-        (raster.width + LANES) * (by_column + sensitivities)
+    pub(crate) fn memory(tiled: &TiledSource) -> usize {
+        let by_column = tiled.height * tiled.channels * size_of::<i16>();
+        let sensitivities = sensitivity_lines(tiled) * size_of::<f32>();
+        (tiled.width + LANES) * (by_column + sensitivities)
     }
 
     /// Width and height of the picture.
@@ -292,8 +295,8 @@ fn draw<S: Simd>(
 }
 
 /// Number of different lines of sensitivities.
-fn sensitivity_lines(raster: &Raster) -> usize {
-    raster.sensitivity.as_ref().map_or(1, |_| raster.height.div_ceil(BLOCK))
+fn sensitivity_lines(tiled: &TiledSource) -> usize {
+    tiled.sensitivity.as_ref().map_or(1, |_| tiled.height.div_ceil(BLOCK))
 }
 
 /// The columns and rows of the window of a Gaussian in a picture of a width and height: the bounding box
@@ -371,13 +374,13 @@ mod tests {
                 (0..width * height * channels).map(|_| rng.u8(..).saturating_mul(2)).collect();
             let source = Source::new_u8(width as u32, height as u32, model, &samples)
                 .expect("the sizes agree");
-            let raster = unobserved(|observer| {
-                Raster::new(&source.keeping_invisible(true), Tune::Visual, observer)
+            let tiled = unobserved(|observer| {
+                TiledSource::new(&source.keeping_invisible(true), Tune::Visual, observer)
             });
             let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
-            let mut residuals = unobserved(|observer| Residuals::new(&raster, observer));
-            residuals.set(&raster, 0, &rendering);
-            let sensitivity = raster.sensitivity.as_ref().expect("it is tuned");
+            let mut residuals = unobserved(|observer| Residuals::new(&tiled, observer));
+            residuals.set(&tiled, 0, &rendering);
+            let sensitivity = tiled.sensitivity.as_ref().expect("it is tuned");
             unobserved(|observer| residuals.shift(sensitivity, observer));
 
             let mut plain: Vec<f64> = (0..samples.len())

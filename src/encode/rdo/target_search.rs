@@ -3,14 +3,14 @@
 use super::code_optimizer::{CodeOptimizer, Optimized};
 use super::search_work::SearchWork;
 use super::step_search::StepSearch;
-use crate::coding::entropy::LatticeCodes;
+use crate::coding::entropy::QuantizedCodes;
 use crate::encode::aim::{Aim, FileAim};
 use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
-use crate::encode::raster::Raster;
 use crate::encode::rate_model;
+use crate::encode::tiled_source::TiledSource;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
 
@@ -18,17 +18,17 @@ use crate::gaussian::Gaussian;
 /// Most steps that are tried: by rounding alone, and with passes of coordinate descent.
 const MOST_ROUNDING_TRIES: u32 = 8;
 const MOST_TRIES: u32 = 4;
-/// With at most this deviation of rounded codes, the step that follows from it is good.
+/// With at most this log ratio of rounded codes, the step that follows from it is good.
 const CLOSE_OF_ROUNDED: f64 = 0.025;
-/// Gaussians of at most this strength are weak: most of them are not worth their bits.
+/// Gaussians of at most this energy are weak: most of them are not worth their bits.
 const WEAK: i64 = 2;
 /// The fall of size and of error, as base-2 logarithms, that further passes of coordinate descent bring
 /// after the first one. After n passes, 1 / n of it is still to come.
 const SETTLING: f64 = 0.03;
 /// The additional fall in the first pass after a change of the step.
 const SETTLING_AGAIN: f64 = 0.012;
-/// The deviation of a file that decodes to an exact copy, which has no finite PSNR.
-const LARGEST_DEVIATION: f64 = 10.0;
+/// The log ratio of a file that decodes to an exact copy, which has no finite PSNR.
+const LARGEST_LOG_RATIO: f64 = 10.0;
 /// By how much lambda may change to meet a target, as a base-2 logarithm.
 const MOST_LAMBDA_CHANGE: f64 = 1.0;
 /// Most passes of coordinate descent until a target is met.
@@ -54,7 +54,7 @@ const MOST_TRIMMINGS: u32 = 32;
 
 /// The share of weak Gaussians.
 fn weak_share(coded: &CodedLayers) -> f64 {
-    let weak = coded.codes.iter().filter(|code| code.strength() <= WEAK).count();
+    let weak = coded.codes.iter().filter(|code| code.energy() <= WEAK).count();
     weak as f64 / coded.codes.len().max(1) as f64
 }
 
@@ -83,17 +83,17 @@ impl<'a> TargetSearch<'a> {
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         judge: &'a Judge<'a>,
-        raster: &'a Raster,
+        tiled: &'a TiledSource,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
         observer: &mut Observer<'_>,
     ) -> Result<Self, EncodeError> {
-        let codes = CodeOptimizer::new(raster, layout, observer)?;
+        let codes = CodeOptimizer::new(tiled, layout, observer)?;
         Ok(Self { judge, layout, work, codes })
     }
 
     /// Finds codes of `gaussians`, whose rendering has this distortion, for an aim. Returns them with their
-    /// deviation from it (see [`FileAim`]); it is 0 where no error is asked for.
+    /// log ratio from it (see [`FileAim`]); it is 0 where no error is asked for.
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
@@ -116,24 +116,24 @@ impl<'a> TargetSearch<'a> {
         };
         let finest = (step + FINEST).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
-        let (mut coded, mut deviation, step) =
+        let (mut coded, mut log_ratio, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
         if let FileAim::Size(bytes) = aim {
             return Ok((self.shortened(coded, bytes, observer)?, 0.0));
         }
-        if aim.miss(deviation, weak_share(&coded.coded)) > 0.0 {
+        if aim.violation(log_ratio, weak_share(&coded.coded)) > 0.0 {
             // With few Gaussians the PSNR jumps from step to step, but it rises as steps get finer.
             let mut finer = step;
             for change in FINER {
                 finer -= change;
-                if deviation <= 0.0 || finer < finest {
+                if log_ratio <= 0.0 || finer < finest {
                     break;
                 }
                 coded = self.descended(gaussians, finer, self.work.passes, observer)?;
-                deviation = self.deviation(&coded.coded, aim, observer)?;
+                log_ratio = self.log_ratio(&coded.coded, aim, observer)?;
             }
         }
-        self.trimmed(coded, deviation, aim, observer)
+        self.trimmed(coded, log_ratio, aim, observer)
     }
 
     /// The codes of a step, which is halved while there are fewer than `count`.
@@ -158,7 +158,7 @@ impl<'a> TargetSearch<'a> {
     }
 
     /// Tries up to [`MOST_TRIES`] steps, `step` first. Returns the codes that come nearest to an aim, their
-    /// deviation from it, and the step at which the search has arrived.
+    /// log ratio from it, and the step at which the search has arrived.
     fn aimed(
         &mut self,
         gaussians: &[Gaussian],
@@ -170,23 +170,23 @@ impl<'a> TargetSearch<'a> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
         let mut best: Option<(Optimized, f64, f64)> = None;
         for _ in 0..MOST_TRIES {
-            let (optimized, deviation, expected) = self.tried(gaussians, &search, aim, observer)?;
-            let miss = aim.miss(deviation, weak_share(&optimized.coded));
-            if best.as_ref().is_none_or(|&(.., least)| miss < least) {
-                best = Some((optimized, deviation, miss));
+            let (optimized, log_ratio, expected) = self.tried(gaussians, &search, aim, observer)?;
+            let violation = aim.violation(log_ratio, weak_share(&optimized.coded));
+            if best.as_ref().is_none_or(|&(.., least)| violation < least) {
+                best = Some((optimized, log_ratio, violation));
             }
-            if miss == 0.0 || search.is_exhausted(expected) {
+            if violation == 0.0 || search.is_exhausted(expected) {
                 break;
             }
-            search.tell(expected);
+            search.report(expected);
             observer.expect(self.work.one_more_try());
         }
-        let (optimized, deviation, _) = best.expect("at least one was tried");
-        Ok((optimized, deviation, search.at))
+        let (optimized, log_ratio, _) = best.expect("at least one was tried");
+        Ok((optimized, log_ratio, search.at))
     }
 
     /// Tries the step at which the search is; passes with other lambdas, or another rounding, bring the codes
-    /// nearer to the aim. Returns the codes, their deviation from the aim, and an estimate of the deviation
+    /// nearer to the aim. Returns the codes, their log ratio from the aim, and an estimate of the log ratio
     /// that the step itself has, with the usual lambda.
     fn tried(
         &mut self,
@@ -199,14 +199,14 @@ impl<'a> TargetSearch<'a> {
         let mut optimized = self.descended(gaussians, search.at, first, observer)?;
         let (mut pass, mut step, mut lambda): (u32, f64, f64) = (first, search.at, 0.0);
         loop {
-            let deviation = self.deviation(&optimized.coded, aim, observer)?;
-            let expected = deviation - settling(pass) + settling(self.work.passes.max(pass + 1));
+            let log_ratio = self.log_ratio(&optimized.coded, aim, observer)?;
+            let expected = log_ratio - settling(pass) + settling(self.work.passes.max(pass + 1));
             let is_within_lambda = aim.is_within_lambda(expected);
             // The squared error of codes that are rounded twice is too large.
             let can_be_rounded = matches!(aim, FileAim::Size(_)) && pass < MOST_ROUNDED_PASSES;
             let can_change = is_within_lambda || can_be_rounded;
             let is_enough = pass >= self.work.passes
-                && (aim.miss(deviation, weak_share(&optimized.coded)) == 0.0
+                && (aim.violation(log_ratio, weak_share(&optimized.coded)) == 0.0
                     || pass >= MOST_PASSES
                     || lambda.abs() == MOST_LAMBDA_CHANGE
                     // A target that is out of reach gets no more passes than an encoding without
@@ -216,7 +216,7 @@ impl<'a> TargetSearch<'a> {
                 let by_step = aim.by_step() * (step - search.at);
                 return Ok((
                     optimized,
-                    deviation,
+                    log_ratio,
                     expected - aim.change_by_lambda(lambda) - by_step,
                 ));
             }
@@ -229,7 +229,7 @@ impl<'a> TargetSearch<'a> {
                 lambda = (lambda + change.clamp(-0.7, 0.7))
                     .clamp(-MOST_LAMBDA_CHANGE, MOST_LAMBDA_CHANGE);
             } else {
-                // Codes on a new lattice, which a pass improves as it improves those of the fit.
+                // Codes on a new quantization grid, which a pass improves as it improves those of the fit.
                 let too_much = expected - SETTLING_AGAIN - aim.middle();
                 step = (step - too_much / aim.by_step()).max(search.finest);
                 lambda = 0.0;
@@ -258,14 +258,14 @@ impl<'a> TargetSearch<'a> {
             let coded = self.codes.rounded(gaussians, search.at, observer)?;
             let fall =
                 settling_of_rounded(weak_share(&coded)) + settling(1) - settling(self.work.passes);
-            let deviation = self.deviation(&coded, aim, observer)? - fall - aim.middle();
-            if deviation.abs() < CLOSE_OF_ROUNDED {
-                return Ok((search.at - deviation / aim.by_step()).max(finest));
+            let log_ratio = self.log_ratio(&coded, aim, observer)? - fall - aim.middle();
+            if log_ratio.abs() < CLOSE_OF_ROUNDED {
+                return Ok((search.at - log_ratio / aim.by_step()).max(finest));
             }
-            if search.is_exhausted(deviation) {
+            if search.is_exhausted(log_ratio) {
                 break;
             }
-            search.tell(deviation);
+            search.report(log_ratio);
         }
         Ok(search.at)
     }
@@ -287,29 +287,29 @@ impl<'a> TargetSearch<'a> {
         Ok(optimized)
     }
 
-    /// The deviation from an aim.
-    fn deviation(
+    /// The log ratio from an aim.
+    fn log_ratio(
         &self,
         coded: &CodedLayers,
         aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<f64, EncodeError> {
         let file = self.layout.write_entropy(coded, observer)?;
-        let deviation = match aim {
+        let log_ratio = match aim {
             FileAim::Size(_) => (file.len() as f64 / aim.wanted()).log2(),
             FileAim::Psnr(_) => {
                 let verified = Verified::new(&file, self.judge.source(), observer)?;
                 let reached = verified.psnr(verified.gaussians(), observer)?;
-                ((aim.wanted() - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_DEVIATION)
+                ((aim.wanted() - reached) * 0.1 * 10_f64.log2()).max(-LARGEST_LOG_RATIO)
             }
             FileAim::Quality(quality) => {
                 let verified = Verified::new(&file, self.judge.source(), observer)?;
                 let verdict = self.judge.judge(&verified.picture(), observer)?;
-                verdict.excess(quality).log2().max(-LARGEST_DEVIATION)
+                verdict.excess(quality).log2().max(-LARGEST_LOG_RATIO)
             }
         };
         observer.advance(self.work.comparison())?;
-        Ok(deviation)
+        Ok(log_ratio)
     }
 
     /// The codes without the least useful ones, such that the file has at most so many bytes.
@@ -333,7 +333,7 @@ impl<'a> TargetSearch<'a> {
             let count = ((size - bytes) as f64 / bytes_each).ceil() as usize;
             by_use.truncate(by_use.len().saturating_sub(count));
             let codes = by_use.clone();
-            let codes = LatticeCodes { lattice: coded.lattice, codes };
+            let codes = QuantizedCodes { quantization: coded.quantization, codes };
             coded = self.layout.coded(codes, observer)?;
             size = self.layout.write_entropy(&coded, observer)?.len() as u64;
         }
@@ -341,17 +341,17 @@ impl<'a> TargetSearch<'a> {
     }
 
     /// The codes of a picture that is too good without the least useful ones, as many as can be spared, and
-    /// their deviation from the aim.
+    /// their log ratio from the aim.
     fn trimmed(
         &self,
         optimized: Optimized,
-        mut deviation: f64,
+        mut log_ratio: f64,
         aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64), EncodeError> {
         let Optimized { mut coded, mut by_use } = optimized;
-        if deviation > 0.0 || aim.miss(deviation, 0.0) == 0.0 {
-            return Ok((coded, deviation));
+        if log_ratio > 0.0 || aim.violation(log_ratio, 0.0) == 0.0 {
+            return Ok((coded, log_ratio));
         }
         // Those from `end` on cannot be spared, and likely not many more at a time.
         let mut end = by_use.len();
@@ -359,21 +359,21 @@ impl<'a> TargetSearch<'a> {
         for _ in 0..MOST_TRIMMINGS {
             let start = end.saturating_sub(portion);
             let codes = [&by_use[..start], &by_use[end..]].concat();
-            let lattice = coded.lattice.clone();
-            let fewer = self.layout.coded(LatticeCodes { lattice, codes }, observer)?;
-            let deviation_with_fewer = self.deviation(&fewer, aim, observer)?;
-            if deviation_with_fewer <= 0.0 {
+            let quantization = coded.quantization.clone();
+            let fewer = self.layout.coded(QuantizedCodes { quantization, codes }, observer)?;
+            let log_ratio_with_fewer = self.log_ratio(&fewer, aim, observer)?;
+            if log_ratio_with_fewer <= 0.0 {
                 by_use.drain(start..end);
-                (coded, deviation, end) = (fewer, deviation_with_fewer, start);
+                (coded, log_ratio, end) = (fewer, log_ratio_with_fewer, start);
             } else if portion > 1 {
                 portion /= 2;
             } else {
                 end -= 1;
             }
-            if end == 0 || aim.miss(deviation, 0.0) == 0.0 {
+            if end == 0 || aim.violation(log_ratio, 0.0) == 0.0 {
                 break;
             }
         }
-        Ok((coded, deviation))
+        Ok((coded, log_ratio))
     }
 }

@@ -12,7 +12,7 @@ use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::own_frame::{GeometryChange, GeometrySums};
-use crate::encode::raster::Raster;
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 
 // Constants: docs/tuning.md, "Search for a target".
@@ -110,13 +110,13 @@ impl Default for Window {
 
 impl Window {
     /// Size in bytes of what the largest window for some Gaussians keeps.
-    pub(crate) fn memory(raster: &Raster, gaussians: &[Gaussian]) -> usize {
-        let size = [raster.width, raster.height];
+    pub(crate) fn memory(tiled: &TiledSource, gaussians: &[Gaussian]) -> usize {
+        let size = [tiled.width, tiled.height];
         let windows = gaussians.iter().filter_map(|gaussian| window(gaussian, size));
         let pixels =
             windows.map(|[columns, rows]| columns.len().next_multiple_of(LANES) * rows.len());
         let largest = pixels.filter(|&pixels| pixels <= MOST_KEPT).max().unwrap_or(0);
-        largest * raster.channels * size_of::<i16>()
+        largest * tiled.channels * size_of::<i16>()
     }
 
     /// Takes a Gaussian out of the rendering in its window, all rows of which `band` must have. Returns

@@ -16,7 +16,7 @@ pub(crate) struct Info {
     /// is turned by `orientation`, 1 to 8 as in Exif.
     /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the
     /// quantizer of each component of the packed coding; with the entropy coding it is empty.
-    /// `lattice_steps` has the quantization steps of the entropy coding; with the packed coding it
+    /// `quantization_steps` has the quantization steps of the entropy coding; with the packed coding it
     /// is null.
     #[arg(long)]
     pub(crate) json: bool,

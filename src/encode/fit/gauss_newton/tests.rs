@@ -252,22 +252,22 @@ fn a_gaussian_alone_comes_to_its_optimum() {
 }
 
 #[test]
-fn the_pace_rises_with_agreement_and_falls_with_contradiction() {
+fn the_step_size_rises_with_agreement_and_falls_with_contradiction() {
     let color = [0.5, 0.0, 0.0, 0.0];
     let mut values = Components { center: [24.0; 2], shape: [3.0, 0.0, 3.0], color };
     let mut state = State::NEW;
-    let mut paced = |by_color: f32| {
+    let mut step_size_after = |by_color: f32| {
         let mut gradient = Components::ZERO;
         gradient.color[0] = by_color;
         step_alone(&mut values, &mut state, &gradient, Parameterization::Cholesky, 0.01);
-        state.pace
+        state.step_size
     };
-    let paces = [1.0, 1.0, 1.0, -9.0, 9.0].map(&mut paced);
-    assert_eq!(paces[0], FIRST_PACE);
-    assert!(paces[0] < paces[1] && paces[1] < paces[2], "{paces:?}");
-    assert!(paces[2] > paces[3] && paces[3] > paces[4], "{paces:?}");
+    let step_sizes = [1.0, 1.0, 1.0, -9.0, 9.0].map(&mut step_size_after);
+    assert_eq!(step_sizes[0], FIRST_STEP_SIZE);
+    assert!(step_sizes[0] < step_sizes[1] && step_sizes[1] < step_sizes[2], "{step_sizes:?}");
+    assert!(step_sizes[2] > step_sizes[3] && step_sizes[3] > step_sizes[4], "{step_sizes:?}");
     for _ in 0..50 {
-        paced(9.0);
+        step_size_after(9.0);
     }
-    assert_eq!(paced(9.0), MOST_PACE);
+    assert_eq!(step_size_after(9.0), MOST_STEP_SIZE);
 }

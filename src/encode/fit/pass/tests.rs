@@ -20,14 +20,14 @@ const PARAMETERIZATIONS: [Parameterization; 3] =
 /// Runs a pass with an observer that never cancels.
 fn run(
     pass: &mut Pass,
-    raster: &Raster,
+    tiled: &TiledSource,
     splats: &[Splat],
     kernel: Kernel,
     base: [f32; 4],
 ) -> RenderingError {
     unobserved(|observer| {
-        pass.bin(raster, splats, kernel, observer)?;
-        pass.run(raster, splats, kernel, base, None, observer)
+        pass.bin(tiled, splats, kernel, observer)?;
+        pass.run(tiled, splats, kernel, base, None, observer)
     })
 }
 
@@ -37,7 +37,7 @@ fn loss(
     parameterization: Parameterization,
     kernel: Kernel,
     source: &Source<'_>,
-    raster: &Raster,
+    tiled: &TiledSource,
 ) -> f64 {
     let channels = source.color().channels();
     let mut residuals = Vec::new();
@@ -78,7 +78,7 @@ fn loss(
         }
     }
     let size = [WIDTH as usize, HEIGHT as usize];
-    let distortion = match &raster.sensitivity {
+    let distortion = match &tiled.sensitivity {
         Some(sensitivity) => plain_distortion(sensitivity, size, &residuals),
         None => residuals.iter().map(|residual| residual * residual).sum(),
     };
@@ -124,13 +124,13 @@ fn gradients(
     scene: &[Components],
     parameterization: Parameterization,
     kernel: Kernel,
-    raster: &Raster,
+    tiled: &TiledSource,
 ) -> Vec<Components> {
     let splats = splats_of(scene, parameterization);
-    let mut pass = Pass::new(raster);
-    run(&mut pass, raster, &splats, kernel, BASE);
+    let mut pass = Pass::new(tiled);
+    run(&mut pass, tiled, &splats, kernel, BASE);
     let gradients = scene.iter().enumerate().map(|(index, components)| {
-        let SplatGradient { geometry, color } = pass.gradient(index, raster.channels);
+        let SplatGradient { geometry, color } = pass.gradient(index, tiled.channels);
         let (center, shape) =
             parameterization::gradients(&geometry, parameterization, components.shape);
         Components { center, shape, color }
@@ -156,9 +156,10 @@ fn every_gradient_equals_its_finite_difference() {
             let scene = scene(parameterization, channels, &mut rng);
             let exact = scene.iter().map(|components| components.to_array().map(f64::from));
             let exact = exact.collect::<Vec<_>>();
-            let raster =
-                unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
-            let found = gradients(&scene, parameterization, kernel, &raster);
+            let tiled = unobserved(|observer| {
+                TiledSource::new(&source.keeping_invisible(true), tune, observer)
+            });
+            let found = gradients(&scene, parameterization, kernel, &tiled);
             for (index, found) in found.iter().enumerate() {
                 let found = found.to_array();
                 for component in 0..component_count(channels) {
@@ -167,7 +168,7 @@ fn every_gradient_equals_its_finite_difference() {
                         let mut moved = exact.clone();
                         moved[index][component] += by;
                         let moved: Vec<_> = moved.into_iter().map(Components::from_array).collect();
-                        loss(&moved, parameterization, kernel, &source, &raster)
+                        loss(&moved, parameterization, kernel, &source, &tiled)
                     };
                     let expected = (moved(step) - moved(-step)) / (2.0 * step);
                     let error = (f64::from(found[component]) - expected).abs();
@@ -192,9 +193,9 @@ fn every_simd_level_gives_the_same_bits() {
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
     let scene = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats = splats_of(&scene, Parameterization::Cholesky);
-    let run = |level, raster: &Raster| {
-        let mut pass = Pass { level, ..Pass::new(raster) };
-        let error = run(&mut pass, raster, &splats, Kernel::Quartic, BASE);
+    let run = |level, tiled: &TiledSource| {
+        let mut pass = Pass { level, ..Pass::new(tiled) };
+        let error = run(&mut pass, tiled, &splats, Kernel::Quartic, BASE);
         let gradients = (0..splats.len()).map(|splat| pass.gradient(splat, 3));
         (error, gradients.collect())
     };
@@ -209,13 +210,14 @@ fn every_simd_level_gives_the_same_bits() {
             .collect()
     };
     for tune in [Tune::Visual, Tune::Psnr] {
-        let raster =
-            unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
-        let expected = run(Level::baseline(), &raster);
+        let tiled = unobserved(|observer| {
+            TiledSource::new(&source.keeping_invisible(true), tune, observer)
+        });
+        let expected = run(Level::baseline(), &tiled);
         assert!(expected.0.squared > 0.0 && expected.0.distortion > 0.0);
         let expected = bits(expected);
         for (name, level) in simd_levels() {
-            let found = bits(run(level, &raster));
+            let found = bits(run(level, &tiled));
             assert_eq!(found.len(), expected.len(), "{tune:?} {name}");
             let differing = found.iter().zip(&expected).filter(|(a, b)| a != b).count();
             assert_eq!(differing, 0, "{tune:?} {name}: of {} values", expected.len());
@@ -227,13 +229,14 @@ fn every_simd_level_gives_the_same_bits() {
 fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let white = [255; 5 * 3 * 3];
     let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
-    let raster =
-        unobserved(|observer| Raster::new(&source.keeping_invisible(true), Tune::Visual, observer));
+    let tiled = unobserved(|observer| {
+        TiledSource::new(&source.keeping_invisible(true), Tune::Visual, observer)
+    });
     let gaussian =
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
-    let mut pass = Pass::new(&raster);
-    let error = run(&mut pass, &raster, &[splat], Kernel::Quartic, [0.9; 4]);
+    let mut pass = Pass::new(&tiled);
+    let error = run(&mut pass, &tiled, &[splat], Kernel::Quartic, [0.9; 4]);
     assert_eq!(error, RenderingError::default());
     assert_eq!(pass.gradient(0, 3), SplatGradient::default());
 }
@@ -246,24 +249,25 @@ fn measured_distortions_are_those_of_the_tiles_rendered_again() {
     let scene = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats = splats_of(&scene, Parameterization::Cholesky);
     for tune in [Tune::Visual, Tune::Psnr] {
-        let raster =
-            unobserved(|observer| Raster::new(&source.keeping_invisible(true), tune, observer));
+        let tiled = unobserved(|observer| {
+            TiledSource::new(&source.keeping_invisible(true), tune, observer)
+        });
         let kernel = Kernel::Quartic;
         for measure in [Distortion::L1, Distortion::L3] {
-            let mut pass = Pass::new(&raster);
+            let mut pass = Pass::new(&tiled);
             unobserved(|observer| {
-                pass.bin(&raster, &splats, kernel, observer)?;
-                pass.run(&raster, &splats, kernel, BASE, Some(measure), observer)
+                pass.bin(&tiled, &splats, kernel, observer)?;
+                pass.run(&tiled, &splats, kernel, BASE, Some(measure), observer)
             });
-            let columns = raster.width.div_ceil(TILE_WIDTH);
+            let columns = tiled.width.div_ceil(TILE_WIDTH);
             let expected = pass.distortions();
-            assert_eq!(expected.len(), columns * raster.height.div_ceil(TILE_HEIGHT));
+            assert_eq!(expected.len(), columns * tiled.height.div_ceil(TILE_HEIGHT));
             let rendered =
-                Rendered { pass: &pass, raster: &raster, splats: &splats, kernel, base: BASE };
+                Rendered { pass: &pass, tiled: &tiled, splats: &splats, kernel, base: BASE };
             for (tile, &expected) in expected.iter().enumerate() {
                 let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
                 let planes = rendered.residuals(tile);
-                let found = distortion_map::of_tile(&raster, corner, &planes, measure);
+                let found = distortion_map::of_tile(&tiled, corner, &planes, measure);
                 assert!(expected > 0.0);
                 assert_eq!(found.as_flattened().iter().sum::<f32>(), expected);
             }

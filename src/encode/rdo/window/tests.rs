@@ -4,9 +4,9 @@ use super::*;
 use crate::color::ColorModel;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
-use crate::encode::raster::Raster;
 use crate::encode::rdo::residuals::Residuals;
 use crate::encode::source::Source;
+use crate::encode::tiled_source::TiledSource;
 
 // The window of a Gaussian that covers all is shared by threads.
 const WIDTH: usize = 125;
@@ -18,7 +18,7 @@ struct Scene {
     source: Vec<u8>,
     /// Plane after plane.
     rendering: Vec<f32>,
-    raster: Raster,
+    tiled: TiledSource,
 }
 
 /// A random source, with even ground on the left, and a random rendering of it. If `clamped`, the
@@ -46,10 +46,10 @@ fn scene(model: ColorModel, clamped: bool) -> Scene {
     let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
     let size = [WIDTH, HEIGHT].map(|length| length as u32);
     let of_raster = Source::new_u8(size[0], size[1], model, &source).expect("the sizes agree");
-    let raster = unobserved(|observer| {
-        Raster::new(&of_raster.keeping_invisible(true), Tune::Visual, observer)
+    let tiled = unobserved(|observer| {
+        TiledSource::new(&of_raster.keeping_invisible(true), Tune::Visual, observer)
     });
-    Scene { model, source, rendering, raster }
+    Scene { model, source, rendering, tiled }
 }
 
 fn gaussians() -> Vec<Gaussian> {
@@ -104,15 +104,15 @@ fn plain_error(scene: &Scene, gaussian: &Gaussian, factor: f64) -> f64 {
 fn weighted_error(scene: &Scene, residuals: impl Iterator<Item = f64>) -> f64 {
     let terms = residuals.enumerate().map(|(at, residual)| {
         let pixel = at / scene.model.channels();
-        let sensitivity = scene.raster.sensitivity(pixel % WIDTH, pixel / WIDTH);
+        let sensitivity = scene.tiled.sensitivity(pixel % WIDTH, pixel / WIDTH);
         f64::from(sensitivity) * residual * residual
     });
     terms.sum()
 }
 
 fn residuals(scene: &Scene) -> Residuals {
-    let mut residuals = unobserved(|observer| Residuals::new(&scene.raster, observer));
-    residuals.set(&scene.raster, 0, &scene.rendering);
+    let mut residuals = unobserved(|observer| Residuals::new(&scene.tiled, observer));
+    residuals.set(&scene.tiled, 0, &scene.rendering);
     residuals
 }
 

@@ -35,7 +35,7 @@ enum Planes {
 
 /// The samples of a picture by tiles.
 #[derive(Debug)]
-pub(crate) struct Raster {
+pub(crate) struct TiledSource {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) channels: usize,
@@ -46,11 +46,11 @@ pub(crate) struct Raster {
     /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) mean: [f32; 4],
     planes: Planes,
-    /// Size in bytes of what else [`Raster::new`] needed.
+    /// Size in bytes of what else [`TiledSource::new`] needed.
     pub(crate) scratch_memory: usize,
 }
 
-impl Raster {
+impl TiledSource {
     /// That of a source. Colours that do not show are others, unless they are to be kept.
     ///
     /// # Errors
@@ -279,8 +279,8 @@ mod tests {
         let samples: Vec<u8> =
             (0..96 * 96).map(|i| if i % 96 < 48 { 128 } else { rng.u8(..) }).collect();
         let source = Source::new_u8(96, 96, ColorModel::Gray, &samples).expect("the sizes agree");
-        let raster = |tune| unobserved(|observer| Raster::new(&source, tune, observer));
-        let visual = raster(Tune::Visual);
+        let tiled = |tune| unobserved(|observer| TiledSource::new(&source, tune, observer));
+        let visual = tiled(Tune::Visual);
         let [even, noise] = [8.0, 88.0].map(|x| visual.sensitivity_near([x, 48.0]));
         assert!(even > 4.0 * noise, "{even}, {noise}");
         let under = |x, cholesky| visual.sensitivity_under([x, 48.0], cholesky);
@@ -289,6 +289,6 @@ mod tests {
         assert!((under(60.0, [30.0, 0.0, 2.0]) - noise) > 0.1 * even);
         assert!(under(60.0, [2.0, 0.0, 30.0]) < 2.0 * noise);
         assert!(under(-1e30, [1e30, 1e30, 1.0]).is_finite());
-        assert_eq!(raster(Tune::Psnr).sensitivity_under([60.0, 48.0], [30.0, 0.0, 2.0]), 1.0);
+        assert_eq!(tiled(Tune::Psnr).sensitivity_under([60.0, 48.0], [30.0, 0.0, 2.0]), 1.0);
     }
 }

@@ -1,5 +1,5 @@
-//! The lattice of Gaussians that entropy-coded files can store: integer codes to values and back
-//! (spec, section 7.5). The precision class of a Gaussian scales the steps of its geometry.
+//! The quantization grid: the Gaussians that entropy-coded files can store, from integer codes to values and
+//! back (spec, section 7.5). The step exponent of a Gaussian scales the steps of its geometry.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -16,8 +16,8 @@ use crate::simd::Backend;
 
 /// Steps of geometry: position, size, ratio, slant.
 const GEOMETRY: usize = 4;
-/// Largest precision class.
-pub(crate) const MAX_CLASS: u32 = 7;
+/// Largest step exponent.
+pub(crate) const MAX_EXPONENT: u32 = 7;
 /// The largest code that the encoder rounds to.
 #[cfg(feature = "encode")]
 pub(crate) const MOST_CODE: f32 = 30_000.0;
@@ -37,11 +37,11 @@ const AXES: [[f32; 3]; 3] = [
     [0.408_248_3, -0.816_496_6, 0.408_248_3],
 ];
 
-/// The integer codes of a Gaussian, in steps of the [`Lattice`].
+/// The integer codes of a Gaussian, in steps of the [`Quantization`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Code {
-    /// Precision class c, 0 to [`MAX_CLASS`]: steps of geometry are 2^-c of those of the file.
-    pub(crate) class: u32,
+    /// Step exponent n, 0 to [`MAX_EXPONENT`]: steps of geometry are 2^-n of those of the file.
+    pub(crate) exponent: u32,
     /// Amplitudes along the colour axes, times the geometric mean of l11 and l22.
     pub(crate) color: [i32; 4],
     /// Logarithm of the geometric mean of l11 and l22.
@@ -66,28 +66,28 @@ pub(crate) struct Shape {
 /// Exponentials of codes times steps, with a table of those that are likely.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ExpTable {
-    /// The step of precision class 0.
+    /// The step of exponent 0.
     step: f32,
-    /// The table, precision class by precision class. It is worth it: decoding waits for the shape of each
+    /// The table, exponent by exponent. It is worth it: decoding waits for the shape of each
     /// Gaussian before it reads on.
     likely: Vec<f32>,
 }
 
 impl ExpTable {
-    /// How many codes of precision class 0 are in the table: half of them negative. Every class has
+    /// How many codes of exponent 0 are in the table: half of them negative. Every exponent has
     /// twice as many as the one before.
     const LIKELY: u32 = 16;
-    /// Precision classes in the table.
-    const CLASSES: u32 = 6;
+    /// Step exponents in the table.
+    const EXPONENTS: u32 = 6;
 
     fn new(step: f32) -> Self {
-        let mut likely = vec![0.0; (Self::LIKELY as usize) * ((1 << Self::CLASSES) - 1)];
+        let mut likely = vec![0.0; (Self::LIKELY as usize) * ((1 << Self::EXPONENTS) - 1)];
         Backend::fastest().run(
             #[inline(always)]
             || {
                 let mut rest = likely.as_mut_slice();
-                for class in 0..Self::CLASSES {
-                    let (count, step) = (Self::LIKELY << class, step * class_scale(class));
+                for exponent in 0..Self::EXPONENTS {
+                    let (count, step) = (Self::LIKELY << exponent, step * step_scale(exponent));
                     let (values, later) = rest.split_at_mut(count as usize);
                     rest = later;
                     let first = -(count as i32 / 2);
@@ -105,30 +105,30 @@ impl ExpTable {
         math::exp((code as f32 * step).clamp(-MAX_LOGARITHM, MAX_LOGARITHM))
     }
 
-    /// The step of precision class 0.
+    /// The step of exponent 0.
     pub(crate) fn step(&self) -> f32 {
         self.step
     }
 
-    /// The exponential of a code of a precision class.
-    fn of(&self, code: i32, class: u32) -> f32 {
-        let count = Self::LIKELY << class;
+    /// The exponential of a code with a step exponent.
+    fn of(&self, code: i32, exponent: u32) -> f32 {
+        let count = Self::LIKELY << exponent;
         let index = code.wrapping_add(count as i32 / 2) as u32;
-        if class < Self::CLASSES && index < count {
+        if exponent < Self::EXPONENTS && index < count {
             return self.likely[(count - Self::LIKELY + index) as usize];
         }
-        Self::exp(code, self.step * class_scale(class))
+        Self::exp(code, self.step * step_scale(exponent))
     }
 }
 
 /// The quantizer steps of a file with [`Coding::Entropy`](crate::Coding), each from 2^-20 to 2^10
 /// (spec, section 7.5).
 ///
-/// Each Gaussian has a precision class c, 0 to 7. The steps of position, size, ratio and slant are
-/// those of class 0; for the others they are multiplied by 2^-c.
+/// Each Gaussian has a step exponent n, 0 to 7. The steps of position, size, ratio and slant are
+/// those of exponent 0; for the others they are multiplied by 2^-n.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct LatticeSteps {
+pub struct QuantizationSteps {
     /// Of the centre, along x in units of l11 and along y in units of l22. The intervals in pixels
     /// are then rounded to powers of two.
     pub position: f32,
@@ -143,9 +143,9 @@ pub struct LatticeSteps {
     pub color: Vec<f32>,
 }
 
-/// The lattice of a file: the [`LatticeSteps`], with tables of exponentials.
+/// The quantization grid of a file: the [`QuantizationSteps`], with tables of exponentials.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Lattice {
+pub(crate) struct Quantization {
     pub(crate) position: f32,
     pub(crate) size: ExpTable,
     pub(crate) ratio: ExpTable,
@@ -153,8 +153,8 @@ pub(crate) struct Lattice {
     pub(crate) color: Vec<f32>,
 }
 
-impl Lattice {
-    /// The lattice with these steps: of position, size, ratio and slant, and of each colour axis.
+impl Quantization {
+    /// The quantization grid with these steps: of position, size, ratio and slant, and of each colour axis.
     pub(crate) fn new([position, size, ratio, slant]: [f32; GEOMETRY], color: Vec<f32>) -> Self {
         let [size, ratio] = [size, ratio].map(ExpTable::new);
         Self { position, size, ratio, slant, color }
@@ -176,8 +176,8 @@ impl Lattice {
     }
 
     /// The steps.
-    pub(crate) fn steps(&self) -> LatticeSteps {
-        LatticeSteps {
+    pub(crate) fn steps(&self) -> QuantizationSteps {
+        QuantizationSteps {
             position: self.position,
             size: self.size.step,
             ratio: self.ratio.step,
@@ -196,20 +196,20 @@ impl Lattice {
     /// The shape of a Gaussian with this code.
     #[inline]
     pub(crate) fn shape(&self, code: &Code) -> Shape {
-        let size = self.size.of(code.size, code.class);
-        let ratio = self.ratio.of(code.ratio, code.class);
+        let size = self.size.of(code.size, code.exponent);
+        let ratio = self.ratio.of(code.ratio, code.exponent);
         let (l11, l22) = (size * ratio, size / ratio);
-        let l21 = code.slant as f32 * (self.slant * class_scale(code.class)) * l22;
+        let l21 = code.slant as f32 * (self.slant * step_scale(code.exponent)) * l22;
         Shape { size, cholesky: [l11, l21, l22] }
     }
 
     /// The fraction bits f of the coordinates along x and y: the position interval is 2^-f pixels,
     /// more than a pixel if f is negative.
-    pub(crate) fn fraction_bits(&self, class: u32, shape: &Shape) -> [i32; 2] {
+    pub(crate) fn fraction_bits(&self, exponent: u32, shape: &Shape) -> [i32; 2] {
         let [l11, _, l22] = shape.cholesky;
         [l11, l22].map(|extent| {
             // With the factor sqrt(2), the exponent is that of the nearest power of two.
-            let step = self.position * class_scale(class) * extent * core::f32::consts::SQRT_2;
+            let step = self.position * step_scale(exponent) * extent * core::f32::consts::SQRT_2;
             let exponent = (step.to_bits() >> 23) as i32 - 127;
             (-exponent).min(MAX_FRACTION_BITS)
         })
@@ -237,14 +237,14 @@ impl Lattice {
 impl Code {
     /// How much the Gaussian adds to the picture: the sum of the squares of its colour codes. Their
     /// steps are relative to the Gaussian's size, so this follows its energy.
-    pub(crate) fn strength(&self) -> i64 {
+    pub(crate) fn energy(&self) -> i64 {
         self.color.iter().map(|&code| i64::from(code) * i64::from(code)).sum()
     }
 }
 
 #[cfg(feature = "encode")]
-impl Lattice {
-    /// The code of a precision class that is nearest to a Gaussian, or of a lower class if the slant is so
+impl Quantization {
+    /// The code with a step exponent that is nearest to a Gaussian, or of a lower exponent if the slant is so
     /// large that it has no code in this one.
     ///
     /// Where possible, a component compensates for the rounding errors of those before it: what
@@ -252,21 +252,21 @@ impl Lattice {
     pub(crate) fn code(
         &self,
         gaussian: &Gaussian,
-        class: u32,
+        exponent: u32,
         grid: &CenterGrid,
         model: ColorModel,
     ) -> Code {
-        let scale = class_scale(class);
+        let scale = step_scale(exponent);
         let nearest = |value: f32, step: f32| (value / step).round().clamp(-MOST_CODE, MOST_CODE);
         let [l11, l21, l22] = gaussian.cholesky;
         let size = nearest(0.5 * (l11 * l22).ln(), self.size.step * scale) as i32;
         let ratio = nearest(0.5 * (l11 / l22).ln(), self.ratio.step * scale) as i32;
-        let mut code = Code { class, size, ratio, ..Code::default() };
+        let mut code = Code { exponent, size, ratio, ..Code::default() };
         // With L (I + D) for the rounded Cholesky factor, this slant makes D21 zero.
         let Shape { size, cholesky: [c11, _, c22] } = self.shape(&code);
         let slant = l21 / l22 * (1.0 + (c11 / l11).ln() - (c22 / l22).ln());
-        if class > 0 && slant.abs() > MOST_CODE * self.slant * scale {
-            return self.code(gaussian, class - 1, grid, model);
+        if exponent > 0 && slant.abs() > MOST_CODE * self.slant * scale {
+            return self.code(gaussian, exponent - 1, grid, model);
         }
         code.slant = nearest(slant, self.slant * scale) as i32;
         code.center = self.placed(&code, gaussian.center, grid);
@@ -282,7 +282,7 @@ impl Lattice {
     pub(crate) fn placed(&self, code: &Code, [x, y]: [f32; 2], grid: &CenterGrid) -> [u32; 2] {
         let shape = self.shape(code);
         let [l11, l21, _] = shape.cholesky;
-        let fraction_bits = self.fraction_bits(code.class, &shape);
+        let fraction_bits = self.fraction_bits(code.exponent, &shape);
         let column = grid.snapped(grid.units([x, y])[0], fraction_bits[0]);
         let error = grid.center([column, 0])[0] - x;
         let row = grid.snapped(grid.units([x, y + l21 / l11 * error])[1], fraction_bits[1]);
@@ -291,7 +291,7 @@ impl Lattice {
 
     /// The logarithms of size and ratio that a code stands for, and the slant.
     pub(crate) fn shape_values(&self, code: &Code) -> [f32; 3] {
-        let scale = class_scale(code.class);
+        let scale = step_scale(code.exponent);
         [
             code.size as f32 * (self.size.step * scale),
             code.ratio as f32 * (self.ratio.step * scale),
@@ -318,7 +318,7 @@ impl Lattice {
         forward: bool,
         grid: &CenterGrid,
     ) -> Option<Code> {
-        let fraction_bits = self.fraction_bits(code.class, &self.shape(code))[axis];
+        let fraction_bits = self.fraction_bits(code.exponent, &self.shape(code))[axis];
         let step = 1 << grid.interval_bits(fraction_bits);
         let center = code.center[axis];
         let center = if forward { center.checked_add(step)? } else { center.checked_sub(step)? };
@@ -331,14 +331,14 @@ impl Lattice {
 /// The Gaussians of an entropy-coded file, as codes.
 #[cfg(feature = "encode")]
 #[derive(Clone, Debug)]
-pub(crate) struct LatticeCodes {
-    pub(crate) lattice: Lattice,
+pub(crate) struct QuantizedCodes {
+    pub(crate) quantization: Quantization,
     pub(crate) codes: Vec<Code>,
 }
 
-/// What the steps of a precision class are multiplied by: 2^-class.
-pub(super) fn class_scale(class: u32) -> f32 {
-    f32::from_bits((127 - class) << 23)
+/// What the steps of a step exponent are multiplied by: 2^-nxponent.
+pub(super) fn step_scale(exponent: u32) -> f32 {
+    f32::from_bits((127 - exponent) << 23)
 }
 
 /// Channels from colour axes. Gray and alpha are axes of their own.
@@ -372,14 +372,14 @@ mod tests {
     #[cfg(feature = "encode")]
     #[test]
     fn a_steep_gaussian_keeps_its_direction() {
-        let lattice = Lattice::new([1.1, 0.8, 0.9, 1.7], vec![0.01]);
+        let quantization = Quantization::new([1.1, 0.8, 0.9, 1.7], vec![0.01]);
         let grid = CenterGrid::new(400, 300);
         for slant in [1.0_f32, 300.0, -470.0, 3000.0] {
             let cholesky = [0.57 * slant.abs(), 0.57 * slant, 0.57];
             let gaussian =
                 Gaussian { center: [113.9, 41.9], cholesky, color: [1.9, 0.0, 0.0, 0.0] };
-            let code = lattice.code(&gaussian, MAX_CLASS, &grid, ColorModel::Gray);
-            let [l11, l21, _] = lattice.shape(&code).cholesky;
+            let code = quantization.code(&gaussian, MAX_EXPONENT, &grid, ColorModel::Gray);
+            let [l11, l21, _] = quantization.shape(&code).cholesky;
             assert!((l21 / l11 - slant.signum()).abs() < 0.01, "{slant}: {code:?}");
         }
     }
@@ -388,12 +388,12 @@ mod tests {
     fn the_table_has_the_values_that_are_computed_without_it() {
         for step in [0.9, 0.013, 700.0] {
             let exponentials = ExpTable::new(step);
-            for class in 0..=MAX_CLASS {
-                let step = step * class_scale(class);
+            for exponent in 0..=MAX_EXPONENT {
+                let step = step * step_scale(exponent);
                 for code in (-1000..1000).chain([i32::MIN, i32::MAX]) {
-                    let found = exponentials.of(code, class);
+                    let found = exponentials.of(code, exponent);
                     let computed = ExpTable::exp(code, step);
-                    assert_eq!(found.to_bits(), computed.to_bits(), "{step} {class} {code}");
+                    assert_eq!(found.to_bits(), computed.to_bits(), "{step} {exponent} {code}");
                 }
             }
         }
