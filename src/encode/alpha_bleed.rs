@@ -22,10 +22,6 @@ const TAPS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
 // Constants: docs/tuning.md, "Not measured".
 /// The known share of what a cell is made from with which it is known: that of a cell beside an edge.
 const ENOUGH: f32 = 0.125;
-/// Rows that one task computes.
-const ROWS: usize = 16;
-/// Work for a pixel.
-const WORK: f64 = 20.0;
 
 /// Samples of either depth.
 #[derive(Debug)]
@@ -152,22 +148,20 @@ fn bled<T: Sample>(
         coarser = level;
     }
     let mut samples = samples.to_vec();
-    let rows = samples.chunks_mut(ROWS * width * channels).enumerate();
-    observer.map(WORK * (ROWS * width) as f64, rows, |(band, samples)| {
-        for (row, samples) in samples.chunks_exact_mut(width * channels).enumerate() {
-            let around = coarser.around_row(band * ROWS + row);
-            for (x, pixel) in samples.chunks_exact_mut(channels).enumerate() {
-                let alpha = pixel[colors].into();
-                if alpha == full {
-                    continue;
-                }
-                // Infinite where the pixel is transparent.
-                let reach = (LEAST_VISIBLE * full / alpha).floor();
-                let found = around.color(x);
-                for (sample, found) in pixel[..colors].iter_mut().zip(found) {
-                    let value: f32 = (*sample).into();
-                    *sample = T::nearest(found.clamp(value - reach, value + reach));
-                }
+    let rows = samples.chunks_exact_mut(width * channels).enumerate();
+    observer.map(rows, |(y, samples)| {
+        let around = coarser.around_row(y);
+        for (x, pixel) in samples.chunks_exact_mut(channels).enumerate() {
+            let alpha = pixel[colors].into();
+            if alpha == full {
+                continue;
+            }
+            // Infinite where the pixel is transparent.
+            let reach = (LEAST_VISIBLE * full / alpha).floor();
+            let found = around.color(x);
+            for (sample, found) in pixel[..colors].iter_mut().zip(found) {
+                let value: f32 = (*sample).into();
+                *sample = T::nearest(found.clamp(value - reach, value + reach));
             }
         }
     })?;
@@ -207,12 +201,9 @@ impl Level {
         cell: impl Fn(usize, usize) -> Cell + Sync + Send,
     ) -> Result<Self, EncodeError> {
         let mut cells = vec![[0.0; 4]; width * height];
-        let bands = cells.chunks_mut(ROWS * width).enumerate();
-        observer.map(WORK * (ROWS * width) as f64, bands, |(band, cells)| {
-            for (row, cells) in cells.chunks_exact_mut(width).enumerate() {
-                for (x, found) in cells.iter_mut().enumerate() {
-                    *found = cell(x, band * ROWS + row);
-                }
+        observer.map(cells.chunks_exact_mut(width).enumerate(), |(y, cells)| {
+            for (x, found) in cells.iter_mut().enumerate() {
+                *found = cell(x, y);
             }
         })?;
         Ok(Self { width, height, cells })
@@ -225,17 +216,14 @@ impl Level {
     /// Fills what is not known from a level of half the size, of which all is known.
     fn fill(&mut self, coarser: &Self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let width = self.width;
-        let bands = self.cells.chunks_mut(ROWS * width).enumerate();
-        observer.map(WORK * (ROWS * width) as f64, bands, |(band, cells)| {
-            for (row, cells) in cells.chunks_exact_mut(width).enumerate() {
-                let around = coarser.around_row(band * ROWS + row);
-                for (x, cell) in cells.iter_mut().enumerate() {
-                    let known = cell[3];
-                    if known < 1.0 {
-                        let found = around.color(x);
-                        for (color, found) in cell.iter_mut().zip(found) {
-                            *color = known * *color + (1.0 - known) * found;
-                        }
+        observer.map(self.cells.chunks_exact_mut(width).enumerate(), |(y, cells)| {
+            let around = coarser.around_row(y);
+            for (x, cell) in cells.iter_mut().enumerate() {
+                let known = cell[3];
+                if known < 1.0 {
+                    let found = around.color(x);
+                    for (color, found) in cell.iter_mut().zip(found) {
+                        *color = known * *color + (1.0 - known) * found;
                     }
                 }
             }

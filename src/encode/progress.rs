@@ -4,6 +4,7 @@ use core::fmt;
 use core::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use super::error::EncodeError;
 use crate::threads;
@@ -25,11 +26,11 @@ pub struct Progress {
     pub psnr: f64,
 }
 
-/// Work of a thread from one poll of the observer to the next: a few milliseconds.
-const WORK_PER_POLL: f64 = 4e6;
-/// The least work that a thread takes from what all of them share: taking it costs a hundredth.
-const LEAST_WORK: f64 = 1e4;
-/// A thread takes an nth of its equal share of the remaining work at a time, so that all threads end at
+/// Time of a thread from one poll of the observer to the next, if no task takes longer.
+const BETWEEN_POLLS: Duration = Duration::from_millis(4);
+/// The least time for which a thread takes tasks from what all threads share: taking them costs a hundredth.
+const LEAST_PORTION: Duration = Duration::from_micros(10);
+/// A thread takes an nth of its equal share of the remaining tasks at a time, so that all threads end at
 /// about the same time.
 const PART_OF_SHARE: usize = 3;
 /// The least work that is assumed to be left, as a share of the work done: an estimate may be too low.
@@ -104,18 +105,17 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// What `task` makes of every item, in their order. All threads share the tasks, each of which is so
-    /// much work, and every few milliseconds there is a poll on this one.
+    /// What `task` makes of every item, in their order. All threads share the tasks, and every few
+    /// milliseconds there is a poll on this one.
     ///
     /// # Errors
     /// As [`Observer::poll`].
     pub(crate) fn map<T: Send, R: Send>(
         &mut self,
-        work: f64,
         items: impl ExactSizeIterator<Item = T> + Send,
         task: impl Fn(T) -> R + Send + Sync,
     ) -> Result<Vec<R>, EncodeError> {
-        self.map_with(work, items, |(): &mut (), item| task(item))
+        self.map_with(items, |(): &mut (), item| task(item))
     }
 
     /// [`Observer::map`], where each thread has memory of its own, which it passes to all of its tasks.
@@ -124,19 +124,15 @@ impl<'a> Observer<'a> {
     /// As [`Observer::poll`].
     pub(crate) fn map_with<M: Default, T: Send, R: Send>(
         &mut self,
-        work: f64,
         items: impl ExactSizeIterator<Item = T> + Send,
         task: impl Fn(&mut M, T) -> R + Send + Sync,
     ) -> Result<Vec<R>, EncodeError> {
         let total = items.len();
         let threads = rayon::current_num_threads();
-        // The casts saturate.
-        let most = ((WORK_PER_POLL / work) as usize).max(1);
-        let least = if threads > 1 { ((LEAST_WORK / work) as usize).clamp(1, most) } else { most };
         let items = Mutex::new(items);
         let is_cancelled = AtomicBool::new(false);
         // Moves the next items to `portion`, and returns the index of the first.
-        let take = |portion: &mut Vec<T>| {
+        let take = |portion: &mut Vec<T>, least, most| {
             let mut items = items.lock().expect("items do not panic");
             let left = items.len();
             if !is_cancelled.load(Ordering::Relaxed) {
@@ -148,32 +144,38 @@ impl<'a> Observer<'a> {
         let results = Mutex::new(Vec::new());
         let run = |mut poll: Option<&mut dyn FnMut() -> Result<(), EncodeError>>| {
             let (mut memory, mut portion) = (M::default(), Vec::new());
-            let mut since_poll = most;
+            let (mut least, mut most, mut since_poll) = (1, 1, BETWEEN_POLLS);
             loop {
-                let first = take(&mut portion);
-                if portion.is_empty() {
+                let first = take(&mut portion, least, most);
+                let count = portion.len();
+                if count == 0 {
                     return Ok(());
                 }
                 if let Some(poll) = &mut poll
-                    && since_poll >= most
+                    && since_poll >= BETWEEN_POLLS
                 {
-                    since_poll = 0;
+                    since_poll = Duration::ZERO;
                     poll().inspect_err(|_| is_cancelled.store(true, Ordering::Relaxed))?;
                 }
-                since_poll += portion.len();
+                let start = Instant::now();
                 let found: Vec<R> = portion.drain(..).map(|item| task(&mut memory, item)).collect();
+                let time = start.elapsed();
                 results.lock().expect("no task runs meanwhile").push((first, found));
+                since_poll += time;
+                // The next tasks may take longer.
+                let within = |limit: Duration| {
+                    let share = limit.div_duration_f64(time);
+                    ((share * count as f64) as usize).clamp(1, 2 * count)
+                };
+                (least, most) = (within(LEAST_PORTION), within(BETWEEN_POLLS));
             }
         };
-        let others = total.div_ceil(least).min(threads).saturating_sub(1);
+        let others = total.min(threads).saturating_sub(1);
         let mut outcome: Result<(), EncodeError> = Ok(());
         let help = || run(None).expect("only polls fail");
         threads::together(others, help, || outcome = run(Some(&mut || self.poll())));
         outcome?;
         let mut results = results.into_inner().expect("no task runs meanwhile");
-        if let [(_, all)] = &mut results[..] {
-            return Ok(core::mem::take(all));
-        }
         results.sort_unstable_by_key(|&(first, _)| first);
         let mut all = Vec::with_capacity(total);
         results.into_iter().for_each(|(_, mut found)| all.append(&mut found));
@@ -196,6 +198,8 @@ pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T, En
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicUsize;
+
     use super::*;
 
     /// Fractions that the callback gets.
@@ -234,21 +238,22 @@ mod tests {
     }
 
     #[test]
-    fn tasks_keep_their_order_and_there_is_a_poll_every_few_milliseconds() {
+    fn tasks_keep_their_order_and_long_ones_have_polls_between_them() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
         pool.install(|| {
-            let mut polls = 0;
+            let (mut polls, mut done) = (0, AtomicUsize::new(0));
             let mut callback = |_: &Progress| {
                 polls += 1;
-                if polls > 260 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                if polls == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let mut observer = Observer::new(&mut callback, 1);
-            let doubled = observer.map(1e6, 0..1000, |number| 2 * number).expect("few polls");
-            assert_eq!(doubled, (0..1000).map(|number| 2 * number).collect::<Vec<_>>());
-            // A task that is longer than that has a poll of its own.
-            let long = observer.map(1e9, 0..11, |number| number);
+            let long = Observer::new(&mut callback, 1).map(0..11, |_| {
+                std::thread::sleep(BETWEEN_POLLS);
+                done.fetch_add(1, Ordering::Relaxed);
+            });
             assert!(matches!(long, Err(EncodeError::Cancelled)));
-            assert_eq!(polls, 261);
+            assert_eq!((polls, *done.get_mut()), (3, 2));
         });
+        let doubled = unobserved(|observer| observer.map(0..1000, |number| 2 * number));
+        assert_eq!(doubled, (0..1000).map(|number| 2 * number).collect::<Vec<_>>());
     }
 }

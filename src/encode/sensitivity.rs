@@ -39,8 +39,6 @@ const IN_GRADIENT: f32 = 4.0;
 const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 /// Rows of blocks that one task computes.
 const BAND: usize = 16;
-/// Work for a pixel on the finest scale.
-const WORK: f64 = 40.0;
 
 /// The sensitivities of a picture.
 #[derive(Debug)]
@@ -75,9 +73,8 @@ impl Sensitivity {
         let mut means = [0.0; SCALES];
         for (scale, share) in BY_SCALE.into_iter().enumerate() {
             let mut logarithms = vec![0.0; blocks.len()];
-            let work = WORK * (columns * BLOCK * BAND * BLOCK) as f64;
             let bands = logarithms.chunks_mut(columns * BAND).enumerate();
-            observer.map(work, bands, |(band, blocks)| {
+            observer.map(bands, |(band, blocks)| {
                 let first = band * BAND;
                 let end = first + blocks.len() / columns;
                 let rows = first..end;

@@ -22,8 +22,6 @@ type SamplePlane<T> = [[T; TILE_WIDTH]; TILE_HEIGHT];
 pub(crate) const FULL_SCALE: f32 = 65535.0;
 /// The factor from 8-bit samples to that scale.
 const OF_EIGHT: u16 = 257;
-/// Work for a sample.
-const WORK: f64 = 2.0;
 
 /// One [`SamplePlane`] per tile and channel: all channels of the first tile, then all of the second, and
 /// so on. Samples of a tile outside the picture are 0.
@@ -229,9 +227,8 @@ fn by_tiles<T: Copy + Default + Into<u64> + Send + Sync>(
     let columns = width.div_ceil(TILE_WIDTH);
     let tiles = columns * height.div_ceil(TILE_HEIGHT);
     let mut planes = vec![[[T::default(); TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];
-    let work = WORK * (TILE_HEIGHT * width * channels) as f64;
     let rows = planes.chunks_exact_mut(columns * channels).enumerate();
-    let sums = observer.map(work, rows, |(row, planes)| {
+    let sums = observer.map(rows, |(row, planes)| {
         let first = row * TILE_HEIGHT;
         let mut sums = [0_u64; 4];
         for y in first..height.min(first + TILE_HEIGHT) {

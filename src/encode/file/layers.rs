@@ -12,13 +12,6 @@ use crate::gaussian::MAX_COMPONENTS;
 use crate::layers::bounds::LayerBounds;
 use crate::layers::plan;
 
-/// Work to code a Gaussian.
-const WORK: f64 = 800.0;
-/// Work to move a code to its half of a part.
-const WORK_OF_CUT: f64 = 20.0;
-/// Work for the bounds of a Gaussian.
-const WORK_OF_BOUNDS: f64 = 100.0;
-
 /// The payloads of the layers of a packed file, from codes in the order of the file.
 pub(super) fn write_packed_layers(
     codes: &[[u32; MAX_COMPONENTS]],
@@ -48,10 +41,8 @@ pub(super) fn write_entropy_layers(
     codes: &mut [Code],
     observer: &mut Observer<'_>,
 ) -> Result<Vec<EncodedLayer>, EncodeError> {
-    let count = codes.len();
     let layers = divide(coder, codes, observer)?;
-    let work = WORK * count as f64 / layers.len() as f64;
-    observer.map(work, layers.into_iter(), |codes| coder.write(codes))
+    observer.map(layers.into_iter(), |codes| coder.write(codes))
 }
 
 /// The payload of `bNDS`: the bounds of every layer (spec, section 5.6). `None` for a file of so
@@ -72,8 +63,7 @@ pub(super) fn bounds_payload(
         rest = later;
         codes
     });
-    let work = WORK_OF_BOUNDS * codes.len() as f64 / layers.len() as f64;
-    let bounds = observer.map(work, layers_of_codes, |codes| {
+    let bounds = observer.map(layers_of_codes, |codes| {
         let gaussians = codes.iter().map(|code| {
             let shape = coder.quantization.shape(code);
             coder.quantization.gaussian(code, &shape, &coder.grid, header.color)
@@ -116,11 +106,8 @@ fn divide_by_position<'a>(
     observer: &mut Observer<'_>,
 ) -> Result<Vec<&'a mut [Code]>, EncodeError> {
     // In halves, so that every code is moved a few times only.
-    while let Some(largest) = parts.iter().map(|part| part.len()).max()
-        && largest > most
-    {
-        let work = WORK_OF_CUT * largest as f64;
-        let halves = observer.map(work, parts.into_iter(), |part| {
+    while parts.iter().any(|part| part.len() > most) {
+        let halves = observer.map(parts.into_iter(), |part| {
             let layers = part.len().div_ceil(most);
             let first = part.len().min(layers.div_ceil(2) * most);
             if first < part.len() {

@@ -12,10 +12,6 @@ use crate::simd::LANES;
 
 /// Splats that one task bins.
 const CHUNK: usize = 256;
-/// Nanoseconds of work to bin a splat, to number a span, and to sort it by tile.
-const WORK: f64 = 80.0;
-const WORK_TO_NUMBER: f64 = 2.0;
-const WORK_TO_SORT: f64 = 30.0;
 
 /// For every row of tiles of a picture, the splats that may touch it, in their order; and for every
 /// splat, where these are.
@@ -151,7 +147,7 @@ impl RowBins {
             blocks.resize(splats.len().div_ceil(LANES), found.len());
             ChunkSpans::new((chunk * CHUNK) as u32, splats.len(), scratch)
         };
-        let chunks = observer.map_with(WORK * CHUNK as f64, chunks, bin)?;
+        let chunks = observer.map_with(chunks, bin)?;
         let offsets = self.count_rows(&chunks);
         self.number_spans(splats.len(), &chunks, offsets, observer)?;
         self.sort_rows(&chunks, observer)
@@ -205,8 +201,7 @@ impl RowBins {
             start += chunk.rows.len() as u32;
             (chunk, offsets, indices, ends, first)
         });
-        let work = WORK_TO_NUMBER * total as f64 / chunks.len() as f64;
-        observer.map(work, parts, |(chunk, mut offsets, indices, ends, first)| {
+        observer.map(parts, |(chunk, mut offsets, indices, ends, first)| {
             for (index, row) in indices.iter_mut().zip(&chunk.rows) {
                 let next = &mut offsets[*row as usize - chunk.first_row];
                 *index = *next;
@@ -233,8 +228,7 @@ impl RowBins {
             let count = starts[row + 1] - starts[row];
             (row, spans.split_off_mut(..count).expect("all are counted"))
         });
-        let work = WORK_TO_SORT * total as f64 / rows as f64;
-        self.tile_rows = observer.map(work, parts, |(row, spans)| {
+        self.tile_rows = observer.map(parts, |(row, spans)| {
             let mut rest = &mut *spans;
             for chunk in chunks {
                 let found = chunk.row(row);

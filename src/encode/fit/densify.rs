@@ -25,10 +25,6 @@ const MOST_OVERLAP: f64 = 3.0;
 const MOST_AT_ONCE: f64 = 12.0;
 /// as a factor on the average over the tiles.
 const MOST_OF_AVERAGE: f64 = 4.0;
-/// Work for the distortions of a tile.
-const WORK: f64 = 2000.0;
-/// Tiles that get new Gaussians from one poll of the observer to the next, and new Gaussians.
-const PART: usize = 1 << 11;
 
 /// The position of a new Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,12 +101,7 @@ impl Densifier<'_> {
             .filter
             .variance(tiled.pixels(), total)
             .expect("`Training::check` accepted the filter");
-        let mut new = Vec::with_capacity(positions.len());
-        for positions in positions.chunks(PART) {
-            observer.poll()?;
-            new.extend(positions.iter().map(|at| self.new_gaussian(at, variance, rng)));
-        }
-        Ok(new)
+        Ok(positions.iter().map(|at| self.new_gaussian(at, variance, rng)).collect())
     }
 
     /// Sets the negative residuals at positions.
@@ -125,7 +116,7 @@ impl Densifier<'_> {
             y / TILE_HEIGHT * columns + x / TILE_WIDTH
         };
         let by_tile: Vec<_> = positions.chunk_by_mut(|a, b| tile_of(a) == tile_of(b)).collect();
-        observer.map(WORK, by_tile.into_iter(), |positions| {
+        observer.map(by_tile.into_iter(), |positions| {
             let errors = self.errors(tile_of(&positions[0]));
             for position in positions {
                 let (x, y) = self.pixel(position);
@@ -197,7 +188,7 @@ impl Densifier<'_> {
         let mut map = vec![0.0; tiled.pixels()];
         let [columns, _] = self.tile_grid();
         let rows = map.chunks_mut(tiled.width * TILE_HEIGHT).enumerate();
-        observer.map(WORK * columns as f64, rows, |(row, lines)| {
+        observer.map(rows, |(row, lines)| {
             for column in 0..columns {
                 let distortions = self.errors(row * columns + column).distortions;
                 let lines = lines.chunks_exact_mut(tiled.width).zip(&distortions);
@@ -266,7 +257,7 @@ fn spread(
         }
         sum = end;
     });
-    let positions = observer.map(WORK, found.into_iter(), |(tile, mut sum, mut next)| {
+    let positions = observer.map(found.into_iter(), |(tile, mut sum, mut next)| {
         let ratio = (mean / f64::from(sums[tile])).min(1.0);
         let variance_share = ratio.sqrt().min(MOST_OVERLAP * ratio) as f32;
         let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;

@@ -5,7 +5,7 @@ use super::components::Components;
 use super::densify::{Densifier, MIN_COLOR};
 use super::lsq::decoded;
 use super::pass::Rendered;
-use super::trained::{CHUNK, Fit, WORK};
+use super::trained::Fit;
 use super::training::Portion;
 use super::training_tile::RenderingError;
 use crate::encode::error::EncodeError;
@@ -99,18 +99,14 @@ impl Fit<'_> {
             return Ok(());
         }
         let parameterization = self.bounds.parameterization;
-        let chunks = self.parameters.values.chunks(CHUNK).enumerate();
+        let items = self.parameters.values.iter().enumerate();
         // In the order of energy, and of equal ones in that of the Gaussians.
-        let keys = observer.map(WORK * CHUNK as f64, chunks, |(chunk, values)| {
-            let key = |(index, values): (usize, &Components)| {
-                let gaussian = values.gaussian(parameterization);
-                let Gaussian { center, cholesky, .. } = gaussian;
-                let sensitivity = self.tiled.sensitivity_under(center, cholesky);
-                u64::from(ordered(gaussian.energy() * sensitivity)) << 32 | index as u64
-            };
-            (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
+        let mut keys = observer.map(items, |(index, values)| {
+            let gaussian = values.gaussian(parameterization);
+            let Gaussian { center, cholesky, .. } = gaussian;
+            let sensitivity = self.tiled.sensitivity_under(center, cholesky);
+            u64::from(ordered(gaussian.energy() * sensitivity)) << 32 | index as u64
         })?;
-        let mut keys = keys.concat();
         observer.poll()?;
         keys.select_nth_unstable(count - 1);
         let mut keep = vec![true; keys.len()];
@@ -129,13 +125,12 @@ impl Fit<'_> {
         let values = &self.parameters.values;
         let parameterization = self.bounds.parameterization;
         let quantizers = self.quantizers.as_ref();
-        let is_visible = |index: usize| {
-            let gaussian = decoded(quantizers, &values[index]).gaussian(parameterization);
+        let keep = observer.map(values.iter().enumerate(), |(index, values)| {
+            let gaussian = decoded(quantizers, values).gaussian(parameterization);
             let has_color = gaussian.color.iter().any(|color| color.abs() >= MIN_COLOR);
             let is_inside = self.pass.touches(index);
             gaussian.is_drawable() && has_color && is_inside
-        };
-        let keep = observer.map(WORK, 0..values.len(), is_visible)?;
+        })?;
         if keep.contains(&false) {
             self.parameters.retain(|index| keep[index]);
             self.invalidate();

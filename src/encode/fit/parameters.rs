@@ -15,11 +15,6 @@ use crate::render::splat::Splat;
 
 /// Gaussians that one task steps and sums up.
 const CHUNK: usize = 256;
-/// Work to step a Gaussian, by the gradient by its values and by its splat.
-const WORK: f64 = 200.0;
-const WORK_BY_SPLAT: f64 = 40.0;
-/// Work to find the place of a Gaussian on the Z curve.
-const WORK_TO_SORT: f64 = 3.0;
 
 /// Trained values with their optimizer.
 #[derive(Debug)]
@@ -69,16 +64,11 @@ impl Parameters {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
-        let chunks = self.values.chunks(CHUNK).enumerate();
         // A key with the index below it is compared at once.
-        let keys = observer.map(WORK_TO_SORT * CHUNK as f64, chunks, |(chunk, values)| {
-            let key = |(index, components): (usize, &Components)| {
-                let [x, y] = components.center;
-                u64::from(spread(x) | spread(y) << 1) << 32 | index as u64
-            };
-            (chunk * CHUNK..).zip(values).map(key).collect::<Vec<u64>>()
+        let mut keys = observer.map(self.values.iter().enumerate(), |(index, values)| {
+            let [x, y] = values.center;
+            u64::from(spread(x) | spread(y) << 1) << 32 | index as u64
         })?;
-        let mut keys = keys.concat();
         keys.par_sort_unstable();
         observer.poll()?;
         // The cast leaves the index.
@@ -106,7 +96,7 @@ impl Parameters {
         let by_chunk = match &mut self.states {
             States::Adam(options, states) => {
                 let chunks = chunks(values, states, splats);
-                observer.map(WORK * CHUNK as f64, chunks, |(first, values, states, splats)| {
+                observer.map(chunks, |(first, values, states, splats)| {
                     let mut by_quantizers = QuantizerGradients::default();
                     for (index, (values, state)) in (first..).zip(values.iter_mut().zip(states)) {
                         let slope = backward.by_values(index, values, &mut by_quantizers);
@@ -125,8 +115,7 @@ impl Parameters {
                 let step = gauss_newton::Step { options, bounds, factor, rate_term };
                 let level = Level::new();
                 let chunks = chunks(values, states, splats);
-                let work = if quantizers.is_some() { WORK } else { WORK_BY_SPLAT };
-                observer.map(work * CHUNK as f64, chunks, |(first, values, states, splats)| {
+                observer.map(chunks, |(first, values, states, splats)| {
                     let mut by_quantizers = QuantizerGradients::default();
                     match quantizers {
                         None => step.run(

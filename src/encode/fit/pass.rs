@@ -24,10 +24,6 @@ use crate::region::Region;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
 
-/// Nanoseconds of work for a pair of a tile and a splat, and for a tile.
-const WORK_PER_PAIR: f64 = 60.0;
-const WORK_PER_TILE: f64 = 400.0;
-
 /// The gradient of the loss, half the distortion, by one splat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SplatGradient {
@@ -198,7 +194,6 @@ impl Pass {
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let tiles = self.bins.columns() * self.bins.rows();
-        let work = WORK_PER_PAIR * self.pairs() as f64 + WORK_PER_TILE * tiles as f64;
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);
         self.distortions.resize(if measure.is_some() { tiles } else { 0 }, 0.0);
@@ -217,8 +212,7 @@ impl Pass {
         });
         let level = self.level;
         type Scratch = (Vec<Splat>, Vec<TileState>);
-        let work = work / bins.rows() as f64;
-        observer.map_with(work, rows, |(of_row, states): &mut Scratch, item| {
+        observer.map_with(rows, |(of_row, states): &mut Scratch, item| {
             let (row, tiles, slots, distortions, by_tile, error) = item;
             of_row.clear();
             of_row.extend(bins.spans(row).iter().map(|span| splats[span.splat as usize]));

@@ -24,10 +24,6 @@ use crate::render::splat::Splat;
 const LOST: f64 = 2.0;
 /// Passes with the same bins, while no Gaussians are added or removed.
 const REBIN_INTERVAL: u32 = 8;
-/// Work to turn a Gaussian into a splat, or to look at it.
-pub(super) const WORK: f64 = 20.0;
-/// Gaussians that one task turns into splats.
-pub(super) const CHUNK: usize = 256;
 
 /// What fits have cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -196,12 +192,9 @@ impl<'a> Fit<'a> {
     pub(super) fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         reset(&mut self.splats, self.parameters.len(), Splat::NOWHERE);
-        let chunks = self.parameters.values.chunks(CHUNK);
-        let chunks = chunks.zip(self.splats.chunks_mut(CHUNK));
-        observer.map(WORK * CHUNK as f64, chunks, |(values, splats)| {
-            for (values, splat) in values.iter().zip(splats) {
-                *splat = decoded(quantizers.as_ref(), values).splat(parameterization);
-            }
+        let items = self.parameters.values.iter().zip(&mut self.splats);
+        observer.map(items, |(values, splat)| {
+            *splat = decoded(quantizers.as_ref(), values).splat(parameterization);
         })?;
         self.has_splats = true;
         Ok(())

@@ -20,8 +20,6 @@ use crate::render::Picture;
 /// proportional to the number of tiles that it touches.
 const DECODING_TIME_BITS: f32 = 4.0;
 
-/// Work to round a Gaussian, to make one from its code, and to tell the bits of a code.
-const WORK: (f64, f64, f64) = (200.0, 50.0, 200.0);
 /// Codes whose bits one task adds up.
 const PART: usize = 4096;
 
@@ -82,7 +80,7 @@ impl<'a> CodeOptimizer<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers, EncodeError> {
         let quantization = rate_model::quantization(step, self.model);
-        let codes = observer.map(WORK.0, gaussians.iter(), |gaussian| {
+        let codes = observer.map(gaussians.iter(), |gaussian| {
             let Gaussian { center, cholesky, .. } = *gaussian;
             let sensitivity = self.tiled.sensitivity_under(center, cholesky);
             let exponent =
@@ -104,7 +102,7 @@ impl<'a> CodeOptimizer<'a> {
         let CodedLayers { quantization, codes, .. } = coded;
         let gaussian =
             |code| quantization.gaussian(code, &quantization.shape(code), &self.grid, self.model);
-        observer.map(WORK.1, codes.iter(), gaussian)
+        observer.map(codes.iter(), gaussian)
     }
 
     /// Runs a pass of coordinate descent over the codes. The Lagrange multiplier is 2^`lambda` times
@@ -125,7 +123,7 @@ impl<'a> CodeOptimizer<'a> {
         let coder = LayerCoder::new(&quantization, self.layout.header());
         let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
         let parts = codes.chunks(PART).zip(contexts.chunks(PART));
-        let sums = observer.map(WORK.2 * PART as f64, parts, |(codes, contexts)| {
+        let sums = observer.map(parts, |(codes, contexts)| {
             let (mut bits, mut tiles) = (0.0, 0.0);
             for (code, context) in codes.iter().zip(contexts) {
                 let shape = quantization.shape(code);

@@ -17,9 +17,6 @@ use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 
-/// Work to find the window of a Gaussian.
-const WORK: f64 = 200.0;
-
 // Constants: docs/tuning.md, "Search for a target".
 /// The trust region of the quadratic model: the largest change of each component of the geometry in
 /// a step to the model's minimum.
@@ -129,7 +126,7 @@ impl CoordinateDescent<'_> {
     ) -> Result<Vec<Code>, EncodeError> {
         // Gaussians outside the picture are not among them, and thereby removed.
         let size = residuals.size();
-        let entries = observer.map(WORK, codes.iter().enumerate(), |(index, code)| {
+        let entries = observer.map(codes.iter().enumerate(), |(index, code)| {
             let window = window(&self.gaussian(code), size)?;
             Some(Entry::new(index, window, size[1]))
         })?;
@@ -140,9 +137,8 @@ impl CoordinateDescent<'_> {
         for round in &rounds {
             let round_work = work * round.work();
             let tasks = bands_of(residuals, round);
-            let work = round_work / tasks.len() as f64;
             let passed_bands =
-                observer.map_with(work, tasks.into_iter(), |window, (band, of_band)| {
+                observer.map_with(tasks.into_iter(), |window, (band, of_band)| {
                     self.optimize(window, band, of_band.entries, codes, contexts)
                 })?;
             observer.advance(round_work)?;

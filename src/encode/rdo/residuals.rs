@@ -25,8 +25,6 @@ pub(super) const ROWS_PER_TASK: usize = 32;
 /// The margin of a window around its Gaussian, for candidates that are larger or elsewhere: a
 /// factor on the extent, and pixels.
 const MARGIN: (f32, f32) = (1.2, 1.0);
-/// Work for the sensitivity of a sample, and for the shift of a residual.
-const WORK: (f64, f64) = (2.0, 4.0);
 
 /// A residual of 1, where a full sample is 1, as it is stored.
 const UNIT: f32 = 4096.0;
@@ -75,7 +73,7 @@ impl Residuals {
         let stride = width + LANES;
         let mut sensitivities = vec![0.0; stride * sensitivity_lines(tiled)];
         let lines = sensitivities.chunks_exact_mut(stride).enumerate();
-        observer.map(WORK.0 * width as f64, lines, |(row, line)| {
+        observer.map(lines, |(row, line)| {
             for (x, value) in line[..width].iter_mut().enumerate() {
                 *value = tiled.sensitivity(x, row * BLOCK);
             }
@@ -130,7 +128,7 @@ impl Residuals {
         let band = TILE_HEIGHT * CHANNELS * stride;
         let sensitivities = self.sensitivities.chunks(TILE_HEIGHT / BLOCK * stride);
         let bands = self.residuals.chunks_mut(band).zip(sensitivities).enumerate();
-        observer.map(WORK.1 * band as f64, bands, |(row, (residuals, by_pixel))| {
+        observer.map(bands, |(row, (residuals, by_pixel))| {
             let rows = residuals.len() / (CHANNELS * stride);
             for x in (0..width).step_by(TILE_WIDTH) {
                 let columns = TILE_WIDTH.min(width - x);
