@@ -82,94 +82,66 @@
 //! | `image` | no | hooks and an `ImageDecoder` for the `image` crate; with `encode` also an `ImageEncoder` |
 //! | `cli` | no | the command line tool `gip` |
 
-#[cfg(feature = "decode")]
+// All else needs the decoder, so without it the crate is empty.
+#![cfg(feature = "decode")]
+
 extern crate alloc;
 
-#[cfg(feature = "decode")]
 mod chunk;
-#[cfg(feature = "decode")]
 mod coding;
-#[cfg(feature = "decode")]
 mod color;
-#[cfg(feature = "decode")]
 mod container;
-#[cfg(feature = "decode")]
 mod decode;
 #[cfg(feature = "encode")]
 mod encode;
-#[cfg(feature = "decode")]
 mod error;
-#[cfg(feature = "decode")]
 mod gaussian;
 #[cfg(feature = "image")]
 mod image;
-#[cfg(feature = "decode")]
 mod kernel;
-#[cfg(feature = "decode")]
 mod layers;
-#[cfg(feature = "decode")]
 mod limits;
-#[cfg(feature = "decode")]
 mod math;
 #[cfg(feature = "metadata")]
 mod metadata;
 #[cfg(feature = "encode")]
 pub mod metrics;
-#[cfg(feature = "decode")]
 mod orientation;
-#[cfg(feature = "decode")]
 mod region;
-#[cfg(feature = "decode")]
 mod render;
-#[cfg(feature = "decode")]
 mod simd;
-#[cfg(all(test, feature = "decode"))]
+#[cfg(test)]
 mod testing;
-#[cfg(feature = "decode")]
 mod threads;
 
 #[cfg(all(feature = "encode", feature = "image"))]
 pub use crate::image::GipEncoder;
 #[cfg(feature = "image")]
 pub use crate::image::{GipDecoder, register};
-#[cfg(feature = "decode")]
 pub use chunk::ChunkType;
-#[cfg(feature = "decode")]
 pub use coding::entropy::{AttributeBits, QuantizationSteps};
-#[cfg(feature = "decode")]
 pub use coding::packed::{Quantizer, UniformQuantizer};
-#[cfg(feature = "decode")]
 pub use color::{ColorModel, SampleDepth};
 #[cfg(feature = "encode")]
 pub use container::MetadataError;
-#[cfg(feature = "decode")]
 pub use container::{Coding, Header, Metadata, Text};
 #[cfg(feature = "std")]
 pub use decode::Decoder;
-#[cfg(feature = "decode")]
 pub use decode::{ChunkStatistics, Decoded, Samples, StreamDecoder, decode};
 #[cfg(feature = "encode")]
 pub use encode::{
     EncodeError, Encoded, Encoder, OptionError, Precision, Progress, Report, Shortfall, Source,
     SourceError, Target, Tune, encode,
 };
-#[cfg(feature = "decode")]
 pub use error::{DecodeError, LimitKind, Reason, RequestError, Unsupported};
-#[cfg(feature = "decode")]
 pub use gaussian::{Gaussian, Parameterization};
-#[cfg(feature = "decode")]
 pub use kernel::Kernel;
-#[cfg(feature = "decode")]
 pub use limits::Limits;
 #[cfg(feature = "metadata")]
 pub use metadata::{MetadataLoss, MetadataPolicy};
-#[cfg(feature = "decode")]
 pub use orientation::Orientation;
-#[cfg(feature = "decode")]
 pub use region::Region;
-#[cfg(feature = "decode")]
 pub use render::{Picture, RenderOptions};
-#[cfg(feature = "decode")]
 pub use threads::Threads;
 
 #[cfg(all(fuzzing, feature = "encode"))]
