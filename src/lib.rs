@@ -151,9 +151,9 @@ pub use coding::entropy::fuzzing;
 pub mod training {
     //! The constants of training, for the study of the method; see [`Training`].
 
-    pub use crate::encode::VectorQuantizer;
     pub use crate::encode::training::{
-        Adam, Densification, Distortion, GaussNewton, GaussianFilter, LearningRateSchedule,
-        NewColor, NewShape, Optimizer, Placement, Portion, Quantization, Training,
+        Adam, Densification, GaussNewton, GaussianFilter, LearningRateSchedule, NewColor, NewShape,
+        Optimizer, Placement, Portion, Quantization, Training,
     };
+    pub use crate::encode::{ErrorNorm, VectorQuantizer};
 }

@@ -4,7 +4,7 @@
 use std::ops::ControlFlow;
 
 use image_gip::training::{
-    Distortion, GaussianFilter, LearningRateSchedule, NewColor, NewShape, Placement, Portion,
+    ErrorNorm, GaussianFilter, LearningRateSchedule, NewColor, NewShape, Placement, Portion,
     Training,
 };
 use image_gip::{
@@ -527,7 +527,7 @@ fn every_published_variant_trains() {
             training.densification.portion = portion;
             training.densification.color = color;
             training.densification.shape = NewShape::Random;
-            training.densification.distortion = Distortion::L1;
+            training.densification.error_norm = ErrorNorm::L1;
             training.densification.placement = Placement::Top;
             training.schedule = LearningRateSchedule::Halving(40);
             trainings.push(training);

@@ -8,6 +8,7 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
+use super::loss::{Distortion, SquaredError};
 use super::progress::Observer;
 use super::quality::Judge;
 use super::rate_model;
@@ -41,7 +42,7 @@ const MISSED: f64 = 0.1;
 /// A fit before it was changed.
 struct Fitted {
     gaussians: Vec<Gaussian>,
-    distortion: f64,
+    distortion: Distortion,
 }
 
 /// Size in bytes of a file without Gaussians.
@@ -102,15 +103,16 @@ pub(crate) fn finish(
 /// Extends a fit until its squared error is at most `error`, or nothing helps.
 fn extend(
     fit: &mut Fit<'_>,
-    error: f64,
+    error: SquaredError,
     job: &Job<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<(), EncodeError> {
     for _ in 0..MAX_ROUNDS {
         let before = fit.len();
-        let squared = fit.best_error().squared;
-        let wanted = Budget::SquaredError(error).wanted(before, squared, fit.most());
-        if squared <= error || wanted <= before {
+        let found = fit.best_error();
+        let usual_bits = || rate_model::USUAL_COMPONENT_BITS;
+        let wanted = Budget::SquaredError(error).wanted(before, found, usual_bits, fit.most());
+        if found.squared <= error || wanted <= before {
             break;
         }
         observer.expect(

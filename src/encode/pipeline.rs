@@ -6,13 +6,13 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
+use super::loss::{PerceptualWeights, RenderingError, SquaredError};
 use super::options::Precision;
 use super::outcome::{LEAST_GAIN, Outcome};
 use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::rate_model;
 use super::rdo::SearchWork;
-use super::sensitivity::Sensitivity;
 use super::shortfall::{Reached, Shortfall};
 use super::tiled_source::TiledSource;
 use super::verify::Verified;
@@ -150,7 +150,10 @@ fn encode_for_target(
     let budget = count.map_or(budget, Budget::Count);
     let expected = match budget {
         Budget::Count(count) => count,
-        Budget::Bits { .. } => budget.wanted(0, rate_model::USUAL_COMPONENT_BITS, job.pixels()),
+        Budget::Bits { .. } => {
+            let usual_bits = || rate_model::USUAL_COMPONENT_BITS;
+            budget.wanted(0, RenderingError::default(), usual_bits, job.pixels())
+        }
         _ => job.pixels() / USUAL_PIXELS,
     };
     observer.advance(preparation)?;
@@ -238,12 +241,13 @@ fn within_reach(
         }
         Aim::File(FileAim::Psnr(psnr)) => {
             let share = if is_coded { rate_model::SHARE_OF_FIT } else { 1.0 };
-            Budget::SquaredError(share * tiled.error_of(psnr))
+            let error = SquaredError::at_psnr(psnr, tiled.samples());
+            Budget::SquaredError(SquaredError(share * error.0))
         }
         Aim::File(FileAim::Quality(quality)) => {
-            let [fine, .., coarse] = match &tiled.sensitivity {
-                Some(sensitivity) => sensitivity.means,
-                None => Sensitivity::new(job.source, observer)?.means,
+            let [fine, .., coarse] = match tiled.loss.weights() {
+                Some(weights) => weights.means,
+                None => PerceptualWeights::new(job.source, observer)?.means,
             };
             Budget::Count(quality::count_for(quality, tiled.pixels(), [fine, coarse]))
         }

@@ -1,12 +1,13 @@
 //! The rate model of the entropy coding: what training, rounding to the quantization grid and the choice of
-//! codes assume about rate (bits) and distortion (squared error, where a full sample is 1, weighted
-//! by the eye's sensitivity if the encoder is tuned for it).
+//! codes assume about rate (bits) and distortion (squared error, where a full sample is 1, weighted for the
+//! eye if the encoder is tuned for it).
 //!
 //! All steps follow from one, the step of colour, which is proportional to the square root of the
 //! distortion per Gaussian. The *norm* of a Gaussian is the Euclidean length of its colour
 //! times the square root of its area l11 l22: its square, the *energy*, is proportional to the sum of
 //! the squares that it adds to the picture.
 
+use super::loss::Distortion;
 use super::options::Tune;
 use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, to_axes};
 use crate::color::ColorModel;
@@ -58,7 +59,7 @@ pub(crate) fn color_step(step: f64) -> f64 {
 
 /// The base-2 logarithm of the step of colour for `count` Gaussians whose picture has this
 /// distortion.
-pub(crate) fn step_for(distortion: f64, count: usize) -> f64 {
+pub(crate) fn step_for(Distortion(distortion): Distortion, count: usize) -> f64 {
     0.5 * (SQUARED_STEP * distortion / count.max(1) as f64).log2()
 }
 
@@ -80,8 +81,8 @@ pub(crate) fn step_for_lambda(lambda: f64) -> f64 {
 }
 
 /// The distortion per Gaussian for which [`step_for`] gives this step.
-pub(crate) fn distortion_per_gaussian(step: f64) -> f64 {
-    (2.0 * step).exp2() / SQUARED_STEP
+pub(crate) fn distortion_per_gaussian(step: f64) -> Distortion {
+    Distortion((2.0 * step).exp2() / SQUARED_STEP)
 }
 
 /// The quantization grid for a step of colour, given by its base-2 logarithm.
@@ -98,17 +99,17 @@ pub(crate) fn lambda(quantization: &Quantization) -> f32 {
     LAMBDA * quantization.color[0] * quantization.color[0]
 }
 
-/// The step exponent for a Gaussian where squared errors count `sensitivity` times: the base-2
+/// The step exponent for a Gaussian where squared errors count `perceptual weight` times: the base-2
 /// logarithm of its norm in steps of colour, rounded and clamped to 0 to [`MAX_EXPONENT`].
 pub(crate) fn step_exponent(
     gaussian: &Gaussian,
-    sensitivity: f32,
+    perceptual_weight: f32,
     quantization: &Quantization,
     model: ColorModel,
 ) -> u32 {
     let [l11, _, l22] = gaussian.cholesky;
     let squared = to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
-    let steps = (squared * l11 * l22 * sensitivity).sqrt() / quantization.color[0];
+    let steps = (squared * l11 * l22 * perceptual_weight).sqrt() / quantization.color[0];
     steps.max(1.0).log2().round().min(MAX_EXPONENT as f32) as u32
 }
 

@@ -1,27 +1,13 @@
 //! The source picture as planes of tiles, in the layout of the training pass.
 
-use fearless_simd::{Simd, f32x16, prelude::*};
-
 use super::alpha_bleed::Bled;
 use super::error::EncodeError;
+use super::loss::PictureLoss;
 use super::options::Tune;
 use super::progress::Observer;
-use super::sensitivity::Sensitivity;
+use super::sample_tile::{FULL_SCALE, OF_EIGHT, SampleLine, SamplePlane, SampleTile, TILE_WIDTH};
 use super::source::{Source, SourceSamples};
 use crate::render::tile_grid::TILE_HEIGHT;
-
-/// Width in pixels of a tile of the training pass, twice that of the decoder's tiles: every splat
-/// of a tile costs a reduction of its gradient sums, and wider tiles need fewer reductions.
-pub(crate) const TILE_WIDTH: usize = 16;
-
-/// One channel of a tile, row by row.
-pub(crate) type TilePlane = [[f32; TILE_WIDTH]; TILE_HEIGHT];
-/// One channel of the source in a tile, row by row, in the source's depth.
-type SamplePlane<T> = [[T; TILE_WIDTH]; TILE_HEIGHT];
-/// The value of a full sample, of either depth.
-pub(crate) const FULL_SCALE: f32 = 65535.0;
-/// The factor from 8-bit samples to that scale.
-const OF_EIGHT: u16 = 257;
 
 /// One [`SamplePlane`] per tile and channel: all channels of the first tile, then all of the second, and
 /// so on. Samples of a tile outside the picture are 0.
@@ -37,10 +23,7 @@ pub(crate) struct TiledSource {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) channels: usize,
-    /// Half of the quantization step of the source's depth, where a full sample is 1.
-    pub(crate) half_step: f32,
-    /// How much errors count by their place and scale; `None` if all count the same.
-    pub(crate) sensitivity: Option<Sensitivity>,
+    pub(crate) loss: PictureLoss,
     /// The mean of each channel over the picture, where a full sample is 1; 0 for absent channels.
     pub(crate) mean: [f32; 4],
     planes: Planes,
@@ -77,14 +60,9 @@ impl TiledSource {
         };
         let full = (width * height) as f64 * f64::from(FULL_SCALE);
         let mean = sums.map(|sum| (sum as f64 / full) as f32);
-        let half_step = 0.5 / f32::from(source.depth().max_sample());
-        let sensitivity = match tune {
-            Tune::Visual => Some(Sensitivity::new(source, observer)?),
-            Tune::Psnr => None,
-        };
-        let scratch = sensitivity.as_ref().map_or(0, |found| found.scratch_memory(source));
-        let scratch_memory = bled_memory + scratch;
-        Ok(Self { width, height, channels, half_step, sensitivity, mean, planes, scratch_memory })
+        let loss = PictureLoss::new(source, tune, observer)?;
+        let scratch_memory = bled_memory + loss.scratch_memory(source);
+        Ok(Self { width, height, channels, loss, mean, planes, scratch_memory })
     }
 
     /// All channels of a tile.
@@ -121,38 +99,13 @@ impl TiledSource {
         }
     }
 
-    /// How much a squared error of a pixel counts.
-    #[inline]
-    pub(crate) fn sensitivity(&self, x: usize, y: usize) -> f32 {
-        self.sensitivity.as_ref().map_or(1.0, |sensitivity| sensitivity.at(x, y))
-    }
-
-    /// How much a squared error counts at a position in pixels, or at the nearest one inside the
-    /// picture.
-    #[inline]
-    pub(crate) fn sensitivity_near(&self, [x, y]: [f32; 2]) -> f32 {
-        // Casts saturate.
-        self.sensitivity((x as usize).min(self.width - 1), (y as usize).min(self.height - 1))
-    }
-
-    /// How much a squared error counts on average under a Gaussian, which may lie across areas of very
-    /// different sensitivity: at three points around its centre, one standard deviation away.
-    #[inline]
-    pub(crate) fn sensitivity_under(&self, center: [f32; 2], cholesky: [f32; 3]) -> f32 {
-        const HALF_ROOT_OF_THREE: f32 = 0.866_025_4;
-        let ([x, y], [l11, l21, l22]) = (center, cholesky);
-        let near = |u: f32, v: f32| self.sensitivity_near([x + l11 * u, y + l21 * u + l22 * v]);
-        let [left, right] = [-HALF_ROOT_OF_THREE, HALF_ROOT_OF_THREE].map(|u| near(u, -0.5));
-        (near(0.0, 1.0) + left + right) / 3.0
-    }
-
-    /// The sum of squared errors at a PSNR in dB, where a full sample is 1.
-    pub(crate) fn error_of(&self, psnr: f64) -> f64 {
-        (self.pixels() * self.channels) as f64 * 10_f64.powf(-psnr / 10.0)
-    }
-
     pub(crate) fn pixels(&self) -> usize {
         self.width * self.height
+    }
+
+    /// Number of samples.
+    pub(crate) fn samples(&self) -> usize {
+        self.pixels() * self.channels
     }
 
     /// Size in bytes.
@@ -161,52 +114,7 @@ impl TiledSource {
             Planes::Eight(planes) => size_of_val(&planes[..]),
             Planes::Sixteen(planes) => size_of_val(&planes[..]),
         };
-        planes + self.sensitivity.as_ref().map_or(0, Sensitivity::memory)
-    }
-}
-
-/// All channels of a tile of the source.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum SampleTile<'a, const CHANNELS: usize> {
-    Eight(&'a [SamplePlane<u8>; CHANNELS]),
-    Sixteen(&'a [SamplePlane<u16>; CHANNELS]),
-}
-
-impl<'a, const CHANNELS: usize> SampleTile<'a, CHANNELS> {
-    #[inline(always)]
-    pub(crate) fn line(&self, channel: usize, row: usize) -> SampleLine<'a> {
-        match self {
-            Self::Eight(planes) => SampleLine::Eight(&planes[channel][row]),
-            Self::Sixteen(planes) => SampleLine::Sixteen(&planes[channel][row]),
-        }
-    }
-}
-
-/// A row of one channel of a tile of the source.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum SampleLine<'a> {
-    Eight(&'a [u8; TILE_WIDTH]),
-    Sixteen(&'a [u16; TILE_WIDTH]),
-}
-
-impl SampleLine<'_> {
-    /// The samples, where a full one is [`FULL_SCALE`].
-    #[inline(always)]
-    pub(crate) fn load<S: Simd>(self, simd: S) -> f32x16<S> {
-        match self {
-            Self::Eight(samples) => {
-                f32x16::from_fn(simd, |x| f32::from(samples[x])) * f32::from(OF_EIGHT)
-            }
-            Self::Sixteen(samples) => f32x16::from_fn(simd, |x| f32::from(samples[x])),
-        }
-    }
-
-    /// One of them.
-    fn sample(self, x: usize) -> f32 {
-        f32::from(match self {
-            Self::Eight(samples) => u16::from(samples[x]) * OF_EIGHT,
-            Self::Sixteen(samples) => samples[x],
-        })
+        planes + self.loss.memory()
     }
 }
 
@@ -245,47 +153,4 @@ fn by_tiles<T: Copy + Default + Into<u64> + Send + Sync>(
     })?;
     let total = |channel| sums.iter().map(|sums: &[u64; 4]| sums[channel]).sum();
     Ok((planes, core::array::from_fn(total)))
-}
-
-/// The residuals of sixteen samples of the source (from 0 to [`FULL_SCALE`]) after clamping, as in the
-/// output: a rendering above white is no error where the source is white, nor one below black where the
-/// source is black.
-#[inline(always)]
-pub(crate) fn visible<S: Simd>(simd: S, residual: f32x16<S>, sample: f32x16<S>) -> f32x16<S> {
-    let zero = f32x16::splat(simd, 0.0);
-    let residual = sample.simd_ge(FULL_SCALE).select(residual.min(zero), residual);
-    sample.simd_le(zero).select(residual.max(zero), residual)
-}
-
-/// The pixel centres of the sixteen columns from `x` on.
-#[inline(always)]
-pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
-    f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::color::ColorModel;
-    use crate::encode::progress::unobserved;
-
-    #[test]
-    fn what_lies_under_a_gaussian_counts() {
-        // Even ground on the left, and noise on the right.
-        let mut rng = fastrand::Rng::with_seed(2);
-        let samples: Vec<u8> =
-            (0..96 * 96).map(|i| if i % 96 < 48 { 128 } else { rng.u8(..) }).collect();
-        let source = Source::new_u8(96, 96, ColorModel::Gray, &samples).expect("the sizes agree");
-        let tiled = |tune| unobserved(|observer| TiledSource::new(&source, tune, observer));
-        let visual = tiled(Tune::Visual);
-        let [even, noise] = [8.0, 88.0].map(|x| visual.sensitivity_near([x, 48.0]));
-        assert!(even > 4.0 * noise, "{even}, {noise}");
-        let under = |x, cholesky| visual.sensitivity_under([x, 48.0], cholesky);
-        // Small, wide, high, outside the picture.
-        assert!((under(8.5, [0.1, 0.0, 0.1]) / even - 1.0).abs() < 1e-5);
-        assert!((under(60.0, [30.0, 0.0, 2.0]) - noise) > 0.1 * even);
-        assert!(under(60.0, [2.0, 0.0, 30.0]) < 2.0 * noise);
-        assert!(under(-1e30, [1e30, 1e30, 1.0]).is_finite());
-        assert_eq!(tiled(Tune::Psnr).sensitivity_under([60.0, 48.0], [30.0, 0.0, 2.0]), 1.0);
-    }
 }

@@ -24,8 +24,8 @@ impl Backward<'_> {
     #[inline(always)]
     pub(super) fn by_splat(&self, index: usize, values: &Components) -> Slope<SplatGradient> {
         let Gaussian { center, cholesky, .. } = values.gaussian(self.bounds.parameterization);
-        let sensitivity = self.tiled.sensitivity_under(center, cholesky);
-        Slope { gradient: self.pass.gradient(index, self.bounds.channels), sensitivity }
+        let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
+        Slope { gradient: self.pass.gradient(index, self.bounds.channels), perceptual_weight }
     }
 
     /// The gradient by trained values. That by the quantizers is added to `by_quantizers`.
@@ -37,7 +37,7 @@ impl Backward<'_> {
     ) -> Slope {
         let parameterization = self.bounds.parameterization;
         let decoded = decoded(self.quantizers, trained);
-        let Slope { gradient: mut by_splat, sensitivity } = self.by_splat(index, &decoded);
+        let Slope { gradient: mut by_splat, perceptual_weight } = self.by_splat(index, &decoded);
         if let Some(rate_term) = self.rate_term {
             by_splat += rate_term.gradient(&decoded.gaussian(parameterization));
         }
@@ -47,7 +47,7 @@ impl Backward<'_> {
         if let Some(quantizers) = self.quantizers {
             add(by_quantizers, &quantizers.backward(trained, &decoded, &mut gradient));
         }
-        Slope { gradient, sensitivity }
+        Slope { gradient, perceptual_weight }
     }
 
     /// [`Self::by_values`] in the Gaussian's own frame.
@@ -57,9 +57,9 @@ impl Backward<'_> {
         trained: &Components,
         by_quantizers: &mut QuantizerGradients,
     ) -> Slope {
-        let Slope { gradient, sensitivity } = self.by_values(index, trained, by_quantizers);
+        let Slope { gradient, perceptual_weight } = self.by_values(index, trained, by_quantizers);
         let frame = OwnFrame::new(self.bounds.parameterization, trained.shape);
         let (center, shape) = frame.gradient(gradient.center, gradient.shape);
-        Slope { gradient: Components { center, shape, ..gradient }, sensitivity }
+        Slope { gradient: Components { center, shape, ..gradient }, perceptual_weight }
     }
 }

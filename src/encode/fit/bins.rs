@@ -4,7 +4,7 @@ use fearless_simd::Level;
 
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::encode::tiled_source::TILE_WIDTH;
+use crate::encode::sample_tile::TILE_WIDTH;
 use crate::region::Region;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::{Columns, TileGrid};

@@ -1,5 +1,6 @@
 //! The budget: how many Gaussians a picture gets.
 
+use crate::encode::loss::{Distortion, RenderingError, SquaredError};
 use crate::encode::options::Tune;
 use crate::encode::rate_model;
 
@@ -11,10 +12,10 @@ pub(crate) enum Budget {
     /// As many Gaussians as take this many bits.
     Bits { bits: f64, tune: Tune },
     /// As many Gaussians as bring the sum of squared errors down to this.
-    SquaredError(f64),
+    SquaredError(SquaredError),
     /// As many Gaussians as leave this distortion per Gaussian. The slope of the distortion over the
     /// number of Gaussians is then the same for every picture, so simple pictures get few.
-    DistortionPerGaussian(f64),
+    DistortionPerGaussian(Distortion),
 }
 
 // Constants: docs/tuning.md, "Growth".
@@ -23,16 +24,26 @@ const POWER: f64 = 1.1;
 
 impl Budget {
     /// The number of Gaussians that is expected to meet the budget, extrapolated from `count`
-    /// Gaussians, of which `measured` is what the budget depends on: the error, or the bits of a
-    /// component ([`rate_model::component_bits`]) on average; at most `most`.
-    pub(crate) fn wanted(self, count: usize, measured: f64, most: usize) -> usize {
+    /// Gaussians with this error; at most `most`. `component_bits` returns the bits of a component
+    /// ([`rate_model::component_bits`]) on average.
+    pub(crate) fn wanted(
+        self,
+        count: usize,
+        error: RenderingError,
+        component_bits: impl FnOnce() -> f64,
+        most: usize,
+    ) -> usize {
         let count = count.max(1) as f64;
         let wanted = match self {
             Self::Count(wanted) => return wanted.min(most),
-            Self::Bits { bits, tune } => bits / rate_model::bits_per_gaussian(tune, measured),
-            Self::SquaredError(target) => count * (measured / target).powf(1.0 / POWER),
-            Self::DistortionPerGaussian(target) => {
-                count * (measured / count / target).powf(1.0 / (POWER + 1.0))
+            Self::Bits { bits, tune } => {
+                bits / rate_model::bits_per_gaussian(tune, component_bits())
+            }
+            Self::SquaredError(SquaredError(target)) => {
+                count * (error.squared.0 / target).powf(1.0 / POWER)
+            }
+            Self::DistortionPerGaussian(Distortion(target)) => {
+                count * (error.distortion.0 / count / target).powf(1.0 / (POWER + 1.0))
             }
         };
         // The cast of a float saturates, and that of NaN gives 0. A target of 0 gives `most`.

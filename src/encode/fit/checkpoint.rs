@@ -5,7 +5,7 @@
 
 use super::components::Components;
 use super::lsq::LsqQuantizers;
-use super::training_tile::RenderingError;
+use crate::encode::loss::{Distortion, RenderingError, SquaredError};
 
 // Constants: docs/tuning.md, "Steps of training".
 /// The distortion of a setback, as a multiple of the least one: of the picture, and of the tiles that
@@ -29,7 +29,8 @@ pub(super) struct Checkpoint {
 impl Checkpoint {
     /// Without Gaussians, and worse than any state.
     pub(super) fn new() -> Self {
-        let error = RenderingError { squared: f64::INFINITY, distortion: f64::INFINITY };
+        let (squared, distortion) = (SquaredError(f64::INFINITY), Distortion(f64::INFINITY));
+        let error = RenderingError { squared, distortion };
         let (values, tiles) = (Vec::new(), Vec::new());
         Self { error, values, quantizers: None, tiles, was_returned_to: false }
     }
@@ -51,8 +52,8 @@ impl Checkpoint {
 
     /// Whether a state of so many samples with this error has lost what this one has.
     pub(super) fn is_lost(&self, error: RenderingError, samples: usize) -> bool {
-        let most = SETBACK * self.error.distortion + NEGLIGIBLE * samples as f64;
-        error.distortion.total_cmp(&most).is_gt()
+        let most = SETBACK * self.error.distortion.0 + NEGLIGIBLE * samples as f64;
+        error.distortion.0.total_cmp(&most).is_gt()
     }
 
     /// The tiles that are to blame for a setback, by the distortions that they have then: all of them when
@@ -80,7 +81,7 @@ mod tests {
     use super::*;
 
     fn error(distortion: f64) -> RenderingError {
-        RenderingError { squared: 1.0, distortion }
+        RenderingError { squared: SquaredError(1.0), distortion: Distortion(distortion) }
     }
 
     #[test]

@@ -67,7 +67,7 @@ const MOST_ROUNDING: f32 = 1.0;
 pub(crate) struct Slope<Gradient = Components> {
     pub(crate) gradient: Gradient,
     /// How much a squared error counts there.
-    pub(crate) sensitivity: f32,
+    pub(crate) perceptual_weight: f32,
 }
 
 /// The bounds of the components of a picture's Gaussians.

@@ -3,13 +3,13 @@
 //! Gaussian Filters").
 
 use super::components::{Bounds, Components};
-use super::distortion_map;
 use super::parameterization;
 use super::pass::Rendered;
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
-use crate::encode::tiled_source::{TILE_WIDTH, TilePlane, TiledSource};
+use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Parameterization;
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -19,7 +19,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 pub(crate) const MIN_COLOR: f32 = 1.0 / 4096.0;
 /// How much the new Gaussians of a tile may overlap, as a multiple of what they would if all were spread
 /// evenly. Those that are placed at the same time see the same residuals. If too many of them overlap, their
-/// steps together go too far: the distortion of the tile rises, and it gets most of the next Gaussians, too.
+/// steps together go too far: the error of the tile rises, and it gets most of the next Gaussians, too.
 const MOST_OVERLAP: f64 = 3.0;
 /// Most new Gaussians of a tile at a time, about one for ten pixels; or, where that is more,
 const MOST_AT_ONCE: f64 = 12.0;
@@ -32,7 +32,7 @@ struct NewPosition {
     /// Index of the pixel that is its centre.
     pixel: u32,
     /// Its variance as a share of the filter's, in (0, 1]. Where a small part of a picture has
-    /// nearly all of the distortion, hundreds of Gaussians with the full variance would overlap
+    /// nearly all of the error, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
     /// The negative residual of each channel ([`Rendered::residuals`]), if the colour depends on it.
@@ -41,7 +41,7 @@ struct NewPosition {
 
 /// The errors of a tile, by which new Gaussians are placed.
 struct TileErrors {
-    distortions: TilePlane,
+    errors: TilePlane,
     /// One plane per channel.
     residuals: Vec<TilePlane>,
 }
@@ -62,7 +62,7 @@ impl TileErrors {
 pub(crate) struct Densifier<'a> {
     pub(crate) options: &'a Densification,
     pub(crate) filter: GaussianFilter,
-    /// The last pass over the picture, which measured the distortion.
+    /// The last pass over the picture, which measured the placement errors.
     pub(crate) pass: Rendered<'a>,
     pub(crate) bounds: Bounds,
     /// Number of Gaussians before, without those that new ones replace.
@@ -70,8 +70,8 @@ pub(crate) struct Densifier<'a> {
 }
 
 impl Densifier<'_> {
-    /// Up to `count` new Gaussians where the distortion is large. There are fewer where fewer
-    /// pixels have any distortion.
+    /// Up to `count` new Gaussians where the error is large. There are fewer where fewer
+    /// pixels have any error.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
@@ -84,14 +84,14 @@ impl Densifier<'_> {
         let tiled = self.pass.tiled;
         let positions = match self.options.placement {
             Placement::Top => {
-                let mut positions = top(count, &self.distortion_map(observer)?);
+                let mut positions = top(count, &self.error_map(observer)?);
                 if let NewColor::Residual(_) = self.options.color {
                     self.find_missing(&mut positions, observer)?;
                 }
                 positions
             }
             Placement::Spread => {
-                let (grid, sums) = (self.tile_grid(), self.pass.pass.distortions());
+                let (grid, sums) = (self.tile_grid(), self.pass.pass.placement_errors());
                 let tiles = |tile| self.errors(tile);
                 spread(count, tiled.width, grid, rng.f64(), sums, tiles, observer)?
             }
@@ -139,8 +139,8 @@ impl Densifier<'_> {
             NewColor::Zero => [0.0; 4],
             NewColor::Source => self.pass.tiled.sample(x, y),
             NewColor::Residual(share) => {
-                let sensitivity = self.pass.tiled.sensitivity(x, y);
-                position.missing.map(|missing| share * missing / sensitivity)
+                let weight = self.pass.tiled.loss.weight_at(x, y);
+                position.missing.map(|missing| share * missing / weight)
             }
         }
     }
@@ -172,26 +172,26 @@ impl Densifier<'_> {
         [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
     }
 
-    /// The distortion of every pixel of a tile, and the residuals.
+    /// The error of every pixel of a tile, and the residuals.
     fn errors(&self, tile: usize) -> TileErrors {
         let [columns, _] = self.tile_grid();
         let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
         let residuals = self.pass.residuals(tile);
-        let (tiled, measure) = (self.pass.tiled, self.options.distortion);
-        let distortions = distortion_map::of_tile(tiled, corner, &residuals, measure);
-        TileErrors { distortions, residuals }
+        let loss = &self.pass.tiled.loss;
+        let errors = loss.placement_errors(corner, &residuals, self.options.error_norm);
+        TileErrors { errors, residuals }
     }
 
-    /// The distortion of every pixel, row by row.
-    fn distortion_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
+    /// The error of every pixel, row by row.
+    fn error_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
         let tiled = self.pass.tiled;
         let mut map = vec![0.0; tiled.pixels()];
         let [columns, _] = self.tile_grid();
         let rows = map.chunks_mut(tiled.width * TILE_HEIGHT).enumerate();
         observer.map(rows, |(row, lines)| {
             for column in 0..columns {
-                let distortions = self.errors(row * columns + column).distortions;
-                let lines = lines.chunks_exact_mut(tiled.width).zip(&distortions);
+                let errors = self.errors(row * columns + column).errors;
+                let lines = lines.chunks_exact_mut(tiled.width).zip(&errors);
                 for (line, values) in lines {
                     let line = &mut line[column * TILE_WIDTH..];
                     let length = line.len().min(TILE_WIDTH);
@@ -203,8 +203,8 @@ impl Densifier<'_> {
     }
 }
 
-/// [`Placement::Top`]: the `count` pixels of largest distortion, with the full variance. Of pixels
-/// with equal distortion, the first ones are taken.
+/// [`Placement::Top`]: the `count` pixels of largest error, with the full variance. Of pixels
+/// with equal error, the first ones are taken.
 fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
     let mut order: Vec<u32> = (0..map.len() as u32).filter(|&at| map[at as usize] > 0.0).collect();
     let descending =
@@ -220,11 +220,11 @@ fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
         .collect()
 }
 
-/// [`Placement::Spread`]: up to `count` pixels, whose density is proportional to the distortion.
-/// They lie at equal steps of the distortion's sum along a Z curve of tiles; `phase`, in [0, 1),
+/// [`Placement::Spread`]: up to `count` pixels, whose density is proportional to the error.
+/// They lie at equal steps of the errors' sum along a Z curve of tiles; `phase`, in [0, 1),
 /// shifts all of them by a part of a step.
 ///
-/// Where a tile has r times the mean distortion, and r is more than 1, each new Gaussian has 1/r of
+/// Where a tile has r times the mean error, and r is more than 1, each new Gaussian has 1/r of
 /// the area that it would have on average. Its variance is smaller by the square root of r: they
 /// overlap, but they converge, up to [`MOST_OVERLAP`]. A variance smaller by r itself is too small to grow
 /// in a short run.
@@ -243,7 +243,7 @@ fn spread(
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
     let average = count as f64 / sums.len() as f64;
     let most = step * MOST_AT_ONCE.max(MOST_OF_AVERAGE * average);
-    // The part of a tile's distortion that counts.
+    // The part of a tile's error that counts.
     let counted = |tile: usize| (most / f64::from(sums[tile])).min(1.0);
     // The tiles that contain a step, with the sum of all tiles before, and the first step in them.
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
@@ -263,13 +263,13 @@ fn spread(
         let first = tile / columns * TILE_HEIGHT * width + tile % columns * TILE_WIDTH;
         let mut positions = Vec::new();
         let (errors, counted) = (errors(tile), counted(tile));
-        for (y, line) in errors.distortions.iter().enumerate() {
+        for (y, line) in errors.errors.iter().enumerate() {
             let end = sum + counted * sum_of(line);
             // Few lines contain a step.
             if end > next {
                 for (x, &value) in line.iter().enumerate() {
                     sum += counted * f64::from(value);
-                    // Pixels that are exact or outside the picture have no distortion.
+                    // Pixels that are exact or outside the picture have no error.
                     if sum > next && value > 0.0 {
                         let pixel = (first + y * width + x) as u32;
                         let missing = errors.missing(x, y);
@@ -366,27 +366,27 @@ mod tests {
     ) -> Vec<NewPosition> {
         let sum_of = |tile| tiles(tile).as_flattened().iter().sum();
         let sums: Vec<f32> = (0..grid[0] * grid[1]).map(sum_of).collect();
-        let errors = |tile| TileErrors { distortions: tiles(tile), residuals: Vec::new() };
+        let errors = |tile| TileErrors { errors: tiles(tile), residuals: Vec::new() };
         unobserved(|observer| super::spread(count, width, grid, phase, &sums, errors, observer))
     }
 
-    /// A tile whose distortions depend on the picture's column alone.
+    /// A tile whose errors depend on the picture's column alone.
     fn tile_of(column: usize, value: impl Fn(usize) -> f32) -> TilePlane {
         [core::array::from_fn(|x| value(column * TILE_WIDTH + x)); TILE_HEIGHT]
     }
 
     #[test]
-    fn spread_pixels_follow_the_distortion() {
-        // The right half has three times the distortion of the left one.
+    fn spread_pixels_follow_the_errors() {
+        // The right half has three times the error of the left one.
         let width = 50;
-        let distortions = |tile| {
+        let errors = |tile| {
             tile_of(tile % 4, |x| match x {
                 0..25 => 1.0,
                 25..50 => 3.0,
                 _ => 0.0,
             })
         };
-        let positions = spread(397, width, [4, 5], 0.5, distortions);
+        let positions = spread(397, width, [4, 5], 0.5, errors);
         let pixels = pixels(&positions);
         assert!((396..=397).contains(&pixels.len()));
         let mut sorted = pixels.clone();
@@ -406,7 +406,7 @@ mod tests {
                 assert!((count - share).abs() < 1.0, "{count} of {share}");
             }
         }
-        // A tile has a distortion of 200 on average; the third column of tiles has 384 in each.
+        // A tile has an error of 200 on average; the third column of tiles has 384 in each.
         for position in &positions {
             let share = position.variance_share;
             match position.pixel as usize % width {
@@ -419,7 +419,7 @@ mod tests {
 
     #[test]
     fn a_tile_gets_few_at_once() {
-        // One of 400 tiles has nearly all of the distortion.
+        // One of 400 tiles has nearly all of the error.
         let tiles = |tile| tile_of(0, |_| if tile == 21 { 1e6 } else { 1.0 });
         let in_tile = |count: usize| {
             let pixels = pixels(&spread(count, 20 * TILE_WIDTH, [20, 20], 0.5, tiles));

@@ -149,7 +149,7 @@ impl Step<'_> {
             let blocks = values.chunks_mut(LANES).zip(states.chunks_mut(LANES)).enumerate();
             for (block, (values, states)) in blocks {
                 let first = block * LANES;
-                let mut slopes = [Slope { gradient: G::default(), sensitivity: 1.0 }; LANES];
+                let mut slopes = [Slope { gradient: G::default(), perceptual_weight: 1.0 }; LANES];
                 let mut of_lanes = [values[0]; LANES];
                 let mut states_of_lanes = [State::NEW; LANES];
                 for lane in 0..values.len() {
@@ -209,7 +209,7 @@ impl Step<'_> {
         }
         let step_size = f32x16::from_fn(simd, |lane| states[lane].step_size);
         let weight = f32x16::from_fn(simd, |lane| states[lane].weight);
-        let sensitivity = f32x16::from_fn(simd, |lane| slopes[lane].sensitivity);
+        let perceptual_weight = f32x16::from_fn(simd, |lane| slopes[lane].perceptual_weight);
 
         let Components { center: [x, y], shape: [l11, l21, l22], color } =
             Components::from_array(old);
@@ -233,7 +233,7 @@ impl Step<'_> {
         }
         let gradient = gradient.to_array();
 
-        let area = area * sensitivity;
+        let area = area * perceptual_weight;
         let damping = self.options.damping * self.options.damping;
         let by_energy = one / ((squared_color + damping) * area);
         let by_area = one / area;

@@ -1,14 +1,13 @@
 //! Birth and death of Gaussians: densification, culling and pruning, for a budget.
 
-use super::budget::Budget;
 use super::components::Components;
 use super::densify::{Densifier, MIN_COLOR};
 use super::lsq::decoded;
 use super::pass::Rendered;
 use super::trained::Fit;
 use super::training::Portion;
-use super::training_tile::RenderingError;
 use crate::encode::error::EncodeError;
+use crate::encode::loss::{Distortion, RenderingError, SquaredError};
 use crate::encode::progress::Observer;
 use crate::encode::rate_model;
 use crate::gaussian::Gaussian;
@@ -17,18 +16,17 @@ impl Fit<'_> {
     /// The number of Gaussians that the budget sets, if training changes the error by the factor
     /// `foreseen`.
     pub(super) fn wanted(&self, foreseen: f64) -> usize {
-        let RenderingError { squared, distortion, .. } = self.error;
-        let measured = match self.budget {
-            Budget::Count(_) => 0.0,
-            Budget::Bits { .. } => self.component_bits(distortion * foreseen),
-            Budget::SquaredError(_) => squared * foreseen,
-            Budget::DistortionPerGaussian(_) => distortion * foreseen,
+        let RenderingError { squared, distortion } = self.error;
+        let error = RenderingError {
+            squared: SquaredError(squared.0 * foreseen),
+            distortion: Distortion(distortion.0 * foreseen),
         };
-        self.budget.wanted(self.len(), measured, self.most())
+        let component_bits = || self.component_bits(error.distortion);
+        self.budget.wanted(self.len(), error, component_bits, self.most())
     }
 
     /// The bits of a component on average, if the picture has this distortion.
-    pub(super) fn component_bits(&self, distortion: f64) -> f64 {
+    pub(super) fn component_bits(&self, distortion: Distortion) -> f64 {
         if self.len() == 0 {
             return rate_model::USUAL_COMPONENT_BITS;
         }
@@ -53,7 +51,7 @@ impl Fit<'_> {
         }
     }
 
-    /// Densification: adds up to `count` Gaussians where the distortion is large, and up to `replaced`
+    /// Densification: adds up to `count` Gaussians where the error is large, and up to `replaced`
     /// more in place of the least important ones. Where there is no place for all, fewer are replaced.
     pub(super) fn grow(
         &mut self,
@@ -104,8 +102,8 @@ impl Fit<'_> {
         let mut keys = observer.map(items, |(index, values)| {
             let gaussian = values.gaussian(parameterization);
             let Gaussian { center, cholesky, .. } = gaussian;
-            let sensitivity = self.tiled.sensitivity_under(center, cholesky);
-            u64::from(ordered(gaussian.energy() * sensitivity)) << 32 | index as u64
+            let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
+            u64::from(ordered(gaussian.energy() * perceptual_weight)) << 32 | index as u64
         })?;
         observer.poll()?;
         keys.select_nth_unstable(count - 1);

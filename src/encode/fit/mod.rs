@@ -7,7 +7,6 @@ pub(crate) mod budget;
 mod checkpoint;
 mod components;
 mod densify;
-mod distortion_map;
 mod gauss_newton;
 mod growth;
 mod lsq;

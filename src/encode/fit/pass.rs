@@ -12,13 +12,13 @@ use core::ops::AddAssign;
 use fearless_simd::Level;
 
 use super::bins::{RowBins, TileRow};
-use super::distortion_map;
-use super::training::Distortion;
-use super::training_tile::{RenderingError, Slot, TileState, TrainingTile, slots_per_span};
+use super::training_tile::{Slot, TileState, TrainingTile, slots_per_span};
 use crate::encode::error::EncodeError;
+use crate::encode::loss::{ErrorNorm, RenderingError};
 use crate::encode::own_frame::GeometrySums;
 use crate::encode::progress::Observer;
-use crate::encode::tiled_source::{TILE_WIDTH, TilePlane, TiledSource};
+use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
+use crate::encode::tiled_source::TiledSource;
 use crate::kernel::Kernel;
 use crate::region::Region;
 use crate::render::splat::Splat;
@@ -50,8 +50,8 @@ pub(crate) struct Pass {
     bins: RowBins,
     /// The slots of all spans, in the order of the bins: row by row, then splat by splat.
     slots: Vec<Slot>,
-    /// The distortion of every tile, if the last pass measured it.
-    distortions: Vec<f32>,
+    /// The sum of placement errors of every tile, if the last pass measured it.
+    placement_errors: Vec<f32>,
     /// What the last pass minimizes, by tile, row by row.
     tile_distortions: Vec<f32>,
     /// The error of every row of tiles.
@@ -66,7 +66,7 @@ impl Pass {
             level: Level::new(),
             bins: RowBins::new(region),
             slots: Vec::new(),
-            distortions: Vec::new(),
+            placement_errors: Vec::new(),
             tile_distortions: vec![0.0; rows * tiled.width.div_ceil(TILE_WIDTH)],
             row_errors: vec![RenderingError::default(); rows],
         }
@@ -109,8 +109,8 @@ impl Pass {
     }
 
     /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
-    /// computes residuals and gradients. Returns the error of the rendering. Measures the distortions
-    /// of tiles if a measure is given.
+    /// computes residuals and gradients. Returns the error of the rendering. Measures the placement
+    /// errors of tiles if their norm is given.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels; `observer` is polled every few
@@ -121,14 +121,14 @@ impl Pass {
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
-        measure: Option<Distortion>,
+        norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
     ) -> Result<RenderingError, EncodeError> {
         match tiled.channels {
-            1 => self.run_of::<1>(tiled, splats, kernel, base, measure, observer),
-            2 => self.run_of::<2>(tiled, splats, kernel, base, measure, observer),
-            3 => self.run_of::<3>(tiled, splats, kernel, base, measure, observer),
-            _ => self.run_of::<4>(tiled, splats, kernel, base, measure, observer),
+            1 => self.run_of::<1>(tiled, splats, kernel, base, norm, observer),
+            2 => self.run_of::<2>(tiled, splats, kernel, base, norm, observer),
+            3 => self.run_of::<3>(tiled, splats, kernel, base, norm, observer),
+            _ => self.run_of::<4>(tiled, splats, kernel, base, norm, observer),
         }?;
         Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
@@ -154,9 +154,9 @@ impl Pass {
         }
     }
 
-    /// The distortions that the last pass measured: those of all tiles, row by row.
-    pub(crate) fn distortions(&self) -> &[f32] {
-        &self.distortions
+    /// The sums of placement errors that the last pass measured: those of all tiles, row by row.
+    pub(crate) fn placement_errors(&self) -> &[f32] {
+        &self.placement_errors
     }
 
     /// What the last pass minimizes, the distortion of every tile, row by row.
@@ -181,7 +181,7 @@ impl Pass {
     pub(crate) fn memory(&self) -> usize {
         self.bins.memory()
             + self.slots.capacity() * size_of::<Slot>()
-            + (self.distortions.capacity() + self.tile_distortions.len()) * size_of::<f32>()
+            + (self.placement_errors.capacity() + self.tile_distortions.len()) * size_of::<f32>()
     }
 
     fn run_of<const CHANNELS: usize>(
@@ -190,30 +190,30 @@ impl Pass {
         splats: &[Splat],
         kernel: Kernel,
         base: [f32; 4],
-        measure: Option<Distortion>,
+        norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let tiles = self.bins.columns() * self.bins.rows();
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);
-        self.distortions.resize(if measure.is_some() { tiles } else { 0 }, 0.0);
+        self.placement_errors.resize(if norm.is_some() { tiles } else { 0 }, 0.0);
         let mut slots = &mut self.slots[..];
-        let mut distortions = &mut self.distortions[..];
+        let mut placement_errors = &mut self.placement_errors[..];
         let by_tile = self.tile_distortions.chunks_exact_mut(bins.columns());
         let rows = bins.tile_rows().iter().zip(&mut self.row_errors).zip(by_tile).enumerate();
         let rows = rows.map(|(row, ((tiles, error), by_tile))| {
             let slots = slots
                 .split_off_mut(..bins.spans(row).len() * per_span)
                 .expect("there are slots for all rows");
-            let of_row = if measure.is_some() { bins.columns() } else { 0 };
-            let distortions =
-                distortions.split_off_mut(..of_row).expect("there is one for each tile");
-            (row, tiles, slots, distortions, by_tile, error)
+            let of_row = if norm.is_some() { bins.columns() } else { 0 };
+            let placement_errors =
+                placement_errors.split_off_mut(..of_row).expect("there is one for each tile");
+            (row, tiles, slots, placement_errors, by_tile, error)
         });
         let level = self.level;
         type Scratch = (Vec<Splat>, Vec<TileState>);
         observer.map_with(rows, |(of_row, states): &mut Scratch, item| {
-            let (row, tiles, slots, distortions, by_tile, error) = item;
+            let (row, tiles, slots, placement_errors, by_tile, error) = item;
             of_row.clear();
             of_row.extend(bins.spans(row).iter().map(|span| splats[span.splat as usize]));
             let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
@@ -227,11 +227,11 @@ impl Pass {
                 }
                 let states = &mut states[..indices.len()];
                 let of_tile = tile.run(level, kernel, states, slots, &mut planes);
-                *by_tile = of_tile.distortion as f32;
+                *by_tile = of_tile.distortion.0 as f32;
                 *error = *error + of_tile;
-                if let (Some(measure), Some(sum)) = (measure, distortions.get_mut(column)) {
+                if let (Some(norm), Some(sum)) = (norm, placement_errors.get_mut(column)) {
                     let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
-                    let plane = distortion_map::of_tile(tiled, corner, &planes, measure);
+                    let plane = tiled.loss.placement_errors(corner, &planes, norm);
                     *sum = plane.as_flattened().iter().sum();
                 }
             }

@@ -3,6 +3,7 @@
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 use super::pass::SplatGradient;
+use crate::encode::loss::Distortion;
 use crate::encode::own_frame::GeometrySums;
 use crate::encode::rate_model::{LAMBDA, step_for};
 use crate::gaussian::{Gaussian, component_count};
@@ -33,7 +34,7 @@ pub(super) struct RateTerm {
 
 impl RateTerm {
     /// The term for `count` Gaussians whose picture has this distortion.
-    pub(super) fn new(distortion: f64, count: usize, channels: usize) -> Self {
+    pub(super) fn new(distortion: Distortion, count: usize, channels: usize) -> Self {
         let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
         Self {
             squared_step,
@@ -104,7 +105,7 @@ mod tests {
 
     #[test]
     fn the_gradient_is_that_of_the_bits() {
-        let (distortion, count) = (3.0, 20);
+        let (distortion, count) = (Distortion(3.0), 20);
         let squared_step = (2.0 * step_for(distortion, count)).exp2();
         let rate_term = RateTerm::new(distortion, count, 3);
         for values in [

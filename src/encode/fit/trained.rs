@@ -10,9 +10,9 @@ use super::parameters::Parameters;
 use super::pass::Pass;
 use super::rate_term::RateTerm;
 use super::training::Training;
-use super::training_tile::RenderingError;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::encode::error::EncodeError;
+use crate::encode::loss::{RenderingError, SquaredError};
 use crate::encode::options::{MAX_GAUSSIANS, Precision};
 use crate::encode::progress::Observer;
 use crate::encode::tiled_source::TiledSource;
@@ -57,7 +57,7 @@ pub(crate) struct Fit<'a> {
     /// The quantizers, once quantization-aware training has started.
     pub(super) quantizers: Option<LsqQuantizers>,
     /// The squared error before quantization started; 0 without it.
-    pub(super) float_error: f64,
+    pub(super) float_error: SquaredError,
     /// The state of least error since Gaussians were last added or removed.
     pub(super) best: Option<Checkpoint>,
     pub(super) pass: Pass,
@@ -96,7 +96,7 @@ impl<'a> Fit<'a> {
             ),
             parameters: Parameters::new(&training.optimizer),
             quantizers: None,
-            float_error: 0.0,
+            float_error: SquaredError::default(),
             best: None,
             pass: Pass::new(tiled),
             binned_for: 0,
@@ -139,7 +139,7 @@ impl<'a> Fit<'a> {
     /// Whether most of the error is that of quantization: fewer Gaussians, which overlap less, may show a
     /// better picture.
     pub(crate) fn is_lost_to_rounding(&self) -> bool {
-        self.quantizers.is_some() && self.best_error().squared > LOST * self.float_error
+        self.quantizers.is_some() && self.best_error().squared.0 > LOST * self.float_error.0
     }
 
     /// What training has cost so far.
@@ -160,19 +160,18 @@ impl<'a> Fit<'a> {
     /// Whether the last step lost what training had. Codes that flip make the error jump, which is no
     /// loss: the best state is kept in any case.
     pub(super) fn is_lost(&self) -> bool {
-        let samples = self.tiled.pixels() * self.tiled.channels;
         let best = self.best.as_ref().filter(|_| self.quantizers.is_none());
-        best.is_some_and(|best| best.is_lost(self.error, samples))
+        best.is_some_and(|best| best.is_lost(self.error, self.tiled.samples()))
     }
 
     /// Renders the Gaussians as the file would store them, and computes error and gradients.
-    /// Measures the distortions if Gaussians are to be added.
+    /// Measures the placement errors if Gaussians are to be added.
     pub(super) fn forward(
         &mut self,
         next: Next,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        let measure = (next == Next::Growth).then_some(self.training.densification.distortion);
+        let norm = (next == Next::Growth).then_some(self.training.densification.error_norm);
         if !self.has_splats {
             self.make_splats(observer)?;
         }
@@ -183,8 +182,7 @@ impl<'a> Fit<'a> {
         }
         self.binned_for -= 1;
         self.work.evaluations += self.pass.evaluations();
-        self.error =
-            self.pass.run(self.tiled, &self.splats, kernel, self.base, measure, observer)?;
+        self.error = self.pass.run(self.tiled, &self.splats, kernel, self.base, norm, observer)?;
         Ok(())
     }
 
@@ -281,8 +279,7 @@ impl<'a> Fit<'a> {
 
     /// PSNR of the last pass, in dB.
     pub(super) fn psnr(&self) -> f64 {
-        let samples = (self.tiled.pixels() * self.tiled.channels) as f64;
-        10.0 * (samples / self.error.squared).log10()
+        self.error.squared.psnr(self.tiled.samples())
     }
 
     /// Size in bytes.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::components::Components;
 use super::vector_quantizer::VectorQuantizer;
+use crate::encode::loss::ErrorNorm;
 use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
 
@@ -61,9 +62,9 @@ pub struct Densification {
     /// The share of the Gaussians, the least important ones, that each growth step replaces by new
     /// ones at other positions, in [0, 1) (paper: 0).
     pub replaced: f32,
-    /// The measure of the distortion at a pixel.
-    pub distortion: Distortion,
-    /// How the pixels for new Gaussians are chosen by their distortion.
+    /// The error of a pixel.
+    pub error_norm: ErrorNorm,
+    /// How the pixels for new Gaussians are chosen by their errors.
     pub placement: Placement,
     /// The colour of a new Gaussian.
     pub color: NewColor,
@@ -88,23 +89,13 @@ pub enum Portion {
     Fixed(u32),
 }
 
-/// The measure of the distortion at a pixel, from the residuals of its channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Distortion {
-    /// The sum of absolute residuals (paper).
-    L1,
-    /// The cube of the Euclidean length of the residuals.
-    L3,
-}
-
-/// How the pixels for new Gaussians are chosen by their distortion.
+/// How the pixels for new Gaussians are chosen by their errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Placement {
-    /// The pixels of largest distortion (paper). They form clusters.
+    /// The pixels of largest error (paper). They form clusters.
     Top,
-    /// Pixels evenly spread, with a density proportional to the distortion. The denser the new
+    /// Pixels evenly spread, with a density proportional to the error. The denser the new
     /// Gaussians are, the less variance they have.
     Spread,
 }
@@ -250,7 +241,7 @@ impl Quantization {
 
 impl Training {
     /// The encoder's defaults, tuned for quality in few iterations. Growth is early, in many steps
-    /// and beyond the budget; new Gaussians are spread by the distortion, and the surplus is culled
+    /// and beyond the budget; new Gaussians are spread by the error, and the surplus is culled
     /// by energy. The optimizer takes Gauss-Newton steps, and the learning rates fall to 0.
     #[must_use]
     pub fn fast(iterations: u32) -> Self {
@@ -270,7 +261,7 @@ impl Training {
                 surplus: 0.3,
                 culled,
                 replaced: (iterations as f32 / 300.0).min(0.2),
-                distortion: Distortion::L3,
+                error_norm: ErrorNorm::L3,
                 placement: Placement::Spread,
                 color: NewColor::Residual(0.3),
                 shape: NewShape::Point,
@@ -327,7 +318,7 @@ impl Training {
                 surplus: 0.0,
                 culled: 0.9,
                 replaced: 0.0,
-                distortion: Distortion::L1,
+                error_norm: ErrorNorm::L1,
                 placement: Placement::Top,
                 color: NewColor::Zero,
                 shape: NewShape::Random,

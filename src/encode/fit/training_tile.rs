@@ -7,12 +7,10 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
-use crate::encode::distortion::differentiate;
+use crate::encode::loss::{PictureLoss, RenderingError};
 use crate::encode::mul_add::MulAdd;
-use crate::encode::sensitivity::Sensitivity;
-use crate::encode::tiled_source::{
-    FULL_SCALE, SampleTile, TILE_WIDTH, TilePlane, TiledSource, centers, visible,
-};
+use crate::encode::sample_tile::{SampleTile, TILE_WIDTH, TilePlane, centers};
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::component_count;
 use crate::kernel::{Kernel, QUARTIC_RADIUS};
 use crate::render::simd_kernel;
@@ -90,27 +88,6 @@ impl TrainingKernel for simd_kernel::Quartic {
     }
 }
 
-/// The error of a rendering, where a full sample is 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct RenderingError {
-    /// The sum of squared errors over all samples, clamped as in the output.
-    pub(crate) squared: f64,
-    /// What training minimizes: the sum of squared errors, weighted by the eye's sensitivity if the
-    /// encoder is tuned for it.
-    pub(crate) distortion: f64,
-}
-
-impl core::ops::Add for RenderingError {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self {
-            squared: self.squared + other.squared,
-            distortion: self.distortion + other.distortion,
-        }
-    }
-}
-
 /// One tile of the pass.
 pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     /// Column and row of its first pixel.
@@ -120,8 +97,7 @@ pub(super) struct TrainingTile<'a, const CHANNELS: usize> {
     columns: usize,
     rows: usize,
     target: SampleTile<'a, CHANNELS>,
-    /// How much errors count; `None` if all count the same.
-    sensitivity: Option<&'a Sensitivity>,
+    loss: &'a PictureLoss,
     /// The base colour.
     base: [f32; 4],
     /// The splats of the row of tiles.
@@ -145,7 +121,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
             columns: TILE_WIDTH.min(tiled.width - column * TILE_WIDTH),
             rows: TILE_HEIGHT.min(tiled.height - row * TILE_HEIGHT),
             target: tiled.tile(row * tiled.width.div_ceil(TILE_WIDTH) + column),
-            sensitivity: tiled.sensitivity.as_ref(),
+            loss: &tiled.loss,
             base,
             splats,
             indices,
@@ -242,15 +218,9 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 v += rise;
             }
         }
-        let squared = self.residual(simd, &rendering, planes);
-        let distortion = match self.sensitivity {
-            Some(sensitivity) => {
-                let corner = [self.x as usize, self.y as usize];
-                differentiate(sensitivity, corner, [self.columns, self.rows], planes)
-            }
-            None => squared,
-        };
-        RenderingError { squared, distortion }
+        let corner = [self.x as usize, self.y as usize];
+        let size = [self.columns, self.rows];
+        self.loss.of_tile(simd, &rendering, self.target, corner, size, planes)
     }
 
     #[inline(always)]
@@ -306,34 +276,6 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
                 );
             }
         }
-    }
-
-    /// Sets `planes` to the residuals of a rendering; returns the sum of squared errors.
-    #[inline(always)]
-    fn residual<S: Simd>(
-        &self,
-        simd: S,
-        rendering: &[[f32x16<S>; TILE_HEIGHT]; CHANNELS],
-        planes: &mut [TilePlane; CHANNELS],
-    ) -> f64 {
-        let zero = f32x16::splat(simd, 0.0);
-        let one = f32x16::splat(simd, 1.0);
-        let columns = self.columns as f32;
-        let inside = (centers(simd, 0)).simd_lt(columns).select(one, zero);
-        let mut total = zero;
-        for channel in 0..CHANNELS {
-            for row in 0..TILE_HEIGHT {
-                let inside = if row < self.rows { inside } else { zero };
-                let sample = self.target.line(channel, row).load(simd);
-                let target = sample * (1.0 / FULL_SCALE);
-                let value = rendering[channel][row];
-                let residual = visible(simd, (value - target) * inside, sample);
-                residual.store_array(&mut planes[channel][row]);
-                let clamped = (value.max(zero).min(one) - target) * inside;
-                total = clamped.fused_mul_add(clamped, total);
-            }
-        }
-        total.to_array().iter().map(|&squared| f64::from(squared)).sum()
     }
 }
 

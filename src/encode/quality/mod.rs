@@ -39,9 +39,9 @@ use smooth::SmoothAreas;
 /// The highest quality that is aimed at. People see no difference from 90 on.
 pub(crate) const MOST_QUALITY: f64 = 97.0;
 
-/// The mean sensitivity of a picture without any variance.
-const MOST_SENSITIVITY: f64 = 20.07;
-/// A picture whose mean sensitivity is less than this below the most is taken to have large even areas, and
+/// The mean perceptual weight of a picture without any variance.
+const MOST_WEIGHT: f64 = 20.07;
+/// A picture whose mean weight is less than this below the most is taken to have large even areas, and
 /// begins with fewer Gaussians:
 const EVEN: f64 = 6.0;
 /// at least this share of them.
@@ -231,13 +231,13 @@ fn distance_at(wanted: f64) -> f64 {
     0.5 * (least + most)
 }
 
-/// About how many Gaussians a picture needs for a quality, given the means of the eye's sensitivity to it
+/// About how many Gaussians a picture needs for a quality, given the means of its perceptual weights
 /// on the finest and on the coarsest scale: texture, and above all fine texture, takes Gaussians.
 pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) -> usize {
     let distance = distance_at(wanted.min(MOST_QUALITY));
     let density = 0.5 * distance.powf(-0.83) * fine.powf(-4.5) * coarse.powf(3.35);
-    // On even ground, sensitivities do not tell how smooth it is.
-    let density = density * ((MOST_SENSITIVITY - fine) / EVEN).clamp(LEAST_SHARE, 1.0);
+    // On even ground, weights do not tell how smooth it is.
+    let density = density * ((MOST_WEIGHT - fine) / EVEN).clamp(LEAST_SHARE, 1.0);
     // The cast saturates.
     ((pixels as f64 * density.min(MOST_DENSITY)) as usize).max(1)
 }

@@ -82,9 +82,9 @@ impl<'a> CodeOptimizer<'a> {
         let quantization = rate_model::quantization(step, self.model);
         let codes = observer.map(gaussians.iter(), |gaussian| {
             let Gaussian { center, cholesky, .. } = *gaussian;
-            let sensitivity = self.tiled.sensitivity_under(center, cholesky);
+            let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
             let exponent =
-                rate_model::step_exponent(gaussian, sensitivity, &quantization, self.model);
+                rate_model::step_exponent(gaussian, perceptual_weight, &quantization, self.model);
             quantization.code(gaussian, exponent, &self.grid, self.model)
         })?;
         self.layout.coded(QuantizedCodes { quantization, codes }, observer)
@@ -167,9 +167,6 @@ impl<'a> CodeOptimizer<'a> {
         strips::render(&rendering, u32::MAX, observer, |region, planes| {
             residuals.set(tiled, region.y as usize, planes);
         })?;
-        if let Some(sensitivity) = &tiled.sensitivity {
-            residuals.shift(sensitivity, observer)?;
-        }
-        Ok(())
+        residuals.shift(&tiled.loss, observer)
     }
 }

@@ -238,7 +238,7 @@ impl CoordinateDescent<'_> {
         let slant = gaussian.cholesky[1] / gaussian.cholesky[2];
         let amplitudes = code.color.iter().zip(&quantization.color);
         let energy: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
-        let energy = energy * gradient.sensitivity;
+        let energy = energy * gradient.perceptual_weight;
         let recolored = self.with_best_colors(&gradient.change, code, context.costs);
         let error =
             gradient.change.with_color(recolored.color, quantization.color_units(&recolored));

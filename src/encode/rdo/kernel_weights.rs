@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use fearless_simd::{Simd, f32x16};
 
-use crate::encode::tiled_source::centers;
+use crate::encode::sample_tile::centers;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::simd_kernel::Quartic;

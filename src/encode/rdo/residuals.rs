@@ -7,12 +7,12 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, LANES, Lanes};
-use crate::encode::distortion::differentiate;
 use crate::encode::error::EncodeError;
+use crate::encode::loss::{BLOCK, PictureLoss, residual};
 use crate::encode::mul_add::MulAdd;
 use crate::encode::progress::Observer;
-use crate::encode::sensitivity::{BLOCK, Sensitivity};
-use crate::encode::tiled_source::{FULL_SCALE, SampleLine, TILE_WIDTH, TiledSource, visible};
+use crate::encode::sample_tile::{FULL_SCALE, SampleLine, TILE_WIDTH};
+use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::tile_grid::TILE_HEIGHT;
@@ -42,7 +42,7 @@ pub(crate) type StoredLanes = [i16; LANES];
 /// error, nor one above white where the source is white. Changes of the rendering are not clamped: they
 /// count as errors there, although the output would hide them, so the descent avoids them.
 ///
-/// The descent minimizes the sum of squared residuals, each times the sensitivity of its pixel. The
+/// The descent minimizes the sum of squared residuals, each times the perceptual weight of its pixel. The
 /// distortion counts the means of blocks too: [`Residuals::shift`] moves the residuals such that the
 /// gradient of that sum is the gradient of the distortion.
 #[derive(Debug)]
@@ -53,9 +53,9 @@ pub(crate) struct Residuals {
     /// In units of 1 / [`UNIT`], row by row, and in each row channel by channel; every line is padded
     /// such that a vector from any pixel on is inside.
     residuals: Vec<i16>,
-    /// The sensitivities of pixels, padded by 0 as `residuals`: one line for each row of blocks, or a
+    /// The perceptual weights of pixels, padded by 0 as `residuals`: one line for each row of blocks, or a
     /// single one where all rows are the same.
-    sensitivities: Vec<f32>,
+    perceptual_weights: Vec<f32>,
     stride: usize,
     level: Level,
 }
@@ -71,16 +71,16 @@ impl Residuals {
     ) -> Result<Self, EncodeError> {
         let (width, height, channels) = (tiled.width, tiled.height, tiled.channels);
         let stride = width + LANES;
-        let mut sensitivities = vec![0.0; stride * sensitivity_lines(tiled)];
-        let lines = sensitivities.chunks_exact_mut(stride).enumerate();
+        let mut perceptual_weights = vec![0.0; stride * weight_lines(tiled)];
+        let lines = perceptual_weights.chunks_exact_mut(stride).enumerate();
         observer.map(lines, |(row, line)| {
             for (x, value) in line[..width].iter_mut().enumerate() {
-                *value = tiled.sensitivity(x, row * BLOCK);
+                *value = tiled.loss.weight_at(x, row * BLOCK);
             }
         })?;
         let residuals = vec![0; stride * height * channels];
         let level = Level::new();
-        Ok(Self { width, height, channels, residuals, sensitivities, stride, level })
+        Ok(Self { width, height, channels, residuals, perceptual_weights, stride, level })
     }
 
     /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
@@ -100,34 +100,35 @@ impl Residuals {
         });
     }
 
-    /// Moves every residual such that, times its sensitivity, it is half the gradient of the
+    /// Moves every residual such that, times its perceptual weight, it is half the gradient of the
     /// distortion.
     ///
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn shift(
         &mut self,
-        sensitivity: &Sensitivity,
+        loss: &PictureLoss,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         match self.channels {
-            1 => self.shift_of::<1>(sensitivity, observer),
-            2 => self.shift_of::<2>(sensitivity, observer),
-            3 => self.shift_of::<3>(sensitivity, observer),
-            _ => self.shift_of::<4>(sensitivity, observer),
+            _ if loss.weights().is_none() => Ok(()),
+            1 => self.shift_of::<1>(loss, observer),
+            2 => self.shift_of::<2>(loss, observer),
+            3 => self.shift_of::<3>(loss, observer),
+            _ => self.shift_of::<4>(loss, observer),
         }
     }
 
     #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]
     fn shift_of<const CHANNELS: usize>(
         &mut self,
-        sensitivity: &Sensitivity,
+        loss: &PictureLoss,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
         let (level, stride, width) = (self.level, self.stride, self.width);
         let band = TILE_HEIGHT * CHANNELS * stride;
-        let sensitivities = self.sensitivities.chunks(TILE_HEIGHT / BLOCK * stride);
-        let bands = self.residuals.chunks_mut(band).zip(sensitivities).enumerate();
+        let perceptual_weights = self.perceptual_weights.chunks(TILE_HEIGHT / BLOCK * stride);
+        let bands = self.residuals.chunks_mut(band).zip(perceptual_weights).enumerate();
         observer.map(bands, |(row, (residuals, by_pixel))| {
             let rows = residuals.len() / (CHANNELS * stride);
             for x in (0..width).step_by(TILE_WIDTH) {
@@ -142,7 +143,7 @@ impl Residuals {
                             planes[channel][y][columns..].fill(0.0);
                         }
                     }
-                    differentiate(sensitivity, corner, [columns, rows], &mut planes);
+                    loss.differentiate(corner, [columns, rows], &mut planes);
                     for channel in 0..CHANNELS {
                         for y in 0..rows {
                             let at = (y * CHANNELS + channel) * stride + x;
@@ -161,8 +162,8 @@ impl Residuals {
     /// Size in bytes of the residuals of a source.
     pub(crate) fn memory(tiled: &TiledSource) -> usize {
         let by_column = tiled.height * tiled.channels * size_of::<i16>();
-        let sensitivities = sensitivity_lines(tiled) * size_of::<f32>();
-        (tiled.width + LANES) * (by_column + sensitivities)
+        let perceptual_weights = weight_lines(tiled) * size_of::<f32>();
+        (tiled.width + LANES) * (by_column + perceptual_weights)
     }
 
     /// Width and height of the picture.
@@ -173,14 +174,14 @@ impl Residuals {
     /// All rows in bands: `first` ones, and then `height` at a time.
     pub(crate) fn bands(&mut self, first: usize, height: usize) -> impl Iterator<Item = Band<'_>> {
         let (size, channels, stride, level) = (self.size(), self.channels, self.stride, self.level);
-        let sensitivities = &self.sensitivities[..];
+        let perceptual_weights = &self.perceptual_weights[..];
         let line = channels * stride;
         let (start, rest) = self.residuals.split_at_mut(first.min(size[1]) * line);
         let mut row = 0;
         core::iter::once(start).chain(rest.chunks_mut(height * line)).map(move |residuals| {
             let rows = row..row + residuals.len() / line;
             row = rows.end;
-            Band { size, channels, stride, level, rows, residuals, sensitivities }
+            Band { size, channels, stride, level, rows, residuals, perceptual_weights }
         })
     }
 
@@ -201,7 +202,7 @@ pub(crate) struct Band<'a> {
     level: Level,
     rows: Range<usize>,
     residuals: &'a mut [i16],
-    sensitivities: &'a [f32],
+    perceptual_weights: &'a [f32],
 }
 
 impl Band<'_> {
@@ -257,12 +258,12 @@ impl Band<'_> {
         load(simd, &self.residuals[self.place(x, y, channel)..])
     }
 
-    /// The sensitivities of these pixels; 0 outside the picture.
+    /// The perceptual weights of these pixels; 0 outside the picture.
     #[inline(always)]
-    pub(crate) fn sensitivities(&self, x: usize, y: usize) -> &Lanes {
-        let is_single = self.sensitivities.len() == self.stride;
+    pub(crate) fn perceptual_weights(&self, x: usize, y: usize) -> &Lanes {
+        let is_single = self.perceptual_weights.len() == self.stride;
         let line = if is_single { 0 } else { y / BLOCK };
-        vector(&self.sensitivities[line * self.stride + x..])
+        vector(&self.perceptual_weights[line * self.stride + x..])
     }
 }
 
@@ -292,9 +293,9 @@ fn draw<S: Simd>(
     }
 }
 
-/// Number of different lines of sensitivities.
-fn sensitivity_lines(tiled: &TiledSource) -> usize {
-    tiled.sensitivity.as_ref().map_or(1, |_| tiled.height.div_ceil(BLOCK))
+/// Number of different lines of perceptual weights.
+fn weight_lines(tiled: &TiledSource) -> usize {
+    tiled.loss.weights().map_or(1, |_| tiled.height.div_ceil(BLOCK))
 }
 
 /// The columns and rows of the window of a Gaussian in a picture of a width and height: the bounding box
@@ -349,15 +350,15 @@ fn set<S: Simd>(simd: S, rendering: &[f32], samples: SampleLine<'_>, residuals: 
     let mut padded = [0.0; LANES];
     padded[..rendering.len()].copy_from_slice(rendering);
     let sample = samples.load(simd);
-    let residual = f32x16::load_array_ref(simd, &padded) - sample * (1.0 / FULL_SCALE);
-    store(simd, visible(simd, residual, sample), residuals);
+    let difference = f32x16::load_array_ref(simd, &padded) - sample * (1.0 / FULL_SCALE);
+    store(simd, residual(simd, difference, sample), residuals);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::color::ColorModel;
-    use crate::encode::distortion::plain_distortion;
+    use crate::encode::loss::plain_distortion;
     use crate::encode::options::Tune;
     use crate::encode::progress::unobserved;
     use crate::encode::source::Source;
@@ -378,8 +379,8 @@ mod tests {
             let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
             let mut residuals = unobserved(|observer| Residuals::new(&tiled, observer));
             residuals.set(&tiled, 0, &rendering);
-            let sensitivity = tiled.sensitivity.as_ref().expect("it is tuned");
-            unobserved(|observer| residuals.shift(sensitivity, observer));
+            let weights = tiled.loss.weights().expect("it is tuned");
+            unobserved(|observer| residuals.shift(&tiled.loss, observer));
 
             let mut plain: Vec<f64> = (0..samples.len())
                 .map(|at| {
@@ -398,13 +399,13 @@ mod tests {
                 let here = plain[at];
                 let mut with = |residual: f64| {
                     plain[at] = residual;
-                    plain_distortion(sensitivity, [width, height], &plain)
+                    plain_distortion(weights, [width, height], &plain)
                 };
                 let half = (with(here + 0.1) - with(here - 0.1)) / 0.4;
                 with(here);
                 let stored = residuals.residuals[(y * channels + channel) * residuals.stride + x];
                 let residual = f32::from(stored) / UNIT;
-                let by_pixel = residuals.whole().sensitivities(x, y)[0];
+                let by_pixel = residuals.whole().perceptual_weights(x, y)[0];
                 let found = f64::from(residual * by_pixel);
                 let rounding = 0.5 / UNIT * by_pixel;
                 assert!(

@@ -7,6 +7,7 @@ use crate::coding::entropy::QuantizedCodes;
 use crate::encode::aim::{Aim, FileAim};
 use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
+use crate::encode::loss::Distortion;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
 use crate::encode::rate_model;
@@ -97,7 +98,7 @@ impl<'a> TargetSearch<'a> {
     pub(crate) fn run(
         &mut self,
         gaussians: &[Gaussian],
-        distortion: f64,
+        distortion: Distortion,
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64), EncodeError> {

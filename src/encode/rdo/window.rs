@@ -1,5 +1,5 @@
 //! The residuals around one Gaussian, and how the error, the sum of their squares times their
-//! sensitivities, depends on it.
+//! perceptual weights, depends on it.
 
 use core::ops::Range;
 
@@ -69,7 +69,7 @@ pub(crate) struct ErrorChange {
     pub(crate) error: f32,
     /// Half of the derivative of `error` by the amplitude along each colour axis.
     pub(crate) by_axis: [f32; 4],
-    /// The sum of squared weights times sensitivities, which is half of the second derivative by each
+    /// The sum of squared weights times perceptual weights, which is half of the second derivative by each
     /// amplitude.
     pub(crate) squared_weights: f32,
     /// The Gaussian's amplitudes along the colour axes.
@@ -97,8 +97,8 @@ pub(crate) struct ErrorGradient {
     pub(crate) change: ErrorChange,
     /// The derivatives by the components of a [`GeometryChange`].
     pub(crate) by_geometry: GeometryChange,
-    /// The mean sensitivity of the pixels, each weighted by the squared weight of the Gaussian.
-    pub(crate) sensitivity: f32,
+    /// The mean perceptual weight of the pixels, each weighted by the squared weight of the Gaussian.
+    pub(crate) perceptual_weight: f32,
 }
 
 impl Default for Window {
@@ -139,11 +139,12 @@ impl Window {
             _ => self.without_of::<4>(band, gaussian),
         };
         // Without any weight in the picture, nothing depends on it.
-        let sensitivity = if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
+        let perceptual_weight =
+            if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
         Some(ErrorGradient {
             change: sums.change.with_present(gaussian, model),
             by_geometry: sums.by_geometry(gaussian),
-            sensitivity,
+            perceptual_weight,
         })
     }
 
@@ -313,8 +314,9 @@ impl Frame<'_> {
                     let [u, v] = weights.local(simd, x, y);
                     let root = kernel_root(simd, [u, v]);
                     let weight = root * root;
-                    let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
-                    let counted = weight * sensitivity;
+                    let perceptual_weight =
+                        f32x16::load_array_ref(simd, self.band.perceptual_weights(x, y));
+                    let counted = weight * perceptual_weight;
                     squares = counted.fused_mul_add(weight, squares);
                     all = weight.fused_mul_add(weight, all);
                     let mut along = zero;
@@ -325,7 +327,7 @@ impl Frame<'_> {
                         residuals[channel] = weight.fused_mul_add(-color, residual);
                     }
                     // dweight/dq = -root / 2, and q = u^2 + v^2.
-                    let slope = along * sensitivity * root;
+                    let slope = along * perceptual_weight * root;
                     let (by_u, by_v) = (slope * u, slope * v);
                     first[0] += by_u;
                     first[1] += by_v;
@@ -370,8 +372,9 @@ impl Frame<'_> {
             for vector in weights.span(left, top + row, vectors) {
                 let [x, y] = self.pixel(row, vector);
                 let weight = weights.at(simd, x, y);
-                let sensitivity = f32x16::load_array_ref(simd, self.band.sensitivities(x, y));
-                let counted = weight * sensitivity;
+                let perceptual_weight =
+                    f32x16::load_array_ref(simd, self.band.perceptual_weights(x, y));
+                let counted = weight * perceptual_weight;
                 squares = counted.fused_mul_add(weight, squares);
                 let residuals: [_; CHANNELS] = match &without.removed {
                     Some(removed) => self.residuals_without(simd, [x, y], removed),
@@ -401,9 +404,9 @@ impl Frame<'_> {
 /// What the change of error by a Gaussian is made of.
 #[derive(Clone, Copy, Debug, Default)]
 struct ChangeSums {
-    /// Squared weights times sensitivities.
+    /// Squared weights times perceptual weights.
     squares: f32,
-    /// Weights times sensitivities times residuals, by channel.
+    /// Weights times perceptual weights times residuals, by channel.
     products: [f32; 4],
 }
 

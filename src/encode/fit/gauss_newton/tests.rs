@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::encode::fit::parameterization::OwnFrame;
+use crate::encode::loss::Distortion;
 use crate::gaussian::{Gaussian, component_count};
 use crate::testing::simd_levels;
 
@@ -44,7 +45,7 @@ fn slopes(count: usize, channels: usize, rng: &mut fastrand::Rng) -> Vec<Slope<S
             GeometrySums { first: [value(), value()], second: [value(), value(), value()] };
         let mut color = [0.0; 4];
         color[..channels].fill_with(value);
-        Slope { gradient: SplatGradient { geometry, color }, sensitivity: 0.5 + rng.f32() }
+        Slope { gradient: SplatGradient { geometry, color }, perceptual_weight: 0.5 + rng.f32() }
     };
     (0..count).map(slope).collect()
 }
@@ -64,7 +65,7 @@ fn in_own_frame(
         parameterization::gradients(&by_splat.geometry, parameterization, values.shape);
     let (center, shape) = OwnFrame::new(parameterization, values.shape).gradient(center, shape);
     let gradient = Components { center, shape, color: by_splat.color };
-    Slope { gradient, sensitivity: slope.sensitivity }
+    Slope { gradient, perceptual_weight: slope.perceptual_weight }
 }
 
 #[test]
@@ -73,7 +74,7 @@ fn gradients_by_splats_and_by_values_give_the_same_steps() {
     for (parameterization, channels) in
         PARAMETERIZATIONS.into_iter().flat_map(|p| [1, 3, 4].map(|channels| (p, channels)))
     {
-        for rate_term in [None, Some(RateTerm::new(0.3, 40, channels))] {
+        for rate_term in [None, Some(RateTerm::new(Distortion(0.3), 40, channels))] {
             // Two blocks and a part of one.
             let count = 2 * LANES + 5;
             let step = step_in(parameterization, [90, 60], channels);
@@ -145,7 +146,7 @@ fn every_simd_level_gives_the_same_bits() {
     let run = |level| {
         let mut rng = fastrand::Rng::with_seed(7);
         let count = 3 * LANES + 1;
-        let rate_term = Some(RateTerm::new(0.3, 40, 3));
+        let rate_term = Some(RateTerm::new(Distortion(0.3), 40, 3));
         let step = Step { rate_term, ..step_in(Parameterization::Cholesky, [90, 60], 3) };
         let mut values = values(count, Parameterization::Cholesky, 3, &mut rng);
         let mut states = vec![State::NEW; count];
@@ -185,7 +186,7 @@ fn step_alone(
         let frame = OwnFrame::new(parameterization, values.shape);
         let (center, shape) = frame.gradient(gradient.center, gradient.shape);
         let gradient = Components { center, shape, ..*gradient };
-        Slope { gradient, sensitivity: 1.0 }
+        Slope { gradient, perceptual_weight: 1.0 }
     });
 }
 

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::color::ColorModel;
-use crate::encode::distortion::plain_distortion;
 use crate::encode::fit::components::Components;
 use crate::encode::fit::parameterization;
+use crate::encode::loss::plain_distortion;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
 use crate::encode::source::Source;
@@ -78,8 +78,8 @@ fn loss(
         }
     }
     let size = [WIDTH as usize, HEIGHT as usize];
-    let distortion = match &tiled.sensitivity {
-        Some(sensitivity) => plain_distortion(sensitivity, size, &residuals),
+    let distortion = match tiled.loss.weights() {
+        Some(weights) => plain_distortion(weights, size, &residuals),
         None => residuals.iter().map(|residual| residual * residual).sum(),
     };
     0.5 * distortion
@@ -206,7 +206,7 @@ fn every_simd_level_gives_the_same_bits() {
         });
         gradients
             .map(u64::from)
-            .chain([error.squared, error.distortion].map(f64::to_bits))
+            .chain([error.squared.0, error.distortion.0].map(f64::to_bits))
             .collect()
     };
     for tune in [Tune::Visual, Tune::Psnr] {
@@ -214,7 +214,7 @@ fn every_simd_level_gives_the_same_bits() {
             TiledSource::new(&source.keeping_invisible(true), tune, observer)
         });
         let expected = run(Level::baseline(), &tiled);
-        assert!(expected.0.squared > 0.0 && expected.0.distortion > 0.0);
+        assert!(expected.0.squared.0 > 0.0 && expected.0.distortion.0 > 0.0);
         let expected = bits(expected);
         for (name, level) in simd_levels() {
             let found = bits(run(level, &tiled));
@@ -242,7 +242,7 @@ fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
 }
 
 #[test]
-fn measured_distortions_are_those_of_the_tiles_rendered_again() {
+fn measured_placement_errors_are_those_of_the_tiles_rendered_again() {
     let mut rng = fastrand::Rng::with_seed(3);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
     let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
@@ -253,21 +253,21 @@ fn measured_distortions_are_those_of_the_tiles_rendered_again() {
             TiledSource::new(&source.keeping_invisible(true), tune, observer)
         });
         let kernel = Kernel::Quartic;
-        for measure in [Distortion::L1, Distortion::L3] {
+        for norm in [ErrorNorm::L1, ErrorNorm::L3] {
             let mut pass = Pass::new(&tiled);
             unobserved(|observer| {
                 pass.bin(&tiled, &splats, kernel, observer)?;
-                pass.run(&tiled, &splats, kernel, BASE, Some(measure), observer)
+                pass.run(&tiled, &splats, kernel, BASE, Some(norm), observer)
             });
             let columns = tiled.width.div_ceil(TILE_WIDTH);
-            let expected = pass.distortions();
+            let expected = pass.placement_errors();
             assert_eq!(expected.len(), columns * tiled.height.div_ceil(TILE_HEIGHT));
             let rendered =
                 Rendered { pass: &pass, tiled: &tiled, splats: &splats, kernel, base: BASE };
             for (tile, &expected) in expected.iter().enumerate() {
                 let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
                 let planes = rendered.residuals(tile);
-                let found = distortion_map::of_tile(&tiled, corner, &planes, measure);
+                let found = tiled.loss.placement_errors(corner, &planes, norm);
                 assert!(expected > 0.0);
                 assert_eq!(found.as_flattened().iter().sum::<f32>(), expected);
             }

@@ -104,8 +104,8 @@ fn plain_error(scene: &Scene, gaussian: &Gaussian, factor: f64) -> f64 {
 fn weighted_error(scene: &Scene, residuals: impl Iterator<Item = f64>) -> f64 {
     let terms = residuals.enumerate().map(|(at, residual)| {
         let pixel = at / scene.model.channels();
-        let sensitivity = scene.tiled.sensitivity(pixel % WIDTH, pixel / WIDTH);
-        f64::from(sensitivity) * residual * residual
+        let perceptual_weight = scene.tiled.loss.weight_at(pixel % WIDTH, pixel / WIDTH);
+        f64::from(perceptual_weight) * residual * residual
     });
     terms.sum()
 }

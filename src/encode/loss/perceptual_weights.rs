@@ -1,4 +1,4 @@
-//! How much an error counts, by its place and its scale, to the eye: visual masking.
+//! Perceptual weights: how much an error counts, by its place and its scale (activity masking).
 //!
 //! An error is hard to see where the picture itself varies. Measures of visible differences divide
 //! the variance of the error by that of the picture, and do so on several scales: most of the weight
@@ -8,29 +8,29 @@
 
 use core::ops::Range;
 
-use super::error::EncodeError;
-use super::progress::Observer;
-use super::quality::Gradients;
-use super::source::Source;
+use crate::encode::error::EncodeError;
+use crate::encode::progress::Observer;
+use crate::encode::quality::Gradients;
+use crate::encode::source::Source;
 
 /// Scales on which errors count: single pixels, and means of luma over 2 x 2 and 4 x 4 pixels.
 pub(crate) const SCALES: usize = 3;
-/// Side in pixels of the blocks that have sensitivities, which is that of the coarsest scale.
+/// Side in pixels of the blocks that have weights, which is that of the coarsest scale.
 pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
 
-/// The sensitivities of a block to squared errors on each scale.
-pub(crate) type BlockSensitivity = [f32; SCALES];
+/// The weights of a block for squared errors on each scale.
+pub(crate) type BlockWeights = [f32; SCALES];
 
 // Constants: docs/tuning.md, "What a person sees".
-/// The mean sensitivity on each scale; they add up to 1.
+/// The mean weight on each scale; they add up to 1.
 const BY_SCALE: [f64; SCALES] = [0.4, 0.35, 0.25];
-/// The sensitivity is the variance to the power of minus this.
+/// The weight is the variance to the power of minus this.
 const MASKING: f64 = 0.4;
 /// What is added to a variance: the square of a few quantization steps of 8 bits.
 const LEAST_VARIANCE: f64 = (6.0 / 255.0) * (6.0 / 255.0);
 /// The variances are those in square boxes with these radii in pixels.
 const RADII: [usize; 3] = [2, 7, 20];
-/// The most and the least sensitivity on a scale, as a factor on its geometric mean.
+/// The largest and the least weight on a scale, as a factor on its geometric mean.
 const MOST: f64 = 8.0;
 /// How often an error counts in a gradient without noise, where people see blotches and bands that measures
 /// of visible differences do not.
@@ -40,13 +40,13 @@ const LUMA: [f32; 3] = [0.265, 0.657, 0.078];
 /// Rows of blocks that one task computes.
 const BAND: usize = 16;
 
-/// The sensitivities of a picture.
+/// The perceptual weights of a picture.
 #[derive(Debug)]
-pub(crate) struct Sensitivity {
+pub(crate) struct PerceptualWeights {
     /// Blocks in a row.
     columns: usize,
     /// Row by row.
-    blocks: Vec<BlockSensitivity>,
+    blocks: Vec<BlockWeights>,
     /// The share of each channel in luma, 0 for alpha, scaled such that an error that is the same in
     /// all colour channels of all pixels of a block counts the same on every scale.
     pub(crate) luma: [f32; 4],
@@ -56,7 +56,7 @@ pub(crate) struct Sensitivity {
     pub(crate) means: [f64; SCALES],
 }
 
-impl Sensitivity {
+impl PerceptualWeights {
     /// # Errors
     /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
@@ -101,11 +101,11 @@ impl Sensitivity {
 
     /// A row of blocks.
     #[inline]
-    pub(crate) fn row(&self, row: usize) -> &[BlockSensitivity] {
+    pub(crate) fn row(&self, row: usize) -> &[BlockWeights] {
         &self.blocks[row * self.columns..][..self.columns]
     }
 
-    /// The sensitivity of a pixel to an error on all scales.
+    /// The weight of an error of a pixel on all scales.
     #[inline]
     pub(crate) fn at(&self, x: usize, y: usize) -> f32 {
         self.row(y / BLOCK)[x / BLOCK].iter().sum()
@@ -116,7 +116,7 @@ impl Sensitivity {
         size_of_val(&self.blocks[..])
     }
 
-    /// Size in bytes of what else [`Sensitivity::new`] needs.
+    /// Size in bytes of what else [`PerceptualWeights::new`] needs.
     pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
         let (width, height) = (source.width() as usize, source.height() as usize);
         let tasks = height.div_ceil(BAND * BLOCK).min(rayon::current_num_threads());
@@ -126,8 +126,8 @@ impl Sensitivity {
     }
 }
 
-/// Raises the sensitivities of blocks in gradients, and lowers all of them to the same mean as before.
-fn stress_gradients(blocks: &mut [BlockSensitivity], columns: usize, gradients: &Gradients) {
+/// Raises the weights of blocks in gradients, and lowers all of them to the same mean as before.
+fn stress_gradients(blocks: &mut [BlockWeights], columns: usize, gradients: &Gradients) {
     let mut sum = 0.0;
     for (index, block) in blocks.iter_mut().enumerate() {
         let (x, y) = (index % columns * BLOCK, index / columns * BLOCK);
@@ -141,7 +141,7 @@ fn stress_gradients(blocks: &mut [BlockSensitivity], columns: usize, gradients: 
     blocks.iter_mut().flatten().for_each(|value| *value /= mean);
 }
 
-/// Sensitivities from their logarithms, with a mean of 1, and their mean before.
+/// Weights from their logarithms, with a mean of 1, and their mean before.
 fn normalized(logarithms: &[f32]) -> (impl Iterator<Item = f64>, f64) {
     let count = logarithms.len() as f64;
     let middle = logarithms.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
@@ -215,7 +215,7 @@ impl LumaBand {
         Self { scale, first, width, height: end - first, sums }
     }
 
-    /// Adds the logarithms of the sensitivities of rows of blocks, of which the first has the index
+    /// Adds the logarithms of the weights of rows of blocks, of which the first has the index
     /// `first` in the picture: means over the values of a block on this scale.
     fn add_logarithms(&self, first: usize, blocks: &mut [f32]) {
         let side = BLOCK >> self.scale;
@@ -258,7 +258,7 @@ mod tests {
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
 
-    /// The sensitivities of a block before they are normalized, directly from the definition.
+    /// The weights of a block before they are normalized, directly from the definition.
     fn plain(source: &Source<'_>, block: [usize; 2], scale: usize) -> f64 {
         let [width, height] = [source.width() as usize, source.height() as usize];
         let side = 1 << scale;
@@ -311,17 +311,17 @@ mod tests {
     }
 
     #[test]
-    fn sensitivities_are_those_of_the_definition() {
+    fn weights_are_those_of_the_definition() {
         // Several bands, the last one of less than a block.
         let (width, height) = (43, 4 * 2 * BAND + 6);
         let samples = noise(width, height);
         let source = Source::new_u8(width as u32, height as u32, ColorModel::Rgb, &samples)
             .expect("the sizes agree");
-        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
+        let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
         let rows = height.div_ceil(BLOCK);
         for scale in 0..SCALES {
             let found: Vec<f64> = (0..rows)
-                .flat_map(|row| sensitivity.row(row).iter().map(|block| f64::from(block[scale])))
+                .flat_map(|row| weights.row(row).iter().map(|block| f64::from(block[scale])))
                 .collect();
             let mean = found.iter().sum::<f64>() / found.len() as f64;
             assert!((mean - BY_SCALE[scale]).abs() < 1e-5, "scale {scale}: {mean}");
@@ -348,27 +348,27 @@ mod tests {
     }
 
     #[test]
-    fn even_ground_is_more_sensitive_than_texture() {
+    fn errors_on_even_ground_count_more_than_in_texture() {
         let samples = noise(64, 64);
         let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("the sizes agree");
-        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
-        let across: Vec<f32> = (4..64).step_by(8).map(|x| sensitivity.at(x, 32)).collect();
+        let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
+        let across: Vec<f32> = (4..64).step_by(8).map(|x| weights.at(x, 32)).collect();
         assert!(across.is_sorted_by(|a, b| a > b), "{across:?}");
     }
 
     #[test]
-    fn every_model_and_size_has_sensitivities() {
+    fn every_model_and_size_has_weights() {
         for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
             for [width, height] in [[1, 1], [1, 70], [2, 3], [17, 9]] {
                 let samples = vec![200; width as usize * height as usize * model.channels()];
                 let source =
                     Source::new_u8(width, height, model, &samples).expect("the sizes agree");
-                let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
-                // All of an even picture is equally sensitive.
-                let found = sensitivity.at(width as usize - 1, height as usize - 1);
+                let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
+                // Errors count the same everywhere in an even picture.
+                let found = weights.at(width as usize - 1, height as usize - 1);
                 assert!((found - 1.0).abs() < 1e-5, "{model:?}, {width}x{height}: {found}");
-                let squares = sensitivity.luma.iter().sum::<f32>().powi(2);
-                assert!((squares - sensitivity.colors as f32).abs() < 1e-5, "{model:?}");
+                let squares = weights.luma.iter().sum::<f32>().powi(2);
+                assert!((squares - weights.colors as f32).abs() < 1e-5, "{model:?}");
             }
         }
     }

@@ -1,12 +1,13 @@
-//! The distortion of a tile: its squared error, weighted by the eye's sensitivity.
+//! The distortion of a tile, and its gradient.
 //!
 //! With the residual r of a sample, and the means m of luma over the blocks of each coarser scale,
-//! the distortion is the sum over all samples of s r^2, plus the sum over all pixels and coarser
-//! scales of s m^2, where s is the sensitivity on the scale. Blocks are whole: outside the picture,
+//! the distortion is the sum over all samples of w r^2, plus the sum over all pixels and coarser
+//! scales of w m^2, where w is the perceptual weight on the scale. Blocks are whole: outside the picture,
 //! residuals are 0. The distortion is quadratic in the residuals.
 
-use super::sensitivity::{BLOCK, SCALES, Sensitivity};
-use super::tiled_source::{TILE_WIDTH, TilePlane};
+use super::error::Distortion;
+use super::perceptual_weights::{BLOCK, PerceptualWeights, SCALES};
+use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
 /// distortion by them, and returns the distortion. `size` is the number of columns and rows inside
@@ -16,20 +17,20 @@ use super::tiled_source::{TILE_WIDTH, TilePlane};
 /// over indices, as in `fit/training_tile.rs`.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "see above")]
-pub(crate) fn differentiate<const CHANNELS: usize>(
-    sensitivity: &Sensitivity,
+pub(super) fn differentiate<const CHANNELS: usize>(
+    weights: &PerceptualWeights,
     [x, y]: [usize; 2],
     [columns, rows]: [usize; 2],
     planes: &mut [TilePlane; CHANNELS],
-) -> f64 {
-    let (luma, colors) = (sensitivity.luma, sensitivity.colors);
+) -> Distortion {
+    let (luma, colors) = (weights.luma, weights.colors);
     let mut inside = [0.0; TILE_WIDTH];
     for x in 0..TILE_WIDTH {
         inside[x] = if x < columns { 1.0 } else { 0.0 };
     }
     let mut total = [0.0; TILE_WIDTH];
     for first in (0..rows).step_by(BLOCK) {
-        let blocks = &sensitivity.row((y + first) / BLOCK)[x / BLOCK..];
+        let blocks = &weights.row((y + first) / BLOCK)[x / BLOCK..];
         let mut by_scale = [[0.0; TILE_WIDTH]; SCALES];
         for x in 0..TILE_WIDTH {
             // Where there is no block, residuals are 0.
@@ -73,7 +74,7 @@ pub(crate) fn differentiate<const CHANNELS: usize>(
             flat[x] = fine[x] + medium[x] + coarse[x];
         }
         for channel in 0..CHANNELS {
-            // All of the sensitivity to alpha is to its single pixels.
+            // All of the weight of alpha is that of its single pixels.
             let by_sample = if channel < colors { &fine } else { &flat };
             for row in 0..BLOCK.min(rows - first) {
                 let residuals = &mut planes[channel][first + row];
@@ -86,13 +87,13 @@ pub(crate) fn differentiate<const CHANNELS: usize>(
             }
         }
     }
-    total.iter().map(|&sum| f64::from(sum)).sum()
+    Distortion(total.iter().map(|&sum| f64::from(sum)).sum())
 }
 
 /// The distortion of a picture's residuals, in interleaved order, directly from its definition.
 #[cfg(test)]
 pub(crate) fn plain_distortion(
-    sensitivity: &Sensitivity,
+    weights: &PerceptualWeights,
     [width, height]: [usize; 2],
     residuals: &[f64],
 ) -> f64 {
@@ -101,28 +102,28 @@ pub(crate) fn plain_distortion(
     let mut distortion = 0.0;
     for y in 0..height.next_multiple_of(BLOCK) {
         for x in 0..width.next_multiple_of(BLOCK) {
-            let by_scale = sensitivity.row(y / BLOCK)[x / BLOCK].map(f64::from);
+            let by_scale = weights.row(y / BLOCK)[x / BLOCK].map(f64::from);
             if x < width && y < height {
                 for (channel, residual) in residuals[at(x, y)..][..channels].iter().enumerate() {
-                    let is_alpha = channel >= sensitivity.colors;
+                    let is_alpha = channel >= weights.colors;
                     let count = if is_alpha { by_scale.iter().sum() } else { by_scale[0] };
                     distortion += count * residual * residual;
                 }
             }
-            for (scale, sensitivity_to_mean) in by_scale.iter().enumerate().skip(1) {
+            for (scale, weight_of_mean) in by_scale.iter().enumerate().skip(1) {
                 let side = 1 << scale;
                 let mut mean = 0.0;
                 for y in (y / side * side..height).take(side) {
                     for x in (x / side * side..width).take(side) {
                         let pixel = residuals[at(x, y)..][..channels].iter();
                         let luma: f64 = pixel
-                            .zip(sensitivity.luma)
+                            .zip(weights.luma)
                             .map(|(residual, share)| residual * f64::from(share))
                             .sum();
                         mean += luma / (side * side) as f64;
                     }
                 }
-                distortion += sensitivity_to_mean * mean * mean;
+                distortion += weight_of_mean * mean * mean;
             }
         }
     }
@@ -161,7 +162,7 @@ mod tests {
         let samples: Vec<u8> = (0..width * height * CHANNELS).map(|_| rng.u8(..)).collect();
         let source =
             Source::new_u8(width as u32, height as u32, model, &samples).expect("the sizes agree");
-        let sensitivity = unobserved(|observer| Sensitivity::new(&source, observer));
+        let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
         let mut residuals: Vec<f64> = samples.iter().map(|_| rng.f64() - 0.4).collect();
 
         let mut distortion = 0.0;
@@ -170,7 +171,7 @@ mod tests {
             for x in (0..width).step_by(TILE_WIDTH) {
                 let inside = [(width - x).min(TILE_WIDTH), (height - y).min(TILE_HEIGHT)];
                 let mut planes = tile::<CHANNELS>(&residuals, size, [x, y]);
-                distortion += differentiate(&sensitivity, [x, y], inside, &mut planes);
+                distortion += differentiate(&weights, [x, y], inside, &mut planes).0;
                 for (channel, plane) in planes.iter().enumerate() {
                     for (row, line) in plane.iter().enumerate() {
                         for (column, &gradient) in line.iter().enumerate() {
@@ -185,13 +186,13 @@ mod tests {
                 }
             }
         }
-        let expected = plain_distortion(&sensitivity, size, &residuals);
+        let expected = plain_distortion(&weights, size, &residuals);
         assert!((distortion / expected - 1.0).abs() < 1e-5, "{model:?}: {distortion}, {expected}");
         for at in 0..residuals.len() {
             let here = residuals[at];
             let mut with = |residual: f64| {
                 residuals[at] = residual;
-                plain_distortion(&sensitivity, size, &residuals)
+                plain_distortion(&weights, size, &residuals)
             };
             // The distortion is quadratic, so that the difference quotient is exact.
             let half = (with(here + 0.1) - with(here - 0.1)) / 0.4;
