@@ -9,10 +9,7 @@ use thiserror::Error;
 
 use crate::chunk::ChunkType;
 use crate::color::ColorModel;
-use crate::region::Region;
-
-/// Largest width and height of an output: every pixel centre is exact in `f32`.
-pub(crate) const MAX_OUTPUT_SIDE: u32 = 1 << 23;
+use crate::region::{MAX_OUTPUT_SIDE, Region};
 
 /// Why a file was not decoded, or not to its end (spec, section 11).
 ///

@@ -1,5 +1,8 @@
 //! The region of an output that is rendered.
 
+/// Largest width and height of an output: every pixel centre is exact in `f32`.
+pub(crate) const MAX_OUTPUT_SIDE: u32 = 1 << 23;
+
 /// A rectangle of output pixels: columns x to x + width - 1 and rows y to y + height - 1, counted
 /// from the output's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

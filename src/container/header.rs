@@ -8,7 +8,6 @@ use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
 use crate::gaussian::{Parameterization, component_count};
 use crate::kernel::Kernel;
-use crate::layers::plan;
 
 /// The version that this crate reads and writes.
 pub(crate) const VERSION: u8 = 1;
@@ -177,13 +176,5 @@ impl Header {
     #[must_use]
     pub fn components(&self) -> usize {
         component_count(self.color.channels())
-    }
-
-    /// How many Gaussians are enough for a preview of this size in pixels: the first sixth, which are the
-    /// strongest, if that is at least one for 16 pixels, or all. A preview of a part lacks small things,
-    /// such as text.
-    #[must_use]
-    pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
-        plan::gaussians_for(self.gaussians, width, height)
     }
 }

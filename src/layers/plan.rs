@@ -2,6 +2,8 @@
 //! In both codings the strongest Gaussians come first, so that every prefix of a file gives a
 //! picture.
 
+use crate::container::Header;
+
 // Constants: docs/tuning.md, "Layers and the decoder".
 /// In a small output, one Gaussian is enough for this many pixels.
 const PIXELS_PER_GAUSSIAN: u64 = 16;
@@ -9,9 +11,18 @@ const PIXELS_PER_GAUSSIAN: u64 = 16;
 /// would differ visibly, however small it is; layers after them may be only a part of the picture each.
 const PREVIEW_DIVISOR: u32 = 6;
 
-/// How many of a file's Gaussians are enough for a preview of a size in pixels: those of the first layers, or
-/// all.
-pub(crate) fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
+impl Header {
+    /// How many Gaussians are enough for a preview of this size in pixels: the first sixth, which are the
+    /// strongest, if that is at least one for 16 pixels, or all. A preview of a part lacks small things,
+    /// such as text.
+    #[must_use]
+    pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
+        gaussians_for(self.gaussians, width, height)
+    }
+}
+
+/// [`Header::gaussians_for`] of a file with so many Gaussians.
+fn gaussians_for(all: u32, width: u32, height: u32) -> u32 {
     let first = all / PREVIEW_DIVISOR;
     let shown = u64::from(width) * u64::from(height) / PIXELS_PER_GAUSSIAN;
     if shown <= u64::from(first) { first } else { all }

@@ -4,10 +4,10 @@
 use super::axis::Axis;
 use crate::color::ColorModel;
 use crate::container::Header;
-use crate::error::{DecodeError, MAX_OUTPUT_SIDE, RequestError};
+use crate::error::{DecodeError, RequestError};
 use crate::kernel::Kernel;
 use crate::limits::Limits;
-use crate::region::Region;
+use crate::region::{MAX_OUTPUT_SIDE, Region};
 use crate::simd::Backend;
 use crate::threads::Threads;
 
