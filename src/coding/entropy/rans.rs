@@ -74,11 +74,6 @@ impl Model {
         search.adapt(&mut self.starts, &TARGETS[symbol % SYMBOLS], rate);
     }
 
-    #[cfg(all(test, feature = "encode"))]
-    pub(crate) fn starts(&self) -> &CumulativeFrequencies {
-        &self.starts
-    }
-
     /// The cost of each symbol in bits: -log2 of its probability.
     #[cfg(feature = "std")]
     pub(crate) fn costs(&self) -> [f32; SYMBOLS] {

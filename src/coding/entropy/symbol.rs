@@ -161,17 +161,16 @@ fearless_simd::kernel!(
 #[cfg(all(test, feature = "encode"))]
 mod tests {
     use super::*;
-    use crate::coding::entropy::rans::Model;
     use crate::testing::simd_levels;
 
     #[test]
     fn the_symbol_of_every_slot_is_found() {
-        let mut model = Model::new(core::array::from_fn(|index| (index * 2048) as i16));
-        // Some symbols have one slot left, one has nearly all.
-        for symbol in [3; 300].into_iter().chain([15, 0, 15]) {
-            model.update(BaselineSearch, symbol);
-        }
-        let starts = model.starts();
+        // Some symbols have one slot, one has nearly all.
+        let starts = &core::array::from_fn(|index| match index as i16 {
+            16 => END,
+            symbol @ 0..4 => symbol,
+            symbol => 29_000 + 9 * symbol * symbol,
+        });
         for slot in 0..1 << SCALE_BITS {
             let symbol = scalar_symbol_of_slot(starts, slot);
             let (start, frequency) = slots_of(starts, symbol);
