@@ -12,10 +12,9 @@ use super::loss::{Distortion, SquaredError};
 use super::progress::Observer;
 use super::quality::Judge;
 use super::rate_model;
-use super::rdo::{Residuals, SearchWork, TargetSearch, Window};
-use super::strips;
+use super::rdo::{SearchWork, TargetSearch};
 use super::tiled_source::TiledSource;
-use crate::coding::entropy::{Code, QuantizedCodes};
+use crate::coding::entropy::QuantizedCodes;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::render::Picture;
@@ -75,13 +74,8 @@ pub(crate) fn finish(
     };
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
-    // Gaussians and their rendering; codes before a pass and after it, with what they are chosen by.
-    let by_gaussian = 2 * size_of::<Gaussian>() + 3 * size_of::<Code>() + size_of::<[u64; 4]>();
-    let strip = strips::memory(job.source.width(), job.source.height(), tiled.channels);
-    let residuals = tiled.memory() + Residuals::memory(tiled);
-    let window = Window::memory(tiled, &gaussians);
     let of_other = too_good.as_ref().map_or(0, |fitted| size_of_val(&fitted.gaussians[..]));
-    let memory = residuals + strip.max(window) + gaussians.len() * by_gaussian + of_other;
+    let memory = TargetSearch::memory(tiled, &gaussians) + of_other;
     work.peak_memory = work.peak_memory.max(memory);
     // Rate-distortion optimisation needs the memory.
     drop(fit);

@@ -15,7 +15,5 @@ mod step_search;
 mod target_search;
 mod window;
 
-pub(crate) use residuals::Residuals;
 pub(crate) use search_work::SearchWork;
 pub(crate) use target_search::TargetSearch;
-pub(crate) use window::Window;

@@ -1,9 +1,11 @@
 //! The search for the codes with which a file meets its target.
 
 use super::code_optimizer::{CodeOptimizer, Optimized};
+use super::residuals::Residuals;
 use super::search_work::SearchWork;
 use super::step_search::StepSearch;
-use crate::coding::entropy::QuantizedCodes;
+use super::window::Window;
+use crate::coding::entropy::{Code, QuantizedCodes};
 use crate::encode::aim::{Aim, FileAim};
 use crate::encode::error::EncodeError;
 use crate::encode::file::{CodedLayers, FileLayout};
@@ -11,6 +13,7 @@ use crate::encode::loss::Distortion;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
 use crate::encode::rate_model;
+use crate::encode::strips;
 use crate::encode::tiled_source::TiledSource;
 use crate::encode::verify::Verified;
 use crate::gaussian::Gaussian;
@@ -91,6 +94,18 @@ impl<'a> TargetSearch<'a> {
     ) -> Result<Self, EncodeError> {
         let codes = CodeOptimizer::new(tiled, layout, observer)?;
         Ok(Self { judge, layout, work, codes })
+    }
+
+    /// The most memory of a search for codes of some Gaussians, in bytes, with that of the source.
+    pub(crate) fn memory(tiled: &TiledSource, gaussians: &[Gaussian]) -> usize {
+        let strip = strips::memory(tiled.width as u32, tiled.height as u32, tiled.channels);
+        let window = Window::memory(tiled, gaussians);
+        // Gaussians and their rendering; codes before a pass and after it, with what they are chosen by.
+        let by_gaussian = 2 * size_of::<Gaussian>() + 3 * size_of::<Code>() + size_of::<[u64; 4]>();
+        tiled.memory()
+            + Residuals::memory(tiled)
+            + strip.max(window)
+            + gaussians.len() * by_gaussian
     }
 
     /// Finds codes of `gaussians`, whose rendering has this distortion, for an aim. Returns them with their
