@@ -1,5 +1,30 @@
 //! The colour models and sample depths that a picture can have (spec, section 5.2).
 
+/// Evaluates an expression in which a constant is the number of channels, 1 to 4.
+macro_rules! with_channels {
+    ($constant:ident = $channels:expr, $value:expr) => {
+        match $channels {
+            1 => {
+                const $constant: usize = 1;
+                $value
+            }
+            2 => {
+                const $constant: usize = 2;
+                $value
+            }
+            3 => {
+                const $constant: usize = 3;
+                $value
+            }
+            _ => {
+                const $constant: usize = 4;
+                $value
+            }
+        }
+    };
+}
+pub(crate) use with_channels;
+
 /// The channels of a picture, in the order of its samples (spec, section 5.2).
 ///
 /// Colours are sRGB-encoded unless an ICC profile says otherwise. Alpha is straight (colours are

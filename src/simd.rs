@@ -3,7 +3,7 @@
 #[cfg(feature = "std")]
 use fearless_simd::{Level, dispatch};
 
-/// Gaussians that are processed together, one per lane.
+/// Values that are processed together, one per lane: those of Gaussians, or of pixels.
 pub(crate) const LANES: usize = 16;
 
 /// The code that does the decoder's arithmetic. All choices give the same results, bit for bit.

@@ -11,7 +11,7 @@ use super::output::{self, Destination, Sample};
 use super::tile::{PairPlane, Tile};
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
 use super::view::{RenderOptions, View};
-use crate::color::ColorModel;
+use crate::color::{ColorModel, with_channels};
 use crate::container::Header;
 use crate::error::DecodeError;
 use crate::limits::Limits;
@@ -202,12 +202,7 @@ impl<'a> PreparedRender<'a> {
         row: usize,
         write: &mut dyn FnMut(&[PairPlane], usize),
     ) {
-        match self.channels {
-            1 => self.row_of::<1>(memory, band, row, write),
-            2 => self.row_of::<2>(memory, band, row, write),
-            3 => self.row_of::<3>(memory, band, row, write),
-            _ => self.row_of::<4>(memory, band, row, write),
-        }
+        with_channels!(CHANNELS = self.channels, self.row_of::<CHANNELS>(memory, band, row, write));
     }
 
     /// Renders one row of tiles of a picture with `CHANNELS` channels.

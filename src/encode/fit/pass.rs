@@ -13,6 +13,7 @@ use fearless_simd::Level;
 
 use super::bins::{RowBins, TileRow};
 use super::training_tile::{Slot, TileState, TrainingTile, slots_per_span};
+use crate::color::with_channels;
 use crate::encode::error::EncodeError;
 use crate::encode::loss::{ErrorNorm, RenderingError};
 use crate::encode::own_frame::GeometrySums;
@@ -124,12 +125,10 @@ impl Pass {
         norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
     ) -> Result<RenderingError, EncodeError> {
-        match tiled.channels {
-            1 => self.run_of::<1>(tiled, splats, kernel, base, norm, observer),
-            2 => self.run_of::<2>(tiled, splats, kernel, base, norm, observer),
-            3 => self.run_of::<3>(tiled, splats, kernel, base, norm, observer),
-            _ => self.run_of::<4>(tiled, splats, kernel, base, norm, observer),
-        }?;
+        with_channels!(
+            CHANNELS = tiled.channels,
+            self.run_of::<CHANNELS>(tiled, splats, kernel, base, norm, observer)
+        )?;
         Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
 
@@ -256,12 +255,7 @@ impl Rendered<'_> {
     /// source is black or white and the rendering lies beyond it, because the output is clamped, and
     /// outside the picture.
     pub(crate) fn residuals(&self, tile: usize) -> Vec<TilePlane> {
-        match self.tiled.channels {
-            1 => self.residuals_of::<1>(tile),
-            2 => self.residuals_of::<2>(tile),
-            3 => self.residuals_of::<3>(tile),
-            _ => self.residuals_of::<4>(tile),
-        }
+        with_channels!(CHANNELS = self.tiled.channels, self.residuals_of::<CHANNELS>(tile))
     }
 
     fn residuals_of<const CHANNELS: usize>(&self, tile: usize) -> Vec<TilePlane> {

@@ -8,9 +8,8 @@ use crate::encode::sample_tile::centers;
 use crate::gaussian::{Gaussian, inverse_cholesky};
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::simd_kernel::Quartic;
+use crate::simd::LANES;
 
-/// Pixels in a vector.
-pub(crate) const LANES: usize = 16;
 /// The values of a vector.
 pub(crate) type Lanes = [f32; LANES];
 

@@ -6,7 +6,8 @@ use core::ops::Range;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
-use super::kernel_weights::{KernelWeights, LANES, Lanes};
+use super::kernel_weights::{KernelWeights, Lanes};
+use crate::color::with_channels;
 use crate::encode::error::EncodeError;
 use crate::encode::loss::{BLOCK, PictureLoss, residual};
 use crate::encode::mul_add::MulAdd;
@@ -16,6 +17,7 @@ use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
 use crate::render::tile_grid::TILE_HEIGHT;
+use crate::simd::LANES;
 
 /// Threads share a window of more pixels.
 const MOST_OF_ONE_TASK: usize = 1 << 13;
@@ -110,13 +112,10 @@ impl Residuals {
         loss: &PictureLoss,
         observer: &mut Observer<'_>,
     ) -> Result<(), EncodeError> {
-        match self.channels {
-            _ if loss.weights().is_none() => Ok(()),
-            1 => self.shift_of::<1>(loss, observer),
-            2 => self.shift_of::<2>(loss, observer),
-            3 => self.shift_of::<3>(loss, observer),
-            _ => self.shift_of::<4>(loss, observer),
+        if loss.weights().is_none() {
+            return Ok(());
         }
+        with_channels!(CHANNELS = self.channels, self.shift_of::<CHANNELS>(loss, observer))
     }
 
     #[expect(clippy::needless_range_loop, reason = "see `encode/fit/training_tile.rs`")]

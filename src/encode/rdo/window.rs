@@ -6,14 +6,15 @@ use core::ops::Range;
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use rayon::prelude::*;
 
-use super::kernel_weights::{KernelWeights, LANES, kernel_root};
+use super::kernel_weights::{KernelWeights, kernel_root};
 use super::residuals::{Band, ROWS_PER_TASK, StoredLanes, is_shared, load, store, window};
 use crate::coding::entropy::to_axes;
-use crate::color::ColorModel;
+use crate::color::{ColorModel, with_channels};
 use crate::encode::mul_add::MulAdd;
 use crate::encode::own_frame::{GeometryChange, GeometrySums};
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
+use crate::simd::LANES;
 
 // Constants: docs/tuning.md, "Search for a target".
 /// The residuals of a window of up to so many pixels are kept without the Gaussian. Those of a wider
@@ -132,12 +133,8 @@ impl Window {
             corner: [columns.start, rows.start],
             size: [columns.len().div_ceil(LANES), rows.len()],
         };
-        let sums = match band.channels() {
-            1 => self.without_of::<1>(band, gaussian),
-            2 => self.without_of::<2>(band, gaussian),
-            3 => self.without_of::<3>(band, gaussian),
-            _ => self.without_of::<4>(band, gaussian),
-        };
+        let sums =
+            with_channels!(CHANNELS = band.channels(), self.without_of::<CHANNELS>(band, gaussian));
         // Without any weight in the picture, nothing depends on it.
         let perceptual_weight =
             if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
@@ -180,12 +177,8 @@ impl Window {
         gaussian: &Gaussian,
         model: ColorModel,
     ) -> ErrorChange {
-        let sums = match band.channels() {
-            1 => self.change_of::<1>(band, gaussian),
-            2 => self.change_of::<2>(band, gaussian),
-            3 => self.change_of::<3>(band, gaussian),
-            _ => self.change_of::<4>(band, gaussian),
-        };
+        let sums =
+            with_channels!(CHANNELS = band.channels(), self.change_of::<CHANNELS>(band, gaussian));
         sums.with_absent(gaussian, model)
     }
 
