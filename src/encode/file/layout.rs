@@ -1,0 +1,263 @@
+//! The chunks of a file, around its layers (spec, sections 4 and 5).
+
+use super::layers;
+use crate::chunk::{ChunkType, FRAMING};
+use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
+use crate::coding::packed::PackedCodes;
+use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
+use crate::encode::error::{EncodeError, OptionError};
+use crate::encode::progress::Observer;
+use crate::encode::source::Source;
+use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
+use crate::kernel::Kernel;
+
+/// Codes in the order of their file, with centres as the decoder reads them, and the layers that they
+/// make.
+#[derive(Debug)]
+pub(crate) struct CodedLayers {
+    pub(crate) quantization: Quantization,
+    pub(crate) codes: Vec<Code>,
+    pub(crate) layers: Vec<EncodedLayer>,
+}
+
+/// The header and the metadata of a file, which its codes complete.
+#[derive(Debug)]
+pub(crate) struct FileLayout<'a> {
+    header: Header,
+    metadata: &'a Metadata,
+}
+
+impl<'a> FileLayout<'a> {
+    /// `mean` is the mean of each channel, where a full sample is 1; it becomes the base colour.
+    pub(crate) fn new(
+        source: &Source<'_>,
+        mean: [f32; 4],
+        kernel: Kernel,
+        parameterization: Parameterization,
+        metadata: &'a Metadata,
+    ) -> Self {
+        let header = Header {
+            version: VERSION,
+            coding: Coding::Packed,
+            width: source.width(),
+            height: source.height(),
+            color: source.color(),
+            depth: source.depth(),
+            gaussians: 0,
+            layers: 0,
+            kernel,
+            parameterization,
+            base_color: mean.map(|value| (value * 65535.0).round() as u16),
+        };
+        Self { header, metadata }
+    }
+
+    /// The header. Its coding and its numbers of Gaussians and layers are those of an empty packed
+    /// file.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The base colour to which Gaussians are added, rounded as in the header.
+    pub(crate) fn base(&self) -> [f32; 4] {
+        self.header.base()
+    }
+
+    /// What a file with so many Gaussians begins with, as far as its limits are concerned.
+    pub(crate) fn start(&self, gaussians: u32) -> Vec<u8> {
+        let layers = u16::from(gaussians > 0);
+        let header = Header { gaussians, layers, ..self.header.clone() };
+        let mut file = ChunkWriter::new();
+        file.chunk(ChunkType::GHDR, &header.to_payload());
+        for (kind, payload) in self.metadata.chunks() {
+            file.chunk(kind, &payload);
+        }
+        file.into_bytes()
+    }
+
+    /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
+    pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
+        let PackedCodes { quantizers, codes } = self.ordered(packed);
+        let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
+        let layers = layers::write_packed_layers(&codes, &quantizers);
+        let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
+        self.write(&header, &quantization, None, layers.iter().map(Vec::as_slice))
+    }
+
+    /// The layers that codes make in a file.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn coded(
+        &self,
+        QuantizedCodes { quantization, mut codes }: QuantizedCodes,
+        observer: &mut Observer<'_>,
+    ) -> Result<CodedLayers, EncodeError> {
+        let coder = LayerCoder::new(&quantization, &self.header);
+        let layers = layers::write_entropy_layers(&coder, &mut codes, observer)?;
+        Ok(CodedLayers { quantization, codes, layers })
+    }
+
+    /// A file with the entropy coding.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`] when the caller cancels.
+    pub(crate) fn write_entropy(
+        &self,
+        coded: &CodedLayers,
+        observer: &mut Observer<'_>,
+    ) -> Result<Vec<u8>, EncodeError> {
+        let CodedLayers { quantization, codes, layers } = coded;
+        let header = Header {
+            coding: Coding::Entropy,
+            parameterization: Parameterization::Cholesky,
+            gaussians: codes.len() as u32,
+            ..self.header.clone()
+        };
+        let coder = LayerCoder::new(quantization, &header);
+        let bounds = layers::bounds_payload(&coder, codes, layers, &header, observer)?;
+        let payloads = layers.iter().map(|layer| &layer.payload[..]);
+        Ok(self.write(&header, &quantization.to_payload(), bounds, payloads))
+    }
+
+    /// A file of either coding, from the payloads of its chunks.
+    fn write<'b>(
+        &self,
+        header: &Header,
+        quantization: &[u8],
+        bounds: Option<Vec<u8>>,
+        layers: impl ExactSizeIterator<Item = &'b [u8]>,
+    ) -> Vec<u8> {
+        let header = Header { layers: layers.len() as u16, ..header.clone() };
+        let mut file = ChunkWriter::new();
+        file.chunk(ChunkType::GHDR, &header.to_payload());
+        file.chunk(ChunkType::QNTZ, quantization);
+        for (kind, payload) in self.metadata.chunks() {
+            file.chunk(kind, &payload);
+        }
+        if let Some(bounds) = bounds {
+            file.chunk(ChunkType::BNDS, &bounds);
+        }
+        for layer in layers {
+            file.chunk(ChunkType::GAUS, layer);
+        }
+        file.finish()
+    }
+
+    /// Size in bytes of the metadata.
+    pub(crate) fn metadata_length(&self) -> usize {
+        self.metadata.chunks().map(|(_, payload)| payload.len() + FRAMING).sum()
+    }
+
+    /// Refuses a target of `bytes` that a file without Gaussians, of `least`, exceeds by its metadata
+    /// alone.
+    pub(crate) fn check_size(&self, bytes: u64, least: u64) -> Result<(), OptionError> {
+        let metadata = self.metadata_length() as u64;
+        if (least - metadata..least).contains(&bytes) {
+            return Err(OptionError::Size { bytes, least, metadata });
+        }
+        Ok(())
+    }
+
+    /// The codes sorted by the energy of their Gaussians, largest first, so that every prefix
+    /// of the file is a picture.
+    pub(crate) fn ordered(&self, fitted: &PackedCodes) -> PackedCodes {
+        let mut order: Vec<_> = fitted
+            .codes
+            .iter()
+            .map(|codes| {
+                let mut values = [0.0; MAX_COMPONENTS];
+                for ((value, &code), quantizer) in
+                    values.iter_mut().zip(codes).zip(&fitted.quantizers)
+                {
+                    *value = quantizer.value(code);
+                }
+                let values = &values[..fitted.quantizers.len()];
+                let gaussian = Gaussian::from_components(values, self.header.parameterization);
+                (gaussian.energy(), codes)
+            })
+            .collect();
+        order.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let codes = order.into_iter().map(|(_, codes)| *codes).collect();
+        PackedCodes { quantizers: fitted.quantizers.clone(), codes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coding::entropy::{CenterGrid, Code};
+    use crate::color::ColorModel;
+    use crate::decode::Decoder;
+    use crate::encode::progress::unobserved;
+    use crate::encode::rate_model;
+    use crate::region::Region;
+    use crate::render::RenderOptions;
+
+    const SIDES: [u32; 2] = [900, 700];
+
+    /// A file of random Gaussians, some of them outside the picture.
+    fn file(count: usize) -> Vec<u8> {
+        let [width, height] = SIDES;
+        let samples = vec![9; (width * height) as usize];
+        let source =
+            Source::new_u8(width, height, ColorModel::Gray, &samples).expect("sizes agree");
+        let metadata = Metadata::default();
+        let layout = FileLayout::new(
+            &source,
+            [0.0; 4],
+            Kernel::Quartic,
+            Parameterization::Cholesky,
+            &metadata,
+        );
+        let grid = CenterGrid::new(width, height);
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut code = || Code {
+            exponent: 2,
+            color: [random.i32(-20..=20), 0, 0, 0],
+            size: random.i32(-6..=6),
+            ratio: random.i32(-3..=3),
+            slant: random.i32(-3..=3),
+            center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
+        };
+        let codes = (0..count).map(|_| code()).collect();
+        let quantization = rate_model::quantization(0.0, ColorModel::Gray);
+        unobserved(|observer| {
+            let coded = layout.coded(QuantizedCodes { quantization, codes }, observer)?;
+            layout.write_entropy(&coded, observer)
+        })
+    }
+
+    /// The samples of a region, and how many Gaussians the decoder keeps. If `all`, it decodes the
+    /// whole file first.
+    fn decoded(file: &[u8], options: &RenderOptions, all: bool) -> (Vec<u8>, usize) {
+        let mut decoder = Decoder::new(file).expect("the header is valid");
+        if all {
+            decoder.read_to_end().expect("the file is valid");
+        }
+        decoder.set_options(options.clone());
+        let mut samples = vec![0; decoder.output_len().expect("it is within the limits")];
+        decoder.decode_into(&mut samples).expect("the file is valid");
+        (samples, decoder.stream().gaussians().len())
+    }
+
+    #[test]
+    fn a_region_of_a_large_picture_is_that_part_of_it() {
+        let file = file(33_000);
+        for (scale, x, y) in [(1, 0, 0), (1, 430, 330), (1, 860, 660), (3, 2000, 800)] {
+            let region = Region { x, y, width: 40, height: 40 };
+            let options = RenderOptions::new().with_size(SIDES[0] * scale, SIDES[1] * scale);
+            let options = options.with_region(region);
+            let (expected, gaussians) = decoded(&file, &options, true);
+            assert_eq!(gaussians, 33_000);
+            // Gaussians that are decoded for a region alone are not kept.
+            assert_eq!(decoded(&file, &options, false), (expected, 0), "{region:?}");
+        }
+    }
+
+    #[test]
+    fn a_file_of_few_layers_has_no_bounds_and_is_decoded_whole() {
+        let options = RenderOptions::new().with_region(Region { x: 0, y: 0, width: 9, height: 9 });
+        assert_eq!(decoded(&file(3000), &options, false).1, 3000);
+    }
+}
