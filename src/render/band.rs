@@ -7,6 +7,7 @@ use core::ops::Range;
 #[cfg(feature = "std")]
 use fearless_simd::dispatch;
 
+use super::range_lists::RangeLists;
 use super::splat::{Block, Splat, fill_block};
 #[cfg(feature = "std")]
 use super::tile_grid::truncate_simd;
@@ -38,17 +39,8 @@ const MIN_SLICE: usize = 512;
 #[derive(Debug)]
 pub(crate) struct Bands {
     grid: TileGrid<TILE_WIDTH>,
-    /// One for each slice of the Gaussians, in file order.
-    slices: Vec<BandMembers>,
-}
-
-/// For each band, the Gaussians of a slice that may show in it.
-#[derive(Debug)]
-struct BandMembers {
-    /// `members[starts[b]..starts[b + 1]]` are those of band b.
-    starts: Vec<usize>,
-    /// Indices of Gaussians, in file order within each band.
-    members: Vec<u32>,
+    /// The indices of the Gaussians of each band, for each slice of the Gaussians, in file order.
+    slices: Vec<RangeLists>,
 }
 
 impl Bands {
@@ -95,15 +87,15 @@ impl Bands {
         limits.check_memory(memory + members + per_thread * count.min(bands) as u64)?;
         let firsts = (0..).step_by(length);
         let slices = threads::map(threads, ranges.into_iter().zip(firsts), |(ranges, first)| {
-            BandMembers::new(&ranges, first)
+            let changes = ranges.changes.iter().map(|change| change.members as usize);
+            RangeLists::new(changes, first, ranges.bands.iter().cloned())
         });
         Ok(Self { grid, slices })
     }
 
     /// The indices of the Gaussians that may show in a band, slice by slice, in file order.
     fn members(&self, band: usize) -> impl Iterator<Item = &[u32]> {
-        let slices = self.slices.iter();
-        slices.map(move |slice| &slice.members[slice.starts[band]..slice.starts[band + 1]])
+        self.slices.iter().map(move |slice| slice.of(band))
     }
 
     /// The number of Gaussians that may show in a band.
@@ -149,7 +141,7 @@ impl BandRanges {
             for &Extent { first, end, columns } in &extents[..gaussians.len()] {
                 work += u64::from(end - first) * u64::from(columns) * TILE_PIXELS as u64;
                 // Each band counts as work, which bounds the time that hostile shapes take here and
-                // in `BandMembers::new`.
+                // in `RangeLists::new`.
                 limits.check_work(work, view.region.pixels())?;
                 let range = first / BAND_ROWS as u32..end.div_ceil(BAND_ROWS as u32);
                 let range = if first < end { range } else { 0..0 };
@@ -160,32 +152,6 @@ impl BandRanges {
             }
         }
         Ok(Self { bands: ranges, changes, work })
-    }
-}
-
-impl BandMembers {
-    /// The members of the bands of a slice, whose first Gaussian has the index `first`.
-    fn new(ranges: &BandRanges, first: u32) -> Self {
-        let (mut total, mut load) = (0, BandLoad::default());
-        let starts = ranges.changes.iter().map(|&change| {
-            load.add(change);
-            let start = total;
-            total += load.members as usize;
-            start
-        });
-        let mut starts: Vec<usize> = starts.collect();
-        let mut members = vec![0; total];
-        // `starts[b]` moves over the members of band b, and is at those of the next band at the
-        // end.
-        for (index, range) in (first..).zip(&ranges.bands) {
-            for start in &mut starts[range.start as usize..range.end as usize] {
-                members[*start] = index;
-                *start += 1;
-            }
-        }
-        starts.rotate_right(1);
-        starts[0] = 0;
-        Self { starts, members }
     }
 }
 

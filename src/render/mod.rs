@@ -12,6 +12,7 @@ mod band;
 mod footprint;
 mod output;
 mod picture;
+pub(crate) mod range_lists;
 #[cfg(feature = "std")]
 pub(crate) mod simd_kernel;
 pub(crate) mod splat;

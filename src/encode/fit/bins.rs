@@ -6,6 +6,7 @@ use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::TILE_WIDTH;
 use crate::region::Region;
+use crate::render::range_lists::RangeLists;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::{Columns, TileGrid};
 use crate::simd::LANES;
@@ -22,7 +23,7 @@ pub(crate) struct RowBins {
     starts: Vec<usize>,
     spans: Vec<TileSpan>,
     /// The spans of every row, sorted by tile.
-    tile_rows: Vec<TileRow>,
+    tile_rows: Vec<RangeLists>,
     /// `span_indices[span_ends[s - 1]..span_ends[s]]` are the indices in `spans` of splat s.
     span_indices: Vec<u32>,
     span_ends: Vec<u32>,
@@ -234,7 +235,7 @@ impl RowBins {
                 let found = chunk.row(row);
                 rest.split_off_mut(..found.len()).expect("all are counted").copy_from_slice(found);
             }
-            TileRow::new(columns, spans)
+            by_tile(columns, spans)
         })?;
         Ok(())
     }
@@ -253,7 +254,7 @@ impl RowBins {
     }
 
     /// The spans of every row, sorted by tile.
-    pub(crate) fn tile_rows(&self) -> &[TileRow] {
+    pub(crate) fn tile_rows(&self) -> &[RangeLists] {
         &self.tile_rows
     }
 
@@ -280,7 +281,7 @@ impl RowBins {
     pub(crate) fn memory(&self) -> usize {
         self.starts.capacity() * size_of::<usize>()
             + self.spans.capacity() * size_of::<TileSpan>()
-            + self.tile_rows.iter().map(TileRow::memory).sum::<usize>()
+            + self.tile_rows.iter().map(RangeLists::memory).sum::<usize>()
             + (self.span_ends.capacity() + self.span_indices.capacity()) * size_of::<u32>()
     }
 }
@@ -307,57 +308,13 @@ impl TileSpan {
 }
 
 /// For each tile of a row, the spans that contain it, by their indices in the row.
-#[derive(Debug, Default)]
-pub(crate) struct TileRow {
-    /// `spans[starts[t]..starts[t + 1]]` contain tile t.
-    starts: Vec<usize>,
-    spans: Vec<u32>,
-}
-
-impl TileRow {
-    /// Sorts the spans of a row by tile.
-    fn new(columns: usize, row: &[TileSpan]) -> Self {
-        // First, `starts[t]` is the number of spans with tile t minus that with the tile before; its
-        // prefix sum is the number with tile t, and the prefix sum of those is the start.
-        let mut starts = vec![0_usize; columns + 1];
-        for &TileSpan { first, end, .. } in row {
-            starts[end as usize] = starts[end as usize].wrapping_sub(1);
-            starts[first as usize] = starts[first as usize].wrapping_add(1);
-        }
-        let (mut count, mut total) = (0_usize, 0);
-        for start in &mut starts {
-            count = count.wrapping_add(*start);
-            *start = total;
-            total += count;
-        }
-        let mut spans = vec![0; total];
-        // While spans are written, `starts[t]` moves from the start of its tile to the start of the next
-        // tile. The rotation below moves each back to its own place.
-        for (span, &TileSpan { first, end, .. }) in (0..).zip(row) {
-            for start in &mut starts[first as usize..end as usize] {
-                spans[*start] = span;
-                *start += 1;
-            }
-        }
-        starts.rotate_right(1);
-        starts[0] = 0;
-        Self { starts, spans }
+fn by_tile(columns: usize, row: &[TileSpan]) -> RangeLists {
+    let mut changes = vec![0_usize; columns + 1];
+    for &TileSpan { first, end, .. } in row {
+        changes[end as usize] = changes[end as usize].wrapping_sub(1);
+        changes[first as usize] = changes[first as usize].wrapping_add(1);
     }
-
-    /// Number of pairs of a tile and a splat.
-    pub(crate) fn entries(&self) -> usize {
-        self.spans.len()
-    }
-
-    /// The spans that contain a tile, in order.
-    pub(crate) fn spans(&self, column: usize) -> &[u32] {
-        &self.spans[self.starts[column]..self.starts[column + 1]]
-    }
-
-    /// Size in bytes.
-    fn memory(&self) -> usize {
-        self.starts.capacity() * size_of::<usize>() + self.spans.capacity() * size_of::<u32>()
-    }
+    RangeLists::new(changes, 0, row.iter().map(|span| span.first..span.end))
 }
 
 #[cfg(test)]
@@ -408,7 +365,7 @@ mod tests {
             for column in 0..bins.columns() {
                 let with_tile = |span: &TileSpan| (span.first..span.end).contains(&(column as u32));
                 let with_tile = (0..).zip(spans).filter(|(_, span)| with_tile(span));
-                assert!(with_tile.map(|(index, _)| index).eq(tiles.spans(column).iter().copied()));
+                assert!(with_tile.map(|(index, _)| index).eq(tiles.of(column).iter().copied()));
             }
         }
     }

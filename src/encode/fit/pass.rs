@@ -11,7 +11,7 @@ use core::ops::AddAssign;
 
 use fearless_simd::Level;
 
-use super::bins::{RowBins, TileRow};
+use super::bins::RowBins;
 use super::training_tile::{Slot, TileState, TrainingTile, slots_per_span};
 use crate::color::with_channels;
 use crate::encode::error::EncodeError;
@@ -22,6 +22,7 @@ use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 use crate::encode::tiled_source::TiledSource;
 use crate::kernel::Kernel;
 use crate::region::Region;
+use crate::render::range_lists::RangeLists;
 use crate::render::splat::Splat;
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -100,7 +101,7 @@ impl Pass {
 
     /// Pairs of a tile and a splat.
     fn pairs(&self) -> usize {
-        self.bins.tile_rows().iter().map(TileRow::entries).sum()
+        self.bins.tile_rows().iter().map(RangeLists::len).sum()
     }
 
     /// Frees the memory of the bins.
@@ -219,7 +220,7 @@ impl Pass {
             slots.fill(Slot::default());
             *error = RenderingError::default();
             for (column, by_tile) in by_tile.iter_mut().enumerate() {
-                let indices = tiles.spans(column);
+                let indices = tiles.of(column);
                 let tile = TrainingTile::new(tiled, [column, row], base, of_row, indices);
                 if states.len() < indices.len() {
                     states.resize(indices.len(), TileState::ZERO);
@@ -262,7 +263,7 @@ impl Rendered<'_> {
         let Pass { level, bins, .. } = self.pass;
         let (row, column) = (tile / bins.columns(), tile % bins.columns());
         let spans = bins.spans(row);
-        let of_tile = bins.tile_rows()[row].spans(column);
+        let of_tile = bins.tile_rows()[row].of(column);
         let splat = |&span: &u32| self.splats[spans[span as usize].splat as usize];
         let splats: Vec<Splat> = of_tile.iter().map(splat).collect();
         let indices: Vec<u32> = (0..splats.len() as u32).collect();
