@@ -521,14 +521,14 @@ fn every_published_variant_trains() {
         training.kernel = Kernel::PAPER;
         trainings.push(training);
     }
-    for portion in [Portion::Even, Portion::Half, Portion::Fixed(20)] {
-        for color in [NewColor::Zero, NewColor::Source] {
+    for portion in [Portion::Even, Portion::Half] {
+        for placement in [Placement::Top, Placement::Spread] {
             let mut training = Training::fast(60);
             training.densification.portion = portion;
-            training.densification.color = color;
+            training.densification.color = NewColor::Zero;
             training.densification.shape = NewShape::Random;
             training.densification.error_norm = ErrorNorm::L1;
-            training.densification.placement = Placement::Top;
+            training.densification.placement = placement;
             training.schedule = LearningRateSchedule::Halving(40);
             trainings.push(training);
         }

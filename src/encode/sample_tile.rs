@@ -52,14 +52,6 @@ impl SampleLine<'_> {
             Self::Sixteen(samples) => f32x16::from_fn(simd, |x| f32::from(samples[x])),
         }
     }
-
-    /// One of them.
-    pub(crate) fn sample(self, x: usize) -> f32 {
-        f32::from(match self {
-            Self::Eight(samples) => u16::from(samples[x]) * OF_EIGHT,
-            Self::Sixteen(samples) => samples[x],
-        })
-    }
 }
 
 /// The pixel centres of the sixteen columns from `x` on.

@@ -73,17 +73,6 @@ impl TiledSource {
         }
     }
 
-    /// The samples of a pixel, where a full sample is 1; 0 for absent channels.
-    pub(crate) fn sample(&self, x: usize, y: usize) -> [f32; 4] {
-        let tile = y / TILE_HEIGHT * self.width.div_ceil(TILE_WIDTH) + x / TILE_WIDTH;
-        let mut sample = [0.0; 4];
-        for (channel, value) in sample[..self.channels].iter_mut().enumerate() {
-            let plane = tile * self.channels + channel;
-            *value = self.sample_line(plane, y % TILE_HEIGHT).sample(x % TILE_WIDTH) / FULL_SCALE;
-        }
-        sample
-    }
-
     /// A row of one channel, by tiles.
     pub(crate) fn line(&self, y: usize, channel: usize) -> impl Iterator<Item = SampleLine<'_>> {
         let columns = self.width.div_ceil(TILE_WIDTH);

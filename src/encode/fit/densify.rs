@@ -35,7 +35,7 @@ struct NewPosition {
     /// nearly all of the error, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
-    /// The negative residual of each channel ([`Rendered::residuals`]), if the colour depends on it.
+    /// The negative residual of each channel ([`Rendered::residuals`]), with [`Placement::Spread`].
     missing: [f32; 4],
 }
 
@@ -83,13 +83,7 @@ impl Densifier<'_> {
     ) -> Result<Vec<Components>, EncodeError> {
         let tiled = self.pass.tiled;
         let positions = match self.options.placement {
-            Placement::Top => {
-                let mut positions = top(count, &self.error_map(observer)?);
-                if let NewColor::Residual(_) = self.options.color {
-                    self.find_missing(&mut positions, observer)?;
-                }
-                positions
-            }
+            Placement::Top => top(count, &self.error_map(observer)?),
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.pass.placement_errors());
                 let tiles = |tile| self.errors(tile);
@@ -104,28 +98,6 @@ impl Densifier<'_> {
         Ok(positions.iter().map(|at| self.new_gaussian(at, variance, rng)).collect())
     }
 
-    /// Sets the negative residuals at positions.
-    fn find_missing(
-        &self,
-        positions: &mut [NewPosition],
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
-        let [columns, _] = self.tile_grid();
-        let tile_of = |position: &NewPosition| {
-            let (x, y) = self.pixel(position);
-            y / TILE_HEIGHT * columns + x / TILE_WIDTH
-        };
-        let by_tile: Vec<_> = positions.chunk_by_mut(|a, b| tile_of(a) == tile_of(b)).collect();
-        observer.map(by_tile.into_iter(), |positions| {
-            let errors = self.errors(tile_of(&positions[0]));
-            for position in positions {
-                let (x, y) = self.pixel(position);
-                position.missing = errors.missing(x % TILE_WIDTH, y % TILE_HEIGHT);
-            }
-        })?;
-        Ok(())
-    }
-
     /// Column and row of the pixel at a position.
     fn pixel(&self, position: &NewPosition) -> (usize, usize) {
         let (pixel, width) = (position.pixel as usize, self.pass.tiled.width);
@@ -134,11 +106,10 @@ impl Densifier<'_> {
 
     /// The colour of a new Gaussian.
     fn color(&self, position: &NewPosition) -> [f32; 4] {
-        let (x, y) = self.pixel(position);
         match self.options.color {
             NewColor::Zero => [0.0; 4],
-            NewColor::Source => self.pass.tiled.sample(x, y),
             NewColor::Residual(share) => {
+                let (x, y) = self.pixel(position);
                 let weight = self.pass.tiled.loss.weight_at(x, y);
                 position.missing.map(|missing| share * missing / weight)
             }

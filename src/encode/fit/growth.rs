@@ -47,7 +47,6 @@ impl Fit<'_> {
             _ if steps_left == 0 => missing,
             Portion::Even => missing.div_ceil(steps_left as usize + 1),
             Portion::Half => missing.div_ceil(2),
-            Portion::Fixed(count) => missing.min(count as usize),
         }
     }
 

@@ -84,9 +84,6 @@ pub enum Portion {
     Even,
     /// Half of those that are missing, and all of them at the last step (the paper's text).
     Half,
-    /// This many, at least 1, and all that are missing at the last step (the paper's released code:
-    /// 1,000).
-    Fixed(u32),
 }
 
 /// How the pixels for new Gaussians are chosen by their errors.
@@ -106,9 +103,7 @@ pub enum Placement {
 pub enum NewColor {
     /// 0 in all channels (the paper's released code; its text for the first Gaussians).
     Zero,
-    /// The colour of the source at the pixel (the paper's text for the others).
-    Source,
-    /// This share of source minus rendering at the pixel.
+    /// This share of source minus rendering at the pixel; with [`Placement::Spread`] only.
     Residual(f32),
 }
 
@@ -374,7 +369,10 @@ impl Training {
             ),
             ((0.0..1.0).contains(&d.replaced), "densification.replaced must be in [0, 1)"),
             (d.prune_interval >= 1, "densification.prune_interval must be at least 1"),
-            (d.portion != Portion::Fixed(0), "densification.portion must be at least 1"),
+            (
+                d.placement == Placement::Spread || d.color == NewColor::Zero,
+                "densification.color must be Zero where densification.placement is Top",
+            ),
             (
                 self.filter.variance(1, 1).is_some(),
                 "filter must be finite, its alpha and cap positive, and not negative",
