@@ -32,8 +32,8 @@ mod workload;
 
 pub use encoder::{Encoded, Encoder, Report, encode};
 pub use error::{EncodeError, OptionError, SourceError};
+pub use fit::VectorQuantizer;
 pub(crate) use fit::training;
-pub use fit::vector_quantizer::VectorQuantizer;
 pub use loss::ErrorNorm;
 pub use options::{Precision, Target, Tune};
 pub use progress::Progress;

@@ -2,7 +2,7 @@
 //! quantizers.
 
 use super::components::{Bounds, Components, Slope};
-use super::lsq::{LsqQuantizers, QuantizerGradients, add, decoded};
+use super::paper::{LsqQuantizers, QuantizerGradients, add, decoded};
 use super::parameterization::{self, OwnFrame};
 use super::pass::{Pass, SplatGradient};
 use super::rate_term::RateTerm;

@@ -4,7 +4,7 @@
 //! overlap they may go too far together, and farther with every step.
 
 use super::components::Components;
-use super::lsq::LsqQuantizers;
+use super::paper::LsqQuantizers;
 use crate::encode::loss::{Distortion, RenderingError, SquaredError};
 
 // Constants: docs/tuning.md, "Steps of training".

@@ -3,14 +3,13 @@
 //! Gaussian Filters").
 
 use super::components::{Bounds, Components};
-use super::parameterization;
 use super::pass::Rendered;
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
+use super::{paper, parameterization};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 use crate::encode::tiled_source::TiledSource;
-use crate::gaussian::Parameterization;
 use crate::render::tile_grid::TILE_HEIGHT;
 
 // Constants: docs/tuning.md, "Growth".
@@ -83,7 +82,13 @@ impl Densifier<'_> {
     ) -> Result<Vec<Components>, EncodeError> {
         let tiled = self.pass.tiled;
         let positions = match self.options.placement {
-            Placement::Top => top(count, &self.error_map(observer)?),
+            Placement::Top => {
+                let errors = |tile| self.errors(tile).errors;
+                let pixels = paper::top(count, [tiled.width, tiled.height], errors, observer)?;
+                let position =
+                    |pixel| NewPosition { pixel, variance_share: 1.0, missing: [0.0; 4] };
+                pixels.into_iter().map(position).collect()
+            }
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.pass.placement_errors());
                 let tiles = |tile| self.errors(tile);
@@ -131,7 +136,7 @@ impl Densifier<'_> {
                 parameterization,
                 [variance.sqrt(), 0.0, variance.sqrt()],
             ),
-            NewShape::Random => random_shape(parameterization, variance, rng),
+            NewShape::Random => paper::random_shape(parameterization, variance, rng),
         };
         let center = [x as f32 + 0.5, y as f32 + 0.5];
         self.bounds.clamped(Components { center, shape, color: self.color(position) })
@@ -152,43 +157,6 @@ impl Densifier<'_> {
         let errors = loss.placement_errors(corner, &residuals, self.options.error_norm);
         TileErrors { errors, residuals }
     }
-
-    /// The error of every pixel, row by row.
-    fn error_map(&self, observer: &mut Observer<'_>) -> Result<Vec<f32>, EncodeError> {
-        let tiled = self.pass.tiled;
-        let mut map = vec![0.0; tiled.pixels()];
-        let [columns, _] = self.tile_grid();
-        let rows = map.chunks_mut(tiled.width * TILE_HEIGHT).enumerate();
-        observer.map(rows, |(row, lines)| {
-            for column in 0..columns {
-                let errors = self.errors(row * columns + column).errors;
-                let lines = lines.chunks_exact_mut(tiled.width).zip(&errors);
-                for (line, values) in lines {
-                    let line = &mut line[column * TILE_WIDTH..];
-                    let length = line.len().min(TILE_WIDTH);
-                    line[..length].copy_from_slice(&values[..length]);
-                }
-            }
-        })?;
-        Ok(map)
-    }
-}
-
-/// [`Placement::Top`]: the `count` pixels of largest error, with the full variance. Of pixels
-/// with equal error, the first ones are taken.
-fn top(count: usize, map: &[f32]) -> Vec<NewPosition> {
-    let mut order: Vec<u32> = (0..map.len() as u32).filter(|&at| map[at as usize] > 0.0).collect();
-    let descending =
-        |a: &u32, b: &u32| map[*b as usize].total_cmp(&map[*a as usize]).then_with(|| a.cmp(b));
-    if count < order.len() {
-        order.select_nth_unstable_by(count, descending);
-        order.truncate(count);
-    }
-    order.sort_unstable_by(descending);
-    order
-        .into_iter()
-        .map(|pixel| NewPosition { pixel, variance_share: 1.0, missing: [0.0; 4] })
-        .collect()
 }
 
 /// [`Placement::Spread`]: up to `count` pixels, whose density is proportional to the error.
@@ -285,30 +253,6 @@ fn along_z([x, y]: [usize; 2], [width, height]: [usize; 2], visit: &mut impl FnM
     }
 }
 
-/// [`NewShape::Random`]: random shape values, plus the filter's variance. In the paper's
-/// parameterization, not every draw is a covariance; an invalid one is drawn again.
-fn random_shape(
-    parameterization: Parameterization,
-    variance: f32,
-    rng: &mut fastrand::Rng,
-) -> [f32; 3] {
-    loop {
-        let mut shape = [(); 3].map(|()| rng.f32());
-        for (value, positive) in
-            shape.iter_mut().zip(parameterization::is_logarithmic(parameterization))
-        {
-            *value += if positive { 0.5 } else { 0.0 };
-        }
-        if parameterization == Parameterization::RotationScale {
-            shape[2] *= core::f32::consts::TAU;
-        }
-        let wide = parameterization::widened(parameterization, shape, variance);
-        if wide.iter().all(|value| value.is_finite()) {
-            return wide;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,15 +260,6 @@ mod tests {
 
     fn pixels(positions: &[NewPosition]) -> Vec<u32> {
         positions.iter().map(|position| position.pixel).collect()
-    }
-
-    #[test]
-    fn the_top_are_the_largest_and_the_first_of_equals() {
-        let map = [0.0, 3.0, 1.0, 3.0, 0.0, 2.0];
-        assert_eq!(pixels(&top(3, &map)), [1, 3, 5]);
-        assert_eq!(pixels(&top(1, &map)), [1]);
-        // Exact pixels get no Gaussian, however many are asked for.
-        assert_eq!(pixels(&top(10, &map)), [1, 3, 5, 2]);
     }
 
     /// [`super::spread`], with the sums that it needs.

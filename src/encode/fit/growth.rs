@@ -2,7 +2,7 @@
 
 use super::components::Components;
 use super::densify::{Densifier, MIN_COLOR};
-use super::lsq::decoded;
+use super::paper::decoded;
 use super::pass::Rendered;
 use super::trained::Fit;
 use super::training::Portion;

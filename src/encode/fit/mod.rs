@@ -1,6 +1,5 @@
 //! The fit of Gaussians to a picture (paper, section "Methodology").
 
-mod adam;
 mod backward;
 mod bins;
 pub(crate) mod budget;
@@ -9,7 +8,7 @@ mod components;
 mod densify;
 mod gauss_newton;
 mod growth;
-mod lsq;
+mod paper;
 mod parameterization;
 mod parameters;
 mod pass;
@@ -20,6 +19,6 @@ mod trained;
 pub(crate) mod training;
 mod training_loop;
 mod training_tile;
-pub(crate) mod vector_quantizer;
 
+pub use paper::VectorQuantizer;
 pub(crate) use trained::{Fit, Work};

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 
 use super::backward::Backward;
 use super::components::Components;
-use super::lsq::{QuantizerGradients, add};
+use super::gauss_newton;
+use super::paper::adam;
+use super::paper::{QuantizerGradients, add};
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
-use super::{adam, gauss_newton};
 use crate::encode::error::EncodeError;
 use crate::encode::progress::Observer;
 use crate::render::splat::Splat;

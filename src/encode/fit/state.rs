@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::gauss_newton;
+use super::paper::adam;
 use super::training::{Adam, GaussNewton, Optimizer};
-use super::{adam, gauss_newton};
 
 /// The fewest items that another thread is asked to copy.
 const LEAST_COPIES: usize = 1 << 11;

@@ -5,7 +5,7 @@ use super::bins::reset;
 use super::budget::Budget;
 use super::checkpoint::Checkpoint;
 use super::components::{Bounds, Components};
-use super::lsq::{LsqQuantizers, decoded};
+use super::paper::{LsqQuantizers, decoded};
 use super::parameters::Parameters;
 use super::pass::Pass;
 use super::rate_term::RateTerm;

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::components::Components;
-use super::vector_quantizer::VectorQuantizer;
+use super::paper::vector_quantizer::VectorQuantizer;
 use crate::encode::loss::ErrorNorm;
 use crate::gaussian::Parameterization;
 use crate::kernel::Kernel;
@@ -225,7 +225,21 @@ pub struct Quantization {
     pub color: Option<Arc<dyn VectorQuantizer>>,
 }
 
+// Constants: docs/tuning.md, "Steps of training".
 impl Quantization {
+    /// The paper's, from a share of the iterations on.
+    pub(super) fn from_share(warm_up: f32) -> Self {
+        Self {
+            warm_up,
+            position_bits: 12,
+            shape_bits: 10,
+            color_bits: 6,
+            learning_rate: 1e-3,
+            center: None,
+            color: None,
+        }
+    }
+
     /// The bit depths of all components; none of those that something else quantizes than LSQ+.
     pub(crate) fn depths(&self) -> Components<Option<u8>> {
         let center = self.center.is_none().then_some(self.position_bits);
@@ -270,15 +284,7 @@ impl Training {
                 trust_region: 0.2 + 3.0 * hurry,
             }),
             schedule: LearningRateSchedule::Linear(0.7),
-            quantization: Quantization {
-                warm_up: 0.6,
-                position_bits: 12,
-                shape_bits: 10,
-                color_bits: 6,
-                learning_rate: 1e-3,
-                center: None,
-                color: None,
-            },
+            quantization: Quantization::from_share(0.6),
         }
     }
 
@@ -293,52 +299,6 @@ impl Training {
             (*rate, *momentum) = (1.1, 0.7);
         }
         self
-    }
-
-    /// GaussianImage++ as published. Where the text and the released code differ, these are the
-    /// variants that gave the better results. From the text: learning rates of 0.18 (code: 0.018)
-    /// and growth by half of what is missing (code: 1,000 at a time). From the code: new Gaussians
-    /// without colour (text: the source's colour) and quantizers that round (text: that truncate).
-    #[must_use]
-    pub fn paper() -> Self {
-        Self {
-            iterations: 50_000,
-            kernel: Kernel::PAPER,
-            parameterization: Parameterization::Covariance,
-            densification: Densification {
-                initial: 0.5,
-                steps: 9,
-                end: 0.9,
-                portion: Portion::Half,
-                surplus: 0.0,
-                culled: 0.9,
-                replaced: 0.0,
-                error_norm: ErrorNorm::L1,
-                placement: Placement::Top,
-                color: NewColor::Zero,
-                shape: NewShape::Random,
-                prune_interval: 100,
-            },
-            filter: GaussianFilter::PAPER,
-            optimizer: Optimizer::Adam(Adam {
-                center: 0.18,
-                shape: 0.18,
-                color: 0.18,
-                beta1: 0.9,
-                beta2: 0.999,
-                epsilon: 1e-15,
-            }),
-            schedule: LearningRateSchedule::Halving(20_000),
-            quantization: Quantization {
-                warm_up: 0.12,
-                position_bits: 12,
-                shape_bits: 10,
-                color_bits: 6,
-                learning_rate: 1e-3,
-                center: None,
-                color: None,
-            },
-        }
     }
 
     /// Refuses constants that are out of range, with the rule that is broken.

@@ -1,12 +1,12 @@
 //! A step of Adam (paper, appendix, section "Implementation Details").
 
-use super::components::{Bounds, Components, Slope};
-use super::training::Adam;
+use crate::encode::fit::components::{Bounds, Components, Slope};
+use crate::encode::fit::training::Adam;
 use crate::gaussian::{MAX_COMPONENTS, Parameterization};
 
 /// The state for one Gaussian.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct State {
+pub(in crate::encode::fit) struct State {
     /// Moving average of the gradient.
     mean: Components,
     /// Moving average of the squared gradient.
@@ -16,16 +16,17 @@ pub(super) struct State {
 }
 
 impl State {
-    pub(super) const NEW: Self = Self { mean: Components::ZERO, square: Components::ZERO, age: 0 };
+    pub(in crate::encode::fit) const NEW: Self =
+        Self { mean: Components::ZERO, square: Components::ZERO, age: 0 };
 
     /// Makes the next steps a quarter as large. The squares forget it.
-    pub(super) fn slow_down(&mut self) {
+    pub(in crate::encode::fit) fn slow_down(&mut self) {
         self.square = Components::from_array(self.square.to_array().map(|square| 16.0 * square));
     }
 }
 
 /// One step for one Gaussian.
-pub(super) fn step(
+pub(in crate::encode::fit) fn step(
     components: &mut Components,
     state: &mut State,
     slope: &Slope,
