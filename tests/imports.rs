@@ -1,4 +1,5 @@
-//! Which file imports from which: no circles, and no stage of the encoder that knows a later one.
+//! Which file imports from which: no circles, no stage of the encoder that knows a later one, and facades that
+//! have nothing of their own.
 //!
 //! A path counts as an import of the file of the deepest module on it: `crate::encode::fit::adam::State`
 //! of `encode/fit/adam.rs`, but a path to an item that `encode/fit/mod.rs` re-exports of that file.
@@ -398,6 +399,19 @@ fn no_stage_of_the_encoder_knows_a_later_one() {
     }
     for (from, to) in [("file", "fit"), ("file", "rdo"), ("fit", "rdo")] {
         assert_eq!(between(from, to), [""; 0], "{from} knows {to}");
+    }
+}
+
+#[test]
+fn every_mod_rs_is_a_facade() {
+    for (name, text) in sources("src").iter().filter(|(name, _)| name.ends_with("/mod.rs")) {
+        let is_code = |line: &&str| !line.starts_with("//") && !line.starts_with("#[");
+        let code: String = text.lines().filter(is_code).collect();
+        for item in code.split_terminator(';') {
+            let private = item.strip_prefix("pub").and_then(|item| Some(item.split_once(' ')?.1));
+            let item = private.unwrap_or(item);
+            assert!(item.starts_with("mod ") || item.starts_with("use "), "{name}: {item}");
+        }
     }
 }
 

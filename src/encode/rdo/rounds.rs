@@ -15,8 +15,10 @@ use rayon::prelude::*;
 const LEAST_HEIGHT: usize = 32;
 
 /// Nanoseconds of work for a pixel of a window, and for a window.
-const WORK: (f64, f64) = (0.7, 2000.0);
-/// The work that a thread does at a time, so that the caller is asked often enough whether to go on.
+const WORK_OF_PIXEL: f64 = 0.7;
+const WORK_OF_WINDOW: f64 = 2000.0;
+/// The work of a band in a round, so that the caller is asked often enough whether to go on. The clock does not
+/// decide that: what Gaussians change beyond their band is drawn after the round, so files depend on it.
 const MOST_WORK: f64 = 4e6;
 
 /// The height of the bands for windows of so many rows, in a picture of so many. Their number is a
@@ -57,7 +59,7 @@ impl Entry {
 
     /// About how many nanoseconds it takes.
     fn work(&self) -> f64 {
-        WORK.0 * f64::from(self.area_class.0).exp2() + WORK.1
+        WORK_OF_PIXEL * f64::from(self.area_class.0).exp2() + WORK_OF_WINDOW
     }
 }
 
