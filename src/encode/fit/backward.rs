@@ -5,7 +5,6 @@ use super::components::{Bounds, Components, Slope};
 use super::paper::{LsqQuantizers, QuantizerGradients, add, decoded};
 use super::parameterization::{self, OwnFrame};
 use super::pass::{Pass, SplatGradient};
-use super::rate_term::RateTerm;
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 
@@ -15,12 +14,11 @@ pub(super) struct Backward<'a> {
     pub(super) pass: &'a Pass,
     pub(super) tiled: &'a TiledSource,
     pub(super) bounds: Bounds,
-    pub(super) rate_term: Option<RateTerm>,
     pub(super) quantizers: Option<&'a LsqQuantizers>,
 }
 
 impl Backward<'_> {
-    /// The gradient by the splat of a Gaussian that has these values, without the rate term.
+    /// The gradient by the splat of a Gaussian that has these values.
     #[inline(always)]
     pub(super) fn by_splat(&self, index: usize, values: &Components) -> Slope<SplatGradient> {
         let Gaussian { center, cholesky, .. } = values.gaussian(self.bounds.parameterization);
@@ -37,10 +35,7 @@ impl Backward<'_> {
     ) -> Slope {
         let parameterization = self.bounds.parameterization;
         let decoded = decoded(self.quantizers, trained);
-        let Slope { gradient: mut by_splat, perceptual_weight } = self.by_splat(index, &decoded);
-        if let Some(rate_term) = self.rate_term {
-            by_splat += rate_term.gradient(&decoded.gaussian(parameterization));
-        }
+        let Slope { gradient: by_splat, perceptual_weight } = self.by_splat(index, &decoded);
         let (center, shape) =
             parameterization::gradients(&by_splat.geometry, parameterization, decoded.shape);
         let mut gradient = Components { center, shape, color: by_splat.color };

@@ -8,6 +8,7 @@ use super::components::Components;
 use super::gauss_newton;
 use super::paper::adam;
 use super::paper::{QuantizerGradients, add};
+use super::rate_term::RateTerm;
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use crate::encode::error::EncodeError;
@@ -80,7 +81,8 @@ impl Parameters {
         Ok(())
     }
 
-    /// Takes one step against the gradients, where `factor` scales all learning rates. `splats`, unless
+    /// Takes one step against the gradients, where `factor` scales all learning rates; Adam does without
+    /// the rate term. `splats`, unless
     /// it is empty, becomes those of the new values. Returns the gradient by the quantizers.
     ///
     /// # Errors
@@ -88,11 +90,12 @@ impl Parameters {
     pub(crate) fn step(
         &mut self,
         backward: &Backward<'_>,
+        rate_term: Option<RateTerm>,
         factor: f32,
         splats: &mut [Splat],
         observer: &mut Observer<'_>,
     ) -> Result<QuantizerGradients, EncodeError> {
-        let &Backward { bounds, rate_term, quantizers, .. } = backward;
+        let &Backward { bounds, quantizers, .. } = backward;
         let values = &mut self.values;
         let by_chunk = match &mut self.states {
             States::Adam(options, states) => {

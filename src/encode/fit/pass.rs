@@ -7,8 +7,6 @@
 //! there are no atomic operations, and the result is the same, bit for bit, on any number of
 //! threads.
 
-use core::ops::AddAssign;
-
 use fearless_simd::Level;
 
 use super::bins::RowBins;
@@ -33,16 +31,6 @@ pub(crate) struct SplatGradient {
     pub(crate) geometry: GeometrySums,
     /// The gradient by the colour.
     pub(crate) color: [f32; 4],
-}
-
-impl AddAssign for SplatGradient {
-    fn add_assign(&mut self, other: Self) {
-        let GeometrySums { first, second } = other.geometry;
-        let parts = first.into_iter().chain(second).chain(other.color);
-        let GeometrySums { first, second } = &mut self.geometry;
-        let sums = first.iter_mut().chain(second).chain(&mut self.color);
-        sums.zip(parts).for_each(|(sum, part)| *sum += part);
-    }
 }
 
 /// The bins, results and scratch memory of passes, reused from one pass to the next.

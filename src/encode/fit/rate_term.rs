@@ -1,12 +1,10 @@
-//! The rate term of the training loss, which makes Gaussians cheap to code (entropy coding only).
+//! The rate term of Gauss-Newton steps, which makes Gaussians cheap to code (entropy coding only).
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::pass::SplatGradient;
 use crate::encode::loss::Distortion;
-use crate::encode::own_frame::GeometrySums;
 use crate::encode::rate_model::{LAMBDA, step_for};
-use crate::gaussian::{Gaussian, component_count};
+use crate::gaussian::component_count;
 
 // Constants: docs/tuning.md, "Steps of training".
 /// The weight of the term, as a share of lambda: at full weight, training loses more quality than it saves
@@ -43,30 +41,8 @@ impl RateTerm {
         }
     }
 
-    /// The gradient of half the term by a Gaussian, in the form of the gradient of the loss: they are
-    /// added up.
-    pub(super) fn gradient(&self, gaussian: &Gaussian) -> SplatGradient {
-        let [l11, _, l22] = gaussian.cholesky;
-        let area = l11 * l22;
-        let squared = gaussian.color.iter().map(|color| color * color).sum::<f32>();
-        let by_color = self.weight * self.components * area / (self.squared_step + squared * area);
-        // Multiples of the covariance and of its square.
-        let [xx, xy, yy] = gaussian.covariance();
-        let by_area = 0.5 * by_color * squared - 2.0 * self.weight;
-        let by_trace = 2.0 * self.weight / (xx + yy);
-        let second = [
-            by_area * xx + by_trace * (xx * xx + xy * xy),
-            by_area * xy + by_trace * (xx * xy + xy * yy),
-            by_area * yy + by_trace * (xy * xy + yy * yy),
-        ];
-        SplatGradient {
-            geometry: GeometrySums { first: [0.0; 2], second },
-            color: gaussian.color.map(|color| by_color * color),
-        }
-    }
-
-    /// The factor that [`Self::gradient`] multiplies colours with, for sixteen Gaussians of these areas
-    /// and squared lengths of colour.
+    /// The gradients of half the term by the colours of sixteen Gaussians of these areas and squared lengths
+    /// of colour, as factors on the colours.
     #[inline(always)]
     pub(super) fn by_color<S: Simd>(&self, area: f32x16<S>, squared: f32x16<S>) -> f32x16<S> {
         area * (self.weight * self.components) / (squared * area + self.squared_step)
@@ -89,13 +65,12 @@ impl RateTerm {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::encode::fit::parameterization::gradients;
-    use crate::gaussian::Parameterization;
+    use fearless_simd::{Level, dispatch};
 
-    /// The values are l11, l21, l22 and three channels.
-    fn bits(values: [f64; 6], squared_step: f64) -> f64 {
-        let [l11, l21, l22, color @ ..] = values;
+    use super::*;
+
+    /// Bits of a Gaussian with a Cholesky factor and three channels.
+    fn bits([l11, l21, l22]: [f64; 3], color: [f64; 3], squared_step: f64) -> f64 {
         let area = l11 * l22;
         let energy = color.iter().map(|color| color * color).sum::<f64>() * area;
         let components = 8.0 * 0.5 * (1.0 + energy / squared_step).log2();
@@ -108,31 +83,39 @@ mod tests {
         let (distortion, count) = (Distortion(3.0), 20);
         let squared_step = (2.0 * step_for(distortion, count)).exp2();
         let rate_term = RateTerm::new(distortion, count, 3);
-        for values in [
-            [2.0, 0.3, 1.5, 0.3, -0.1, 0.2],
-            [0.5, -4.0, 3.0, 0.0, 2.0, -0.01],
-            [9.0, 0.0, 0.4, 0.001, 0.0, 0.0],
+        for (cholesky, color) in [
+            ([2.0, 0.3, 1.5], [0.3, -0.1, 0.2]),
+            ([0.5, -4.0, 3.0], [0.0, 2.0, -0.01]),
+            ([9.0, 0.0, 0.4], [0.001, 0.0, 0.0]),
         ] {
-            let [l11, l21, l22, c0, c1, c2] = values.map(|value| value as f32);
-            let cholesky = [l11, l21, l22];
-            let gaussian = Gaussian { center: [3.0, 4.0], cholesky, color: [c0, c1, c2, 0.0] };
-            let SplatGradient { geometry, color } = rate_term.gradient(&gaussian);
-            let (center, shape) = gradients(&geometry, Parameterization::Cholesky, cholesky);
-            assert_eq!(center, [0.0; 2]);
-            assert_eq!(color[3], 0.0);
-            let found = [shape[0], shape[1], shape[2], color[0], color[1], color[2]];
+            let [l11, l21, l22] = cholesky;
+            let squared = color.iter().map(|color| color * color).sum::<f64>();
+            let (by_shape, by_color) = dispatch!(Level::new(), simd => {
+                let wide = |value: f64| f32x16::splat(simd, value as f32);
+                let by_shape = rate_term.by_shape(simd, cholesky.map(wide));
+                let by_color = rate_term.by_color(wide(l11 * l22), wide(squared));
+                (by_shape.map(|lanes| lanes.to_array()[3]), by_color.to_array()[3])
+            });
             let lambda = f64::from(WEIGHT * LAMBDA) * squared_step;
-            for (index, found) in found.into_iter().enumerate() {
-                let at = |offset: f64| {
-                    let mut values = values;
-                    values[index] += offset;
-                    0.5 * lambda * bits(values, squared_step)
-                };
-                let expected = (at(1e-5) - at(-1e-5)) / 2e-5;
+            let at =
+                |shape: [f64; 3], color: [f64; 3]| 0.5 * lambda * bits(shape, color, squared_step);
+            let along = |direction: usize, by: f64| match direction {
+                0 => at(cholesky.map(|l| l * by.exp()), color.map(|color| color / by.exp())),
+                1 => at([l11 * by.exp(), l21 * by.exp(), l22 / by.exp()], color),
+                2 => at([l11, l21 + l22 * by, l22], color),
+                channel => {
+                    let mut color = color;
+                    color[channel - 3] += by;
+                    at(cholesky, color)
+                }
+            };
+            let by_color = color.map(|color| by_color * color as f32);
+            for (direction, found) in by_shape.into_iter().chain(by_color).enumerate() {
+                let expected = (along(direction, 1e-5) - along(direction, -1e-5)) / 2e-5;
                 let error = (f64::from(found) - expected).abs();
                 assert!(
                     error < 1e-4 * lambda + 1e-3 * expected.abs(),
-                    "{index}: {found}, {expected}"
+                    "{direction}: {found}, {expected}"
                 );
             }
         }

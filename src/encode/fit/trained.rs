@@ -213,13 +213,12 @@ impl<'a> Fit<'a> {
             pass: &self.pass,
             tiled: self.tiled,
             bounds: self.bounds,
-            rate_term,
             quantizers: self.quantizers.as_ref(),
         };
         // A step of the quantizers changes the splats again.
         self.has_splats = next == Next::Pass && self.quantizers.is_none();
         let splats = if self.has_splats { &mut self.splats[..] } else { &mut [] };
-        let by_quantizers = self.parameters.step(&backward, factor, splats, observer)?;
+        let by_quantizers = self.parameters.step(&backward, rate_term, factor, splats, observer)?;
         if let Some(quantizers) = &mut self.quantizers {
             let rate = self.training.quantization.learning_rate * factor;
             quantizers.step(&by_quantizers, &self.parameters.values, rate);

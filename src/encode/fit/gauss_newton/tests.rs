@@ -55,12 +55,8 @@ fn in_own_frame(
     slope: &Slope<SplatGradient>,
     values: &Components,
     parameterization: Parameterization,
-    rate_term: Option<RateTerm>,
 ) -> Slope {
-    let mut by_splat = slope.gradient;
-    if let Some(rate_term) = rate_term {
-        by_splat += rate_term.gradient(&values.gaussian(parameterization));
-    }
+    let by_splat = slope.gradient;
     let (center, shape) =
         parameterization::gradients(&by_splat.geometry, parameterization, values.shape);
     let (center, shape) = OwnFrame::new(parameterization, values.shape).gradient(center, shape);
@@ -77,7 +73,7 @@ fn gradients_by_splats_and_by_values_give_the_same_steps() {
         for rate_term in [None, Some(RateTerm::new(Distortion(0.3), 40, channels))] {
             // Two blocks and a part of one.
             let count = 2 * LANES + 5;
-            let step = step_in(parameterization, [90, 60], channels);
+            let step = Step { rate_term, ..step_in(parameterization, [90, 60], channels) };
             let mut found = values(count, parameterization, channels, &mut rng);
             let mut states = vec![State::NEW; count];
             for _ in 0..4 {
@@ -89,9 +85,8 @@ fn gradients_by_splats_and_by_values_give_the_same_steps() {
                     &mut expected,
                     &mut expected_states,
                     &mut [],
-                    |index, at| in_own_frame(&slopes[index], at, parameterization, rate_term),
+                    |index, at| in_own_frame(&slopes[index], at, parameterization),
                 );
-                let step = Step { rate_term, ..step };
                 let mut splats = vec![Splat::NOWHERE; count];
                 step.run(Level::new(), &mut found, &mut states, &mut splats, |index, values| {
                     assert_eq!(*values, before[index]);
