@@ -56,7 +56,7 @@ impl Components {
 // Constants: docs/tuning.md, "Growth".
 /// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
 /// depends on rounding errors.
-pub(super) const MAX_COLOR: f32 = 8.0;
+pub(super) const MOST_COLOR: f32 = 8.0;
 
 /// Pixels by which rounding may move a centre outwards: where a Gaussian is steep, an error along x
 /// moves it along y.
@@ -116,7 +116,7 @@ impl Bounds {
         for (value, (low, high)) in components.center.iter_mut().zip(self.center_ranges) {
             *value = value.clamp(low, high);
         }
-        components.color = components.color.map(|value| value.clamp(-MAX_COLOR, MAX_COLOR));
+        components.color = components.color.map(|value| value.clamp(-MOST_COLOR, MOST_COLOR));
     }
 }
 

@@ -13,7 +13,7 @@
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
-use super::components::{Bounds, Components, MAX_COLOR, Slope};
+use super::components::{Bounds, Components, MOST_COLOR, Slope};
 use super::parameterization::{self, MIN_DEVIATION};
 use super::pass::SplatGradient;
 use super::rate_term::RateTerm;
@@ -331,7 +331,7 @@ impl Step<'_> {
         let least = long.max(1.0) * f32x16::splat(simd, MIN_DEVIATION);
         new.shape = [l11, l21, l22.max(MIN_DEVIATION).min(max).max(least)];
         for channel in 0..new.color.len() {
-            new.color[channel] = new.color[channel].max(-MAX_COLOR).min(MAX_COLOR);
+            new.color[channel] = new.color[channel].max(-MOST_COLOR).min(MOST_COLOR);
         }
     }
 }
