@@ -11,7 +11,7 @@
 
 use core::ops::Range;
 
-use super::error::EncodeError;
+use super::error::Result;
 use super::progress::Observer;
 use super::source::{Source, SourceSamples};
 
@@ -32,13 +32,7 @@ pub(crate) enum Bled {
 
 impl Bled {
     /// The samples of a source with other colours where they do not show; `None` if all of them show.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn new(
-        source: &Source<'_>,
-        observer: &mut Observer<'_>,
-    ) -> Result<Option<Self>, EncodeError> {
+    pub(crate) fn new(source: &Source<'_>, observer: &mut Observer<'_>) -> Result<Option<Self>> {
         if !source.is_premultiplied() {
             return Ok(None);
         }
@@ -113,7 +107,7 @@ fn bled<T: Sample>(
     channels: usize,
     full: T,
     observer: &mut Observer<'_>,
-) -> Result<Option<Vec<T>>, EncodeError> {
+) -> Result<Option<Vec<T>>> {
     if samples.iter().skip(channels - 1).step_by(channels).all(|&alpha| alpha == full) {
         return Ok(None);
     }
@@ -199,7 +193,7 @@ impl Level {
         [width, height]: [usize; 2],
         observer: &mut Observer<'_>,
         cell: impl Fn(usize, usize) -> Cell + Sync + Send,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let mut cells = vec![[0.0; 4]; width * height];
         observer.map(cells.chunks_exact_mut(width).enumerate(), |(y, cells)| {
             for (x, found) in cells.iter_mut().enumerate() {
@@ -214,7 +208,7 @@ impl Level {
     }
 
     /// Fills what is not known from a level of half the size, of which all is known.
-    fn fill(&mut self, coarser: &Self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    fn fill(&mut self, coarser: &Self, observer: &mut Observer<'_>) -> Result<()> {
         let width = self.width;
         observer.map(self.cells.chunks_exact_mut(width).enumerate(), |(y, cells)| {
             let around = coarser.around_row(y);

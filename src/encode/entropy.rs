@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::aim::{Aim, FileAim};
-use super::error::EncodeError;
+use super::error::Result;
 use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
@@ -45,10 +45,7 @@ struct Fitted {
 }
 
 /// Size in bytes of a file without Gaussians.
-pub(crate) fn least_length(
-    layout: &FileLayout<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<u64, EncodeError> {
+pub(crate) fn least_length(layout: &FileLayout<'_>, observer: &mut Observer<'_>) -> Result<u64> {
     let quantization = rate_model::quantization(0.0, layout.header().color);
     let empty = QuantizedCodes { quantization, codes: Vec::new() };
     Ok(layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64)
@@ -63,7 +60,7 @@ pub(crate) fn finish(
     tiled: &TiledSource,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<(Vec<u8>, Work), EncodeError> {
+) -> Result<(Vec<u8>, Work)> {
     if let Budget::SquaredError(error) = budget {
         extend(&mut fit, error, job, observer)?;
     }
@@ -100,7 +97,7 @@ fn extend(
     error: SquaredError,
     job: &Job<'_>,
     observer: &mut Observer<'_>,
-) -> Result<(), EncodeError> {
+) -> Result<()> {
     for _ in 0..MAX_ROUNDS {
         let before = fit.len();
         let found = fit.best_error();
@@ -131,7 +128,7 @@ fn correct(
     judge: &Judge<'_>,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Option<Fitted>, EncodeError> {
+) -> Result<Option<Fitted>> {
     let mut too_good = None;
     let mut power = 1.0;
     let mut last: Option<(f64, f64)> = None;

@@ -6,6 +6,10 @@ use crate::color::ColorModel;
 use crate::container::{MAX_SIDE, MetadataError};
 use crate::error::LimitKind;
 
+/// What a stage of the encoder returns. Its error is [`EncodeError::Cancelled`], when the caller cancels;
+/// other ones come from `pipeline.rs` and `verify.rs` alone.
+pub(crate) type Result<T, E = EncodeError> = core::result::Result<T, E>;
+
 /// Why a picture could not be encoded.
 #[derive(Debug, Error)]
 #[non_exhaustive]

@@ -1,7 +1,7 @@
 //! From a fit to a file of the packed coding that meets its target.
 
 use super::aim::{Aim, FileAim, PSNR_TOLERANCE, SIZE_TOLERANCE};
-use super::error::EncodeError;
+use super::error::{EncodeError, Result};
 use super::file::{FileLayout, packed_layers_length};
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
@@ -58,7 +58,7 @@ pub(crate) fn finish(
     budget: Budget,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
-) -> Result<(Vec<u8>, Work), EncodeError> {
+) -> Result<(Vec<u8>, Work)> {
     let file = match (job.aim, budget) {
         (Aim::File(FileAim::Psnr(psnr)), _) => {
             let fitted = raised(&mut fit, psnr, layout, job.source, observer)?;
@@ -90,7 +90,7 @@ fn quantizers(job: &Job<'_>) -> Vec<Quantizer> {
 }
 
 /// Adds to a fit what pruning left it short of a size that holds so many Gaussians.
-fn fill(fit: &mut Fit<'_>, count: usize, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+fn fill(fit: &mut Fit<'_>, count: usize, observer: &mut Observer<'_>) -> Result<()> {
     let count = count.min(fit.most());
     for _ in 0..MAX_ROUNDS {
         let before = fit.len();
@@ -114,7 +114,7 @@ fn raised(
     layout: &FileLayout<'_>,
     source: &Source<'_>,
     observer: &mut Observer<'_>,
-) -> Result<PackedCodes, EncodeError> {
+) -> Result<PackedCodes> {
     let fitted = fit.fitted();
     let mut reached = psnr(&layout.write_packed(&fitted), source, observer)?;
     let mut best = (reached, fitted);
@@ -148,7 +148,7 @@ fn extended(
     layout: &FileLayout<'_>,
     judge: &Judge<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Vec<u8>, EncodeError> {
+) -> Result<Vec<u8>> {
     let excess = |file: &[u8], observer: &mut Observer<'_>| {
         let verified = Verified::new(file, judge.source(), observer)?;
         let verdict = judge.judge(&verified.picture(), observer)?;
@@ -179,7 +179,7 @@ fn more(fit: &Fit<'_>, factor: f64) -> usize {
 }
 
 /// The PSNR of a file in dB.
-fn psnr(file: &[u8], source: &Source<'_>, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
+fn psnr(file: &[u8], source: &Source<'_>, observer: &mut Observer<'_>) -> Result<f64> {
     Verified::new(file, source, observer)?.psnr(u32::MAX, observer)
 }
 
@@ -192,7 +192,7 @@ fn trimmed(
     source: &Source<'_>,
     target: f64,
     observer: &mut Observer<'_>,
-) -> Result<Vec<u8>, EncodeError> {
+) -> Result<Vec<u8>> {
     let mut file = layout.write_packed(&fitted);
     let fewest = least_prefix(&Verified::new(&file, source, observer)?, target, observer)?;
     fitted.codes.truncate(fewest as usize);
@@ -214,13 +214,8 @@ fn trimmed(
 }
 
 /// The fewest of the file's first Gaussians that reach `target`; all of them if none do.
-fn least_prefix(
-    verified: &Verified<'_>,
-    target: f64,
-    observer: &mut Observer<'_>,
-) -> Result<u32, EncodeError> {
-    let mut reaches =
-        |count| -> Result<bool, EncodeError> { Ok(verified.psnr(count, observer)? >= target) };
+fn least_prefix(verified: &Verified<'_>, target: f64, observer: &mut Observer<'_>) -> Result<u32> {
+    let mut reaches = |count| -> Result<bool> { Ok(verified.psnr(count, observer)? >= target) };
     let (mut short, mut enough) = (0, verified.gaussians());
     // Nearly monotone, and whatever this ends on was seen to be enough.
     while enough - short > 1 {

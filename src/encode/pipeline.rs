@@ -1,7 +1,7 @@
 //! The way of a picture to a file that meets its target.
 
 use super::aim::{Aim, FileAim};
-use super::error::EncodeError;
+use super::error::Result;
 use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
@@ -34,10 +34,7 @@ const USUAL_CORRECTIONS: f64 = 0.5;
 
 /// The file of the last job, or of an earlier one that is better: those of lower efforts for the same picture.
 /// With few pixels it is chance which of them ends in the better fit.
-pub(crate) fn encode(
-    jobs: &[Job<'_>],
-    observer: &mut Observer<'_>,
-) -> Result<Outcome, EncodeError> {
+pub(crate) fn encode(jobs: &[Job<'_>], observer: &mut Observer<'_>) -> Result<Outcome> {
     let (first, later) = jobs.split_first().expect("there is a job");
     verify::check_limits(first)?;
     let judge = Judge::new(first.source);
@@ -58,7 +55,7 @@ fn encode_once(
     judge: &Judge<'_>,
     work: Work,
     observer: &mut Observer<'_>,
-) -> Result<Outcome, EncodeError> {
+) -> Result<Outcome> {
     let outcome = encode_for_target(job, judge, None, work, observer)?;
     let Aim::File(FileAim::Size(most_bytes)) = job.aim else { return Ok(outcome) };
     // Files are compared by PSNR with either tune: they are tuned alike, and with so many Gaussians the
@@ -76,7 +73,7 @@ fn with_more(
     job: &Job<'_>,
     judge: &Judge<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Outcome, EncodeError> {
+) -> Result<Outcome> {
     for _ in 0..MOST_EXTENSIONS {
         let Some(Shortfall::SizeUnused { bytes, gaussians }) = outcome.shortfall else { break };
         let room = most_bytes as f64 / bytes as f64;
@@ -101,7 +98,7 @@ fn with_fewer(
     job: &Job<'_>,
     judge: &Judge<'_>,
     observer: &mut Observer<'_>,
-) -> Result<Outcome, EncodeError> {
+) -> Result<Outcome> {
     let pixels = job.pixels();
     loop {
         let gaussians = outcome.gaussians as usize;
@@ -136,7 +133,7 @@ fn encode_for_target(
     count: Option<usize>,
     work: Work,
     observer: &mut Observer<'_>,
-) -> Result<Outcome, EncodeError> {
+) -> Result<Outcome> {
     let Job { source, precision, training, .. } = *job;
     let preparation = job.workload(0).preparation();
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
@@ -216,7 +213,7 @@ fn within_reach(
     layout: &FileLayout<'_>,
     tiled: &TiledSource,
     observer: &mut Observer<'_>,
-) -> Result<(Aim, Budget), EncodeError> {
+) -> Result<(Aim, Budget)> {
     let is_coded = job.precision == Precision::Entropy;
     let budget = match job.aim {
         Aim::Count(count) => Budget::Count(count as usize),

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::error::EncodeError;
+use super::error::{EncodeError, Result};
 use crate::threads;
 
 /// The progress of an encoding.
@@ -59,16 +59,13 @@ impl<'a> Observer<'a> {
     }
 
     /// Reports the progress of training to the caller.
-    ///
-    /// # Errors
-    /// As [`Observer::poll`].
     pub(crate) fn report(
         &mut self,
         iteration: u32,
         iterations: u32,
         gaussians: usize,
         psnr: f64,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let fraction = self.progress.fraction;
         self.progress =
             Progress { fraction, iteration, iterations, gaussians: gaussians as u32, psnr };
@@ -81,10 +78,7 @@ impl<'a> Observer<'a> {
     }
 
     /// Reports that work is done.
-    ///
-    /// # Errors
-    /// As [`Observer::poll`].
-    pub(crate) fn advance(&mut self, work: f64) -> Result<(), EncodeError> {
+    pub(crate) fn advance(&mut self, work: f64) -> Result<()> {
         let left = self.left.max(LEAST_LEFT * self.done).max(work);
         if left > 0.0 {
             self.progress.fraction += work / left * (1.0 - self.progress.fraction);
@@ -95,10 +89,7 @@ impl<'a> Observer<'a> {
     }
 
     /// Calls the callback with the last progress, so that the caller can cancel.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn poll(&mut self) -> Result<(), EncodeError> {
+    pub(crate) fn poll(&mut self) -> Result<()> {
         match (self.callback)(&self.progress) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(EncodeError::Cancelled),
@@ -107,26 +98,20 @@ impl<'a> Observer<'a> {
 
     /// What `task` makes of every item, in their order. All threads share the tasks, and every few
     /// milliseconds there is a poll on this one.
-    ///
-    /// # Errors
-    /// As [`Observer::poll`].
     pub(crate) fn map<T: Send, R: Send>(
         &mut self,
         items: impl ExactSizeIterator<Item = T> + Send,
         task: impl Fn(T) -> R + Send + Sync,
-    ) -> Result<Vec<R>, EncodeError> {
+    ) -> Result<Vec<R>> {
         self.map_with(items, |(): &mut (), item| task(item))
     }
 
     /// [`Observer::map`], where each thread has memory of its own, which it passes to all of its tasks.
-    ///
-    /// # Errors
-    /// As [`Observer::poll`].
     pub(crate) fn map_with<M: Default, T: Send, R: Send>(
         &mut self,
         items: impl ExactSizeIterator<Item = T> + Send,
         task: impl Fn(&mut M, T) -> R + Send + Sync,
-    ) -> Result<Vec<R>, EncodeError> {
+    ) -> Result<Vec<R>> {
         let total = items.len();
         let threads = rayon::current_num_threads();
         let items = Mutex::new(items);
@@ -142,7 +127,7 @@ impl<'a> Observer<'a> {
             total - left
         };
         let results = Mutex::new(Vec::new());
-        let run = |mut poll: Option<&mut dyn FnMut() -> Result<(), EncodeError>>| {
+        let run = |mut poll: Option<&mut dyn FnMut() -> Result<()>>| {
             let (mut memory, mut portion) = (M::default(), Vec::new());
             let (mut least, mut most, mut since_poll) = (1, 1, BETWEEN_POLLS);
             loop {
@@ -171,7 +156,7 @@ impl<'a> Observer<'a> {
             }
         };
         let others = total.min(threads).saturating_sub(1);
-        let mut outcome: Result<(), EncodeError> = Ok(());
+        let mut outcome: Result<()> = Ok(());
         let help = || run(None).expect("only polls fail");
         threads::together(others, help, || outcome = run(Some(&mut || self.poll())));
         outcome?;
@@ -191,7 +176,7 @@ impl fmt::Debug for Observer<'_> {
 
 /// Calls `work` with an observer that does nothing.
 #[cfg(test)]
-pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T, EncodeError>) -> T {
+pub(crate) fn unobserved<T>(work: impl FnOnce(&mut Observer<'_>) -> Result<T>) -> T {
     let mut callback = |_: &Progress| ControlFlow::Continue(());
     work(&mut Observer::new(&mut callback, 0)).expect("no one cancels")
 }
@@ -203,7 +188,7 @@ mod tests {
     use super::*;
 
     /// Fractions that the callback gets.
-    fn fractions(work: impl FnOnce(&mut Observer<'_>) -> Result<(), EncodeError>) -> Vec<f64> {
+    fn fractions(work: impl FnOnce(&mut Observer<'_>) -> Result<()>) -> Vec<f64> {
         let mut fractions = Vec::new();
         let mut callback = |progress: &Progress| {
             fractions.push(progress.fraction);

@@ -1,6 +1,6 @@
 //! Division of a large picture into strips.
 
-use super::error::EncodeError;
+use super::error::Result;
 use super::progress::Observer;
 use crate::region::Region;
 use crate::render::{BAND_HEIGHT, Picture, RenderOptions};
@@ -17,15 +17,12 @@ const MOST_PIXELS: usize = 1 << 21;
 /// Renders the first `prefix` Gaussians of a picture strip by strip from the top, and hands every strip to
 /// `visit`: float samples, plane after plane. The number of rows of a strip is a multiple of
 /// [`BAND_HEIGHT`], except at the bottom. The picture must have no [`Limits`](crate::Limits).
-///
-/// # Errors
-/// [`EncodeError::Cancelled`] when the caller cancels.
 pub(crate) fn render(
     picture: &Picture<'_>,
     prefix: u32,
     observer: &mut Observer<'_>,
     mut visit: impl FnMut(Region, &[f32]),
-) -> Result<(), EncodeError> {
+) -> Result<()> {
     observer.poll()?;
     let options = RenderOptions::new().with_prefix(prefix);
     picture.render_strips(&options, bands(picture.header().width), |region, planes| {
@@ -80,16 +77,17 @@ mod tests {
             let pixels = (width * height) as usize;
             for bands in [1, 2, 9] {
                 let mut next = 0;
-                let shown = picture.render_strips(&options, bands, |region, planes| {
-                    assert_eq!(region.y, next);
-                    next += region.height;
-                    let count = region.pixels() as usize;
-                    for (channel, plane) in planes.chunks_exact(count).enumerate() {
-                        let at = channel * pixels + (region.y * width) as usize;
-                        assert_eq!(plane, &whole[at..][..count], "{bands} bands, {channel}");
-                    }
-                    Ok::<(), EncodeError>(())
-                });
+                let shown =
+                    picture.render_strips(&options, bands, |region, planes| -> Result<()> {
+                        assert_eq!(region.y, next);
+                        next += region.height;
+                        let count = region.pixels() as usize;
+                        for (channel, plane) in planes.chunks_exact(count).enumerate() {
+                            let at = channel * pixels + (region.y * width) as usize;
+                            assert_eq!(plane, &whole[at..][..count], "{bands} bands, {channel}");
+                        }
+                        Ok(())
+                    });
                 assert!(shown.is_ok() && next == height, "{bands} bands: {next} rows");
             }
             unobserved(|observer| {

@@ -1,7 +1,7 @@
 //! The source picture as planes of tiles, in the layout of the training pass.
 
 use super::alpha_bleed::Bled;
-use super::error::EncodeError;
+use super::error::Result;
 use super::loss::PictureLoss;
 use super::options::Tune;
 use super::progress::Observer;
@@ -33,14 +33,11 @@ pub(crate) struct TiledSource {
 
 impl TiledSource {
     /// That of a source. Colours that do not show are others, unless they are to be kept.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         source: &Source<'_>,
         tune: Tune,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let bled = Bled::new(source, observer)?;
         let bled_memory = bled.as_ref().map_or(0, |bled| bled.memory(source));
         let bled_source = bled.as_ref().map(|bled| bled.source(source));
@@ -120,7 +117,7 @@ fn by_tiles<T: Copy + Default + Into<u64> + Send + Sync>(
     samples: &[T],
     [width, height, channels]: [usize; 3],
     observer: &mut Observer<'_>,
-) -> Result<(Vec<SamplePlane<T>>, [u64; 4]), EncodeError> {
+) -> Result<(Vec<SamplePlane<T>>, [u64; 4])> {
     let columns = width.div_ceil(TILE_WIDTH);
     let tiles = columns * height.div_ceil(TILE_HEIGHT);
     let mut planes = vec![[[T::default(); TILE_WIDTH]; TILE_HEIGHT]; tiles * channels];

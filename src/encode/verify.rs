@@ -4,7 +4,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::aim::Aim;
-use super::error::EncodeError;
+use super::error::{EncodeError, Result};
 use super::file::FileLayout;
 use super::job::Job;
 use super::progress::Observer;
@@ -43,7 +43,7 @@ pub(crate) struct FilePsnr {
 ///
 /// # Errors
 /// [`EncodeError::Limit`] when a decoder would refuse every such file.
-pub(crate) fn check_limits(job: &Job<'_>) -> Result<(), EncodeError> {
+pub(crate) fn check_limits(job: &Job<'_>) -> Result<()> {
     let Job { source, aim, training, metadata, limits, .. } = *job;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, [0.0; 4], kernel, parameterization, metadata);
@@ -65,14 +65,11 @@ fn refusal(error: DecodeError) -> EncodeError {
 
 impl<'a> Verified<'a> {
     /// Decodes a file without limits, as a search does with all that it tries.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         file: &[u8],
         source: &'a Source<'a>,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         Self::within(file, source, &Limits::none(), observer)
     }
 
@@ -86,7 +83,7 @@ impl<'a> Verified<'a> {
         source: &'a Source<'a>,
         limits: &Limits,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let mut stream = StreamDecoder::new().with_limits(limits.clone());
         for piece in file.chunks(PIECE) {
             observer.poll()?;
@@ -110,10 +107,7 @@ impl<'a> Verified<'a> {
 
     /// The PSNR in dB, at the source's depth, of the picture that the first `count` Gaussians make, or all
     /// of them if there are fewer.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn psnr(&self, count: u32, observer: &mut Observer<'_>) -> Result<f64, EncodeError> {
+    pub(crate) fn psnr(&self, count: u32, observer: &mut Observer<'_>) -> Result<f64> {
         let mut errors = Errors::default();
         strips::render(&self.picture(), count, observer, |region, planes| {
             errors.add(self.source, region, planes);
@@ -122,14 +116,11 @@ impl<'a> Verified<'a> {
     }
 
     /// The PSNR of the decoded picture, and how it differs from the source to the eye.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn judged(
         &self,
         judge: &Judge<'_>,
         observer: &mut Observer<'_>,
-    ) -> Result<(FilePsnr, Verdict), EncodeError> {
+    ) -> Result<(FilePsnr, Verdict)> {
         let (mut errors, mut judgement) = (Errors::default(), Judgement::new(judge));
         strips::render(&self.picture(), u32::MAX, observer, |region, planes| {
             errors.add(self.source, region, planes);

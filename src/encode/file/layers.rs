@@ -6,7 +6,7 @@ use crate::chunk::FRAMING;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
 use crate::coding::packed::{self, Quantizer};
 use crate::container::Header;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::layers::bounds::LayerBounds;
@@ -40,7 +40,7 @@ pub(super) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
     observer: &mut Observer<'_>,
-) -> Result<Vec<EncodedLayer>, EncodeError> {
+) -> Result<Vec<EncodedLayer>> {
     let layers = divide(coder, codes, observer)?;
     observer.map(layers.into_iter(), |codes| coder.write(codes))
 }
@@ -53,7 +53,7 @@ pub(super) fn bounds_payload(
     layers: &[EncodedLayer],
     header: &Header,
     observer: &mut Observer<'_>,
-) -> Result<Option<Vec<u8>>, EncodeError> {
+) -> Result<Option<Vec<u8>>> {
     if !plan::has_bounds(layers.len()) {
         return Ok(None);
     }
@@ -79,7 +79,7 @@ fn divide<'a>(
     coder: &LayerCoder<'_>,
     codes: &'a mut [Code],
     observer: &mut Observer<'_>,
-) -> Result<Vec<&'a mut [Code]>, EncodeError> {
+) -> Result<Vec<&'a mut [Code]>> {
     let count = codes.len();
     let most = plan::most_in_entropy_layer(count);
     observer.poll()?;
@@ -104,7 +104,7 @@ fn divide_by_position<'a>(
     mut parts: Vec<&'a mut [Code]>,
     most: usize,
     observer: &mut Observer<'_>,
-) -> Result<Vec<&'a mut [Code]>, EncodeError> {
+) -> Result<Vec<&'a mut [Code]>> {
     // In halves, so that every code is moved a few times only.
     while parts.iter().any(|part| part.len() > most) {
         let halves = observer.map(parts.into_iter(), |part| {

@@ -5,7 +5,7 @@ use crate::chunk::{ChunkType, FRAMING};
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
 use crate::coding::packed::PackedCodes;
 use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
-use crate::encode::error::{EncodeError, OptionError};
+use crate::encode::error::{OptionError, Result};
 use crate::encode::progress::Observer;
 use crate::encode::source::Source;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
@@ -85,28 +85,22 @@ impl<'a> FileLayout<'a> {
     }
 
     /// The layers that codes make in a file.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn coded(
         &self,
         QuantizedCodes { quantization, mut codes }: QuantizedCodes,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<CodedLayers> {
         let coder = LayerCoder::new(&quantization, &self.header);
         let layers = layers::write_entropy_layers(&coder, &mut codes, observer)?;
         Ok(CodedLayers { quantization, codes, layers })
     }
 
     /// A file with the entropy coding.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn write_entropy(
         &self,
         coded: &CodedLayers,
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<u8>, EncodeError> {
+    ) -> Result<Vec<u8>> {
         let CodedLayers { quantization, codes, layers } = coded;
         let header = Header {
             coding: Coding::Entropy,

@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::TILE_WIDTH;
 use crate::region::Region;
@@ -124,15 +124,12 @@ impl RowBins {
     }
 
     /// Bins `splats` on all threads, in the memory of the previous bins.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn rebuild(
         &mut self,
         splats: &[Splat],
         cutoff: f32,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let (grid, level) = (self.grid, Level::new());
         self.tile_rows = Vec::new();
         let chunks = splats.chunks(CHUNK).enumerate();
@@ -189,7 +186,7 @@ impl RowBins {
         chunks: &[ChunkSpans],
         offsets: Vec<Vec<u32>>,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let total = self.starts[self.grid.rows];
         reset(&mut self.span_indices, total, 0);
         reset(&mut self.span_ends, splats, 0);
@@ -216,11 +213,7 @@ impl RowBins {
     }
 
     /// Sorts the spans of all chunks by row, and those of each row by tile.
-    fn sort_rows(
-        &mut self,
-        chunks: &[ChunkSpans],
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    fn sort_rows(&mut self, chunks: &[ChunkSpans], observer: &mut Observer<'_>) -> Result<()> {
         let (rows, columns) = (self.grid.rows, self.grid.columns);
         let total = self.starts[rows];
         reset(&mut self.spans, total, TileSpan::NONE);

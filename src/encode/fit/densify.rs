@@ -6,7 +6,7 @@ use super::components::{Bounds, Components};
 use super::pass::Rendered;
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use super::{paper, parameterization};
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 use crate::encode::tiled_source::TiledSource;
@@ -71,15 +71,12 @@ pub(crate) struct Densifier<'a> {
 impl Densifier<'_> {
     /// Up to `count` new Gaussians where the error is large. There are fewer where fewer
     /// pixels have any error.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new_gaussians(
         &self,
         count: usize,
         rng: &mut fastrand::Rng,
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<Components>, EncodeError> {
+    ) -> Result<Vec<Components>> {
         let tiled = self.pass.tiled;
         let positions = match self.options.placement {
             Placement::Top => {
@@ -177,7 +174,7 @@ fn spread(
     sums: &[f32],
     errors: impl Fn(usize) -> TileErrors + Send + Sync,
     observer: &mut Observer<'_>,
-) -> Result<Vec<NewPosition>, EncodeError> {
+) -> Result<Vec<NewPosition>> {
     let total: f64 = sums.iter().copied().map(f64::from).sum();
     let (step, mean) = (total / count as f64, total / sums.len() as f64);
     let average = count as f64 / sums.len() as f64;

@@ -6,7 +6,7 @@ use super::paper::decoded;
 use super::pass::Rendered;
 use super::trained::Fit;
 use super::training::Portion;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::loss::{Distortion, RenderingError, SquaredError};
 use crate::encode::progress::Observer;
 use crate::encode::rate_model;
@@ -57,7 +57,7 @@ impl Fit<'_> {
         count: usize,
         replaced: usize,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         if count + replaced == 0 {
             return Ok(());
         }
@@ -86,11 +86,7 @@ impl Fit<'_> {
     }
 
     /// Culling: removes the `count` Gaussians of least energy.
-    pub(super) fn cull(
-        &mut self,
-        count: usize,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(super) fn cull(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<()> {
         let count = count.min(self.len());
         if count == 0 {
             return Ok(());
@@ -118,7 +114,7 @@ impl Fit<'_> {
     }
 
     /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.
-    pub(super) fn prune(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    pub(super) fn prune(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         let values = &self.parameters.values;
         let parameterization = self.bounds.parameterization;
         let quantizers = self.quantizers.as_ref();

@@ -11,7 +11,7 @@ use super::paper::{QuantizerGradients, add};
 use super::rate_term::RateTerm;
 use super::state::{States, reordered, retain};
 use super::training::Optimizer;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::render::splat::Splat;
 
@@ -62,10 +62,7 @@ impl Parameters {
 
     /// Sorts the Gaussians along a Z curve, so that neighbours in the picture are neighbours in
     /// memory.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    pub(crate) fn sort(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         // A key with the index below it is compared at once.
         let mut keys = observer.map(self.values.iter().enumerate(), |(index, values)| {
             let [x, y] = values.center;
@@ -84,9 +81,6 @@ impl Parameters {
     /// Takes one step against the gradients, where `factor` scales all learning rates; Adam does without
     /// the rate term. `splats`, unless
     /// it is empty, becomes those of the new values. Returns the gradient by the quantizers.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn step(
         &mut self,
         backward: &Backward<'_>,
@@ -94,7 +88,7 @@ impl Parameters {
         factor: f32,
         splats: &mut [Splat],
         observer: &mut Observer<'_>,
-    ) -> Result<QuantizerGradients, EncodeError> {
+    ) -> Result<QuantizerGradients> {
         let &Backward { bounds, quantizers, .. } = backward;
         let values = &mut self.values;
         let by_chunk = match &mut self.states {

@@ -12,7 +12,7 @@ use fearless_simd::Level;
 use super::bins::RowBins;
 use super::training_tile::{Slot, TileState, TrainingTile, slots_per_span};
 use crate::color::with_channels;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::loss::{ErrorNorm, RenderingError};
 use crate::encode::own_frame::GeometrySums;
 use crate::encode::progress::Observer;
@@ -64,16 +64,13 @@ impl Pass {
 
     /// Bins splats by the tiles that they touch. The bins remain valid for a few passes in which
     /// the splats change little: near the cut-off, the weight of a splat is close to 0.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn bin(
         &mut self,
         tiled: &TiledSource,
         splats: &[Splat],
         kernel: Kernel,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         // The slots take most of the memory. They are freed while binning needs memory of its own.
         self.slots = Vec::new();
         self.bins.rebuild(splats, kernel.cutoff(), observer)?;
@@ -101,10 +98,6 @@ impl Pass {
     /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
     /// computes residuals and gradients. Returns the error of the rendering. Measures the placement
     /// errors of tiles if their norm is given.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels; `observer` is polled every few
-    /// milliseconds.
     pub(crate) fn run(
         &mut self,
         tiled: &TiledSource,
@@ -113,7 +106,7 @@ impl Pass {
         base: [f32; 4],
         norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
-    ) -> Result<RenderingError, EncodeError> {
+    ) -> Result<RenderingError> {
         with_channels!(
             CHANNELS = tiled.channels,
             self.run_of::<CHANNELS>(tiled, splats, kernel, base, norm, observer)
@@ -180,7 +173,7 @@ impl Pass {
         base: [f32; 4],
         norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let tiles = self.bins.columns() * self.bins.rows();
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);

@@ -11,7 +11,7 @@ use super::pass::Pass;
 use super::rate_term::RateTerm;
 use super::training::Training;
 use crate::coding::packed::{PackedCodes, Quantizer};
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::loss::{RenderingError, SquaredError};
 use crate::encode::options::{MAX_GAUSSIANS, Precision};
 use crate::encode::progress::Observer;
@@ -166,11 +166,7 @@ impl<'a> Fit<'a> {
 
     /// Renders the Gaussians as the file would store them, and computes error and gradients.
     /// Measures the placement errors if Gaussians are to be added.
-    pub(super) fn forward(
-        &mut self,
-        next: Next,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(super) fn forward(&mut self, next: Next, observer: &mut Observer<'_>) -> Result<()> {
         let norm = (next == Next::Growth).then_some(self.training.densification.error_norm);
         if !self.has_splats {
             self.make_splats(observer)?;
@@ -187,7 +183,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Sets the splats to those of the present values.
-    pub(super) fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    pub(super) fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         reset(&mut self.splats, self.parameters.len(), Splat::NOWHERE);
         let items = self.parameters.values.iter().zip(&mut self.splats);
@@ -205,7 +201,7 @@ impl<'a> Fit<'a> {
         factor: f32,
         next: Next,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let channels = self.tiled.channels;
         let rate_term = (self.precision == Precision::Entropy)
             .then(|| RateTerm::new(self.error.distortion, self.len(), channels));

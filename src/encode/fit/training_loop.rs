@@ -5,7 +5,7 @@ use super::parameters::Parameters;
 use super::schedule::TrainingSchedule;
 use super::trained::{Fit, Next};
 use super::training::Training;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::workload::Workload;
 
@@ -29,11 +29,7 @@ struct Iteration {
 
 impl Fit<'_> {
     /// Trains from nothing. `workload` is what was expected of it, for the progress that is reported.
-    pub(crate) fn run(
-        &mut self,
-        workload: Workload,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(crate) fn run(&mut self, workload: Workload, observer: &mut Observer<'_>) -> Result<()> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
         self.forward(Next::Growth, observer)?;
@@ -74,11 +70,7 @@ impl Fit<'_> {
     }
 
     /// Trains from nothing again, with this many Gaussians.
-    pub(crate) fn restart(
-        &mut self,
-        count: usize,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(crate) fn restart(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<()> {
         self.budget = Budget::Count(count);
         self.parameters = Parameters::new(&self.training.optimizer);
         self.quantizers = None;
@@ -89,11 +81,7 @@ impl Fit<'_> {
     /// Adds or removes Gaussians of a finished fit, so that there are `count`, and trains all for a
     /// quarter of the iterations more: at first without quantization, because quantizers of the others
     /// would round what is new to nothing.
-    pub(crate) fn resize(
-        &mut self,
-        count: usize,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(crate) fn resize(&mut self, count: usize, observer: &mut Observer<'_>) -> Result<()> {
         if let Some(best) = self.best.take() {
             self.parameters.replace(best.values);
         }
@@ -121,11 +109,7 @@ impl Fit<'_> {
     }
 
     /// One iteration: a pass, and a step of the optimizer.
-    fn iterate(
-        &mut self,
-        iteration: Iteration,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    fn iterate(&mut self, iteration: Iteration, observer: &mut Observer<'_>) -> Result<()> {
         let Iteration { work, starts_quantization, factor, planned, next } = iteration;
         observer.advance(work)?;
         if starts_quantization {
@@ -147,7 +131,7 @@ impl Fit<'_> {
 
     /// Ends training: renders the values of the last step, keeps them if they are the best, and
     /// frees memory.
-    pub(super) fn settle(&mut self, observer: &mut Observer<'_>) -> Result<(), EncodeError> {
+    pub(super) fn settle(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         self.binned_for = 0;
         self.forward(Next::Pass, observer)?;
         self.keep_if_best();

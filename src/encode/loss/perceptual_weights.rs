@@ -8,7 +8,7 @@
 
 use core::ops::Range;
 
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
 use crate::encode::source::Source;
@@ -57,12 +57,7 @@ pub(crate) struct PerceptualWeights {
 }
 
 impl PerceptualWeights {
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn new(
-        source: &Source<'_>,
-        observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    pub(crate) fn new(source: &Source<'_>, observer: &mut Observer<'_>) -> Result<Self> {
         let model = source.color();
         let colors = model.channels() - usize::from(model.has_alpha());
         let shares = if colors == 1 { [1.0, 0.0, 0.0] } else { LUMA };

@@ -5,7 +5,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use super::error::{Distortion, RenderingError, SquaredError};
 use super::gradient;
 use super::perceptual_weights::PerceptualWeights;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::options::Tune;
 use crate::encode::progress::Observer;
@@ -24,13 +24,11 @@ pub(crate) struct PictureLoss {
 }
 
 impl PictureLoss {
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         source: &Source<'_>,
         tune: Tune,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let size = [source.width() as usize, source.height() as usize];
         let half_step = 0.5 / f32::from(source.depth().max_sample());
         let weights = match tune {

@@ -8,7 +8,7 @@ use super::light::Strip;
 use super::pyramid::Shown;
 use super::scales::Scales;
 use super::smooth::{self, SmoothAreas};
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::source::Source;
 use crate::encode::strips;
@@ -88,14 +88,11 @@ impl<'a> Judge<'a> {
     }
 
     /// Judges a picture, rendered at the source's size.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn judge(
         &self,
         picture: &Picture<'_>,
         observer: &mut Observer<'_>,
-    ) -> Result<Verdict, EncodeError> {
+    ) -> Result<Verdict> {
         let mut judgement = Judgement::new(self);
         strips::render(picture, u32::MAX, observer, |region, planes| {
             judgement.see(region, planes);

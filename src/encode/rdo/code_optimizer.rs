@@ -5,7 +5,7 @@ use super::coordinate_descent::{CodeContext, CoordinateDescent, touched_tiles};
 use super::residuals::Residuals;
 use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, LayerCoder, QuantizedCodes};
 use crate::color::ColorModel;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::progress::Observer;
 use crate::encode::rate_model;
@@ -56,13 +56,11 @@ pub(super) struct CodeOptimizer<'a> {
 }
 
 impl<'a> CodeOptimizer<'a> {
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn new(
         tiled: &'a TiledSource,
         layout: &'a FileLayout<'a>,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let header = layout.header();
         let grid = CenterGrid::new(header.width, header.height);
         let residuals = Residuals::new(tiled, observer)?;
@@ -70,15 +68,12 @@ impl<'a> CodeOptimizer<'a> {
     }
 
     /// Rounds `gaussians` to the quantization grid for a step of colour, given by its base-2 logarithm.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn rounded(
         &self,
         gaussians: &[Gaussian],
         step: f64,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<CodedLayers> {
         let quantization = rate_model::quantization(step, self.model);
         let codes = observer.map(gaussians.iter(), |gaussian| {
             let Gaussian { center, cholesky, .. } = *gaussian;
@@ -91,14 +86,11 @@ impl<'a> CodeOptimizer<'a> {
     }
 
     /// The Gaussians of codes.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn gaussians(
         &self,
         coded: &CodedLayers,
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<Gaussian>, EncodeError> {
+    ) -> Result<Vec<Gaussian>> {
         let CodedLayers { quantization, codes, .. } = coded;
         let gaussian =
             |code| quantization.gaussian(code, &quantization.shape(code), &self.grid, self.model);
@@ -107,16 +99,13 @@ impl<'a> CodeOptimizer<'a> {
 
     /// Runs a pass of coordinate descent over the codes. The Lagrange multiplier is 2^`lambda` times
     /// that of the rate model. `work` is that of the pass, for the progress that is reported.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(super) fn descend(
         &mut self,
         coded: CodedLayers,
         lambda: f64,
         work: f64,
         observer: &mut Observer<'_>,
-    ) -> Result<Optimized, EncodeError> {
+    ) -> Result<Optimized> {
         self.render(&coded, observer)?;
         let CodedLayers { quantization, codes, layers } = coded;
         let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
@@ -154,11 +143,7 @@ impl<'a> CodeOptimizer<'a> {
     }
 
     /// Sets the residuals to those of the codes as the decoder renders them.
-    fn render(
-        &mut self,
-        coded: &CodedLayers,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    fn render(&mut self, coded: &CodedLayers, observer: &mut Observer<'_>) -> Result<()> {
         let gaussians = self.gaussians(coded, observer)?;
         let header = self.layout.header();
         let limits = Limits::none();

@@ -11,7 +11,7 @@ use super::rounds::{BandEntries, Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_EXPONENT, SymbolCosts};
 use crate::color::ColorModel;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::own_frame::{self, GeometryChange};
 use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
@@ -114,16 +114,13 @@ impl CoordinateDescent<'_> {
     /// sorted by how much each lowers the error per bit, the most first.
     ///
     /// Bands of the picture are processed in parallel; the result does not depend on the threads.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn pass(
         &self,
         residuals: &mut Residuals,
         codes: &[Code],
         contexts: &[CodeContext<'_>],
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<Code>, EncodeError> {
+    ) -> Result<Vec<Code>> {
         // Gaussians outside the picture are not among them, and thereby removed.
         let size = residuals.size();
         let entries = observer.map(codes.iter().enumerate(), |(index, code)| {

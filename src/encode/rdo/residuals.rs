@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, Lanes};
 use crate::color::with_channels;
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::loss::{BLOCK, PictureLoss, residual};
 use crate::encode::mul_add::MulAdd;
 use crate::encode::progress::Observer;
@@ -64,13 +64,7 @@ pub(crate) struct Residuals {
 
 impl Residuals {
     /// Residuals of 0, until [`Residuals::set`] sets them.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn new(
-        tiled: &TiledSource,
-        observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    pub(crate) fn new(tiled: &TiledSource, observer: &mut Observer<'_>) -> Result<Self> {
         let (width, height, channels) = (tiled.width, tiled.height, tiled.channels);
         let stride = width + LANES;
         let mut perceptual_weights = vec![0.0; stride * weight_lines(tiled)];
@@ -104,14 +98,7 @@ impl Residuals {
 
     /// Moves every residual such that, times its perceptual weight, it is half the gradient of the
     /// distortion.
-    ///
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
-    pub(crate) fn shift(
-        &mut self,
-        loss: &PictureLoss,
-        observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    pub(crate) fn shift(&mut self, loss: &PictureLoss, observer: &mut Observer<'_>) -> Result<()> {
         if loss.weights().is_none() {
             return Ok(());
         }
@@ -123,7 +110,7 @@ impl Residuals {
         &mut self,
         loss: &PictureLoss,
         observer: &mut Observer<'_>,
-    ) -> Result<(), EncodeError> {
+    ) -> Result<()> {
         let (level, stride, width) = (self.level, self.stride, self.width);
         let band = TILE_HEIGHT * CHANNELS * stride;
         let perceptual_weights = self.perceptual_weights.chunks(TILE_HEIGHT / BLOCK * stride);

@@ -7,7 +7,7 @@ use super::step_search::StepSearch;
 use super::window::Window;
 use crate::coding::entropy::{Code, QuantizedCodes};
 use crate::encode::aim::{Aim, FileAim};
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::loss::Distortion;
 use crate::encode::progress::Observer;
@@ -83,15 +83,13 @@ pub(crate) struct TargetSearch<'a> {
 }
 
 impl<'a> TargetSearch<'a> {
-    /// # Errors
-    /// [`EncodeError::Cancelled`] when the caller cancels.
     pub(crate) fn new(
         judge: &'a Judge<'a>,
         tiled: &'a TiledSource,
         layout: &'a FileLayout<'a>,
         work: SearchWork,
         observer: &mut Observer<'_>,
-    ) -> Result<Self, EncodeError> {
+    ) -> Result<Self> {
         let codes = CodeOptimizer::new(tiled, layout, observer)?;
         Ok(Self { judge, layout, work, codes })
     }
@@ -116,7 +114,7 @@ impl<'a> TargetSearch<'a> {
         distortion: Distortion,
         aim: Aim,
         observer: &mut Observer<'_>,
-    ) -> Result<(CodedLayers, f64), EncodeError> {
+    ) -> Result<(CodedLayers, f64)> {
         let step = match aim {
             Aim::Lambda(lambda) => rate_model::step_for_lambda(lambda),
             Aim::Count(_) | Aim::File(_) => rate_model::step_for(distortion, gaussians.len()),
@@ -160,7 +158,7 @@ impl<'a> TargetSearch<'a> {
         mut step: f64,
         least: f64,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<CodedLayers> {
         let mut halvings = 0;
         loop {
             let coded = self.descended(gaussians, step, self.work.passes, observer)?.coded;
@@ -182,7 +180,7 @@ impl<'a> TargetSearch<'a> {
         finest: f64,
         aim: FileAim,
         observer: &mut Observer<'_>,
-    ) -> Result<(Optimized, f64, f64), EncodeError> {
+    ) -> Result<(Optimized, f64, f64)> {
         let mut search = StepSearch::new(step, aim.by_step(), finest);
         let mut best: Option<(Optimized, f64, f64)> = None;
         for _ in 0..MOST_TRIES {
@@ -210,7 +208,7 @@ impl<'a> TargetSearch<'a> {
         search: &StepSearch,
         aim: FileAim,
         observer: &mut Observer<'_>,
-    ) -> Result<(Optimized, f64, f64), EncodeError> {
+    ) -> Result<(Optimized, f64, f64)> {
         let first = self.work.first_passes();
         let mut optimized = self.descended(gaussians, search.at, first, observer)?;
         let (mut pass, mut step, mut lambda): (u32, f64, f64) = (first, search.at, 0.0);
@@ -265,7 +263,7 @@ impl<'a> TargetSearch<'a> {
         finest: f64,
         aim: FileAim,
         observer: &mut Observer<'_>,
-    ) -> Result<f64, EncodeError> {
+    ) -> Result<f64> {
         if !matches!(aim, FileAim::Size(_)) {
             return Ok(step);
         }
@@ -293,7 +291,7 @@ impl<'a> TargetSearch<'a> {
         step: f64,
         passes: u32,
         observer: &mut Observer<'_>,
-    ) -> Result<Optimized, EncodeError> {
+    ) -> Result<Optimized> {
         let rounded = self.codes.rounded(gaussians, step, observer)?;
         let mut optimized = self.codes.descend(rounded, 0.0, self.work.pass(0), observer)?;
         for pass in 1..passes {
@@ -309,7 +307,7 @@ impl<'a> TargetSearch<'a> {
         coded: &CodedLayers,
         aim: FileAim,
         observer: &mut Observer<'_>,
-    ) -> Result<f64, EncodeError> {
+    ) -> Result<f64> {
         let file = self.layout.write_entropy(coded, observer)?;
         let log_ratio = match aim {
             FileAim::Size(_) => (file.len() as f64 / aim.wanted()).log2(),
@@ -334,7 +332,7 @@ impl<'a> TargetSearch<'a> {
         optimized: Optimized,
         bytes: u64,
         observer: &mut Observer<'_>,
-    ) -> Result<CodedLayers, EncodeError> {
+    ) -> Result<CodedLayers> {
         let Optimized { mut coded, mut by_use } = optimized;
         let all = by_use.len();
         let mut size = self.layout.write_entropy(&coded, observer)?.len() as u64;
@@ -364,7 +362,7 @@ impl<'a> TargetSearch<'a> {
         mut log_ratio: f64,
         aim: FileAim,
         observer: &mut Observer<'_>,
-    ) -> Result<(CodedLayers, f64), EncodeError> {
+    ) -> Result<(CodedLayers, f64)> {
         let Optimized { mut coded, mut by_use } = optimized;
         if log_ratio > 0.0 || aim.violation(log_ratio, 0.0) == 0.0 {
             return Ok((coded, log_ratio));

@@ -1,6 +1,6 @@
 //! Where the paper puts new Gaussians, and their shapes (section "Distortion Driven Densification").
 
-use crate::encode::error::EncodeError;
+use crate::encode::error::Result;
 use crate::encode::fit::parameterization;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
@@ -10,15 +10,12 @@ use crate::render::tile_grid::TILE_HEIGHT;
 /// [`Placement::Top`](crate::training::Placement::Top): the `count` pixels of largest error, given those of
 /// each tile of a picture of a width and height, the largest first. Of pixels with equal error, the first ones
 /// are taken.
-///
-/// # Errors
-/// [`EncodeError::Cancelled`] when the caller cancels.
 pub(in crate::encode::fit) fn top(
     count: usize,
     [width, height]: [usize; 2],
     errors: impl Fn(usize) -> TilePlane + Send + Sync,
     observer: &mut Observer<'_>,
-) -> Result<Vec<u32>, EncodeError> {
+) -> Result<Vec<u32>> {
     let mut map = vec![0.0; width * height];
     let columns = width.div_ceil(TILE_WIDTH);
     let rows = map.chunks_mut(width * TILE_HEIGHT).enumerate();
