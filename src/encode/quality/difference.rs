@@ -16,29 +16,14 @@ const LEAST_VARIANCE: f32 = 0.0009;
 /// Vectors of a row that are compared at a time: the rows around them stay in the first-level cache.
 const VECTORS: usize = 32;
 
-/// Sums over pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Sums {
-    /// Of structural distance, 1 - SSIM.
-    pub(super) structure: f64,
-    /// Of detail that the rendering has and the source lacks.
-    pub(super) artifacts: f64,
-    /// Of detail that is lost in the rendering.
-    pub(super) lost: f64,
-    /// Of the 4th powers of each.
-    pub(super) structure_4: f64,
-    pub(super) artifacts_4: f64,
-    pub(super) lost_4: f64,
-}
+/// Sums over pixels: of structural distance, 1 - SSIM; of detail that the rendering has and the source
+/// lacks; of detail that is lost in the rendering; and of the 4th powers of the three.
+pub(super) type Sums = [f64; 6];
 
-impl core::ops::AddAssign for Sums {
-    fn add_assign(&mut self, other: Self) {
-        self.structure += other.structure;
-        self.artifacts += other.artifacts;
-        self.lost += other.lost;
-        self.structure_4 += other.structure_4;
-        self.artifacts_4 += other.artifacts_4;
-        self.lost_4 += other.lost_4;
+/// Adds sums over other pixels.
+pub(super) fn add(total: &mut Sums, sums: Sums) {
+    for (total, sum) in total.iter_mut().zip(sums) {
+        *total += sum;
     }
 }
 
@@ -58,7 +43,7 @@ pub(super) fn differences<S: Simd>(simd: S, rows: &Rows, y: usize) -> Sums {
     let vectors = rows.width.div_ceil(16);
     for first in (0..vectors).step_by(VECTORS) {
         let end = vectors.min(first + VECTORS);
-        sums += part(simd, &around, first..end, rows.width);
+        add(&mut sums, part(simd, &around, first..end, rows.width));
     }
     sums
 }
@@ -106,15 +91,7 @@ fn part<S: Simd>(simd: S, around: &Around<'_>, vectors: Range<usize>, width: usi
             sums[which + 3] += square * square;
         }
     }
-    let total = |sum: f32x16<S>| sum.as_array().iter().map(|&lane| f64::from(lane)).sum();
-    Sums {
-        structure: total(sums[0]),
-        artifacts: total(sums[1]),
-        lost: total(sums[2]),
-        structure_4: total(sums[3]),
-        artifacts_4: total(sums[4]),
-        lost_4: total(sums[5]),
-    }
+    sums.map(|sum| sum.as_array().iter().map(|&lane| f64::from(lane)).sum())
 }
 
 /// Means down the columns.
@@ -199,14 +176,11 @@ mod tests {
                 let structure = (1.0 - similarity).max(0.0);
                 let at = y * width + x;
                 let detail = (1.0 + (b(at) - mb).abs()) / (1.0 + (a(at) - ma).abs()) - 1.0;
-                sums += Sums {
-                    structure,
-                    artifacts: detail.max(0.0),
-                    lost: (-detail).max(0.0),
-                    structure_4: structure.powi(4),
-                    artifacts_4: detail.max(0.0).powi(4),
-                    lost_4: (-detail).max(0.0).powi(4),
-                };
+                let found = [structure, detail.max(0.0), (-detail).max(0.0)];
+                for (which, found) in found.into_iter().enumerate() {
+                    sums[which] += found;
+                    sums[which + 3] += found.powi(4);
+                }
             }
         }
         sums
@@ -242,21 +216,13 @@ mod tests {
             let total = |level, rows: &Rows| {
                 let mut total = Sums::default();
                 for y in 0..size[1] {
-                    total += dispatch!(level, simd => differences(simd, rows, y));
+                    add(&mut total, dispatch!(level, simd => differences(simd, rows, y)));
                 }
                 total
             };
             for (name, level) in simd_levels() {
                 let found = total(level, &different);
-                let pairs = [
-                    (found.structure, expected.structure),
-                    (found.artifacts, expected.artifacts),
-                    (found.lost, expected.lost),
-                    (found.structure_4, expected.structure_4),
-                    (found.artifacts_4, expected.artifacts_4),
-                    (found.lost_4, expected.lost_4),
-                ];
-                for (found, expected) in pairs {
+                for (found, expected) in found.into_iter().zip(expected) {
                     let error = (found - expected).abs();
                     assert!(
                         error < 1e-4 * expected + 1e-6,

@@ -12,8 +12,9 @@ pub(super) const SCALES: usize = 5;
 const LEAST_SIDE: usize = 8;
 /// Norms of a channel on a scale.
 const NORMS: usize = 6;
-/// The weights, first those of the first channel on all scales. Weights below 0.01 are left out.
-const WEIGHTS: [f64; 3 * MOST_SCALES * NORMS] = weights(&[
+/// The weights that are not 0, with their indices: first come those of the first channel on all scales.
+/// Weights below 0.01 are left out.
+const WEIGHTS: [(usize, f64); 25] = [
     (9, 1.104_172_64),
     (15, 1.842_245_55),
     (16, 11.441_172_6),
@@ -39,18 +40,7 @@ const WEIGHTS: [f64; 3 * MOST_SCALES * NORMS] = weights(&[
     (98, 0.983_438_28),
     (100, 171.266_725_59),
     (101, 0.980_785_89),
-]);
-
-/// All weights, from those that are not 0 with their indices.
-const fn weights(given: &[(usize, f64)]) -> [f64; 3 * MOST_SCALES * NORMS] {
-    let mut weights = [0.0; 3 * MOST_SCALES * NORMS];
-    let mut at = 0;
-    while at < given.len() {
-        weights[given[at].0] = given[at].1;
-        at += 1;
-    }
-    weights
-}
+];
 
 /// What of a picture has norms that count: a channel on a scale.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +81,10 @@ impl Measured {
         let all = (0..scales.min(SCALES)).flat_map(|scale| {
             channels.into_iter().enumerate().map(move |(index, channel)| {
                 let first = (index * scales + scale) * NORMS;
-                let weights = core::array::from_fn(|norm| WEIGHTS[first + norm]);
+                let weights = core::array::from_fn(|norm| {
+                    let found = WEIGHTS.iter().find(|&&(at, _)| at == first + norm);
+                    found.map_or(0.0, |&(_, weight)| weight)
+                });
                 Self { channel, scale, weights }
             })
         });
@@ -100,15 +93,10 @@ impl Measured {
 
     /// The weighted norms, from sums over pixels.
     pub(super) fn weighted(&self, sums: &Sums, pixels: f64) -> f64 {
-        let l4 = |sum: f64| (sum / pixels).sqrt().sqrt();
-        let norms = [
-            sums.structure / pixels,
-            sums.artifacts / pixels,
-            sums.lost / pixels,
-            l4(sums.structure_4),
-            l4(sums.artifacts_4),
-            l4(sums.lost_4),
-        ];
+        let mut norms = sums.map(|sum| sum / pixels);
+        for norm in &mut norms[NORMS / 2..] {
+            *norm = norm.sqrt().sqrt();
+        }
         norms.iter().zip(self.weights).map(|(norm, weight)| norm * weight).sum()
     }
 }

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
-use super::difference::{RADIUS, Sums, differences};
+use super::difference::{RADIUS, Sums, add, differences};
 use super::light::Samples;
 use super::norms::Measured;
 use super::pyramid::{self, ROWS, Shown};
@@ -103,7 +103,7 @@ impl Scales {
         // Added row by row, so that the sums depend neither on the threads nor on the strips.
         for (sums, (index, y)) in compared.collect::<Vec<_>>().into_iter().zip(tasks) {
             let comparison = &mut self.comparisons[index];
-            comparison.sums += sums;
+            add(&mut comparison.sums, sums);
             comparison.compared = y + 1;
             comparison.rows.forget((y + 1).saturating_sub(RADIUS));
         }
