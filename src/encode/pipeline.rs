@@ -16,6 +16,7 @@ use super::rdo::SearchWork;
 use super::shortfall::{Reached, Shortfall};
 use super::tiled_source::TiledSource;
 use super::verify::Verified;
+use super::workload::PREPARATION;
 use super::{entropy, packed, verify};
 
 // Constants: docs/tuning.md, "Search for a target".
@@ -135,7 +136,7 @@ fn encode_for_target(
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
     let Job { source, precision, training, .. } = *job;
-    let preparation = job.workload(0).preparation();
+    let preparation = job.workload(0).of(PREPARATION);
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
     let tiled = TiledSource::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);

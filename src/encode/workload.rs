@@ -2,10 +2,10 @@
 
 /// Nanoseconds of one core for a pixel and for a Gaussian, about: measured on a photograph of three
 /// megapixels with 8,000 to 170,000 Gaussians.
-type Rates = (f64, f64);
+pub(crate) type Rates = (f64, f64);
 
 /// Everything before training.
-const PREPARATION: Rates = (70.0, 0.0);
+pub(crate) const PREPARATION: Rates = (70.0, 0.0);
 /// An iteration of training: for a pixel without Gaussians, and for a Gaussian, however small.
 const ITERATION: Rates = (3.0, 260.0);
 /// What an iteration takes more for a pixel that Gaussians cover.
@@ -14,10 +14,10 @@ const COVERAGE: f64 = 6.7;
 const DESCENT: Rates = (70.0, 3_300.0);
 /// The rendering before each pass.
 const RENDERING: Rates = (25.0, 800.0);
-/// Coding, and measuring the squared error or the visual quality.
-const CODING: Rates = (0.0, 800.0);
-const ERROR: Rates = (4.0, 80.0);
-const QUALITY: Rates = (6.0, 80.0);
+/// Coding, and measuring the squared error or the visual quality of a file.
+pub(crate) const CODING: Rates = (0.0, 800.0);
+pub(crate) const ERROR: Rates = (4.0, 80.0);
+pub(crate) const QUALITY: Rates = (6.0, 80.0);
 
 /// The work for a picture, in nanoseconds of one core.
 #[derive(Clone, Copy, Debug)]
@@ -32,13 +32,9 @@ impl Workload {
         Self { pixels: pixels as f64, gaussians: gaussians as f64 }
     }
 
-    fn of(&self, (pixel, gaussian): Rates) -> f64 {
+    /// The work of something with these rates.
+    pub(crate) fn of(&self, (pixel, gaussian): Rates) -> f64 {
         self.pixels * pixel + self.gaussians * gaussian
-    }
-
-    /// Everything before training.
-    pub(crate) fn preparation(&self) -> f64 {
-        self.of(PREPARATION)
     }
 
     /// An iteration of training when a share of the Gaussians is there.
@@ -63,23 +59,8 @@ impl Workload {
         (first..first + passes).map(pass).sum()
     }
 
-    /// Coding.
-    pub(crate) fn coding(&self) -> f64 {
-        self.of(CODING)
-    }
-
-    /// Measuring the squared error of a file.
-    pub(crate) fn error(&self) -> f64 {
-        self.of(ERROR)
-    }
-
-    /// Measuring the visual quality of a file.
-    pub(crate) fn quality(&self) -> f64 {
-        self.of(QUALITY)
-    }
-
     /// Coding the file, and measuring both.
     pub(crate) fn verification(&self) -> f64 {
-        self.coding() + self.error() + self.quality()
+        self.of(CODING) + self.of(ERROR) + self.of(QUALITY)
     }
 }

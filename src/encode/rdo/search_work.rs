@@ -2,7 +2,7 @@
 
 use crate::encode::aim::FileAim;
 use crate::encode::job::Job;
-use crate::encode::workload::Workload;
+use crate::encode::workload::{CODING, ERROR, QUALITY, Workload};
 
 /// Average number of tries until a size is met, and until a PSNR or a quality is met.
 const TRIES: (f64, f64) = (1.0, 1.5);
@@ -55,10 +55,10 @@ impl SearchWork {
     pub(super) fn comparison(&self) -> f64 {
         let measuring = match self.aim {
             None | Some(FileAim::Size(_)) => 0.0,
-            Some(FileAim::Psnr(_)) => self.workload.error(),
-            Some(FileAim::Quality(_)) => self.workload.quality(),
+            Some(FileAim::Psnr(_)) => self.workload.of(ERROR),
+            Some(FileAim::Quality(_)) => self.workload.of(QUALITY),
         };
-        self.workload.coding() + measuring
+        self.workload.of(CODING) + measuring
     }
 
     fn one_try(&self) -> f64 {
