@@ -262,10 +262,11 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
+    use crate::encode::testing::source;
 
     /// The samples of a source after bleeding.
-    fn bled_u8(size: [u32; 2], color: ColorModel, samples: &[u8]) -> Option<Vec<u8>> {
-        let source = Source::new_u8(size[0], size[1], color, samples).expect("the sizes agree");
+    fn bled_u8(size: [usize; 2], color: ColorModel, samples: &[u8]) -> Option<Vec<u8>> {
+        let source = source(size, color, samples);
         match unobserved(|observer| Bled::new(&source, observer))? {
             Bled::Eight(samples) => Some(samples),
             Bled::Sixteen(_) => unreachable!("the depth stays"),

@@ -26,6 +26,8 @@ mod sample_tile;
 mod shortfall;
 mod source;
 mod strips;
+#[cfg(test)]
+mod testing;
 mod tiled_source;
 mod verify;
 mod workload;

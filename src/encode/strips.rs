@@ -54,7 +54,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
-    use crate::encode::source::Source;
+    use crate::encode::testing::source;
     use crate::encode::{Encoder, Target};
     use crate::{StreamDecoder, Threads};
 
@@ -63,8 +63,7 @@ mod tests {
         let (width, height) = (70, 5 * BAND_HEIGHT as u32 + 3);
         let mut rng = fastrand::Rng::with_seed(8);
         let samples: Vec<u8> = (0..width * height * 3).map(|_| rng.u8(..)).collect();
-        let source =
-            Source::new_u8(width, height, ColorModel::Rgb, &samples).expect("the sizes agree");
+        let source = source([width, height].map(|side| side as usize), ColorModel::Rgb, &samples);
         let encoder = Encoder::new().with_effort(1).with_target(Target::Gaussians(300));
         let encoded = encoder.with_threads(Threads::One).encode(&source).expect("no target");
         let mut stream = StreamDecoder::new();

@@ -185,6 +185,7 @@ mod tests {
     use crate::decode::Decoder;
     use crate::encode::progress::unobserved;
     use crate::encode::rate_model;
+    use crate::encode::testing::source;
     use crate::region::Region;
     use crate::render::RenderOptions;
 
@@ -194,8 +195,7 @@ mod tests {
     fn file(count: usize) -> Vec<u8> {
         let [width, height] = SIDES;
         let samples = vec![9; (width * height) as usize];
-        let source =
-            Source::new_u8(width, height, ColorModel::Gray, &samples).expect("sizes agree");
+        let source = source(SIDES.map(|side| side as usize), ColorModel::Gray, &samples);
         let metadata = Metadata::default();
         let layout = FileLayout::new(
             &source,

@@ -204,11 +204,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::encode::testing::PARAMETERIZATIONS;
     use crate::gaussian::Gaussian;
     use crate::testing::config;
-
-    const PARAMETERIZATIONS: [Parameterization; 3] =
-        [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
     fn covariance(parameterization: Parameterization, values: [f32; 3]) -> [f32; 3] {
         let cholesky = parameterization.to_cholesky(values);

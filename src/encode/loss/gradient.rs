@@ -135,7 +135,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
-    use crate::encode::source::Source;
+    use crate::encode::testing::source;
     use crate::render::tile_grid::TILE_HEIGHT;
 
     /// Residuals in the tile whose first pixel is `corner`.
@@ -160,8 +160,7 @@ mod tests {
         let [width, height] = size;
         let mut rng = fastrand::Rng::with_seed(CHANNELS as u64);
         let samples: Vec<u8> = (0..width * height * CHANNELS).map(|_| rng.u8(..)).collect();
-        let source =
-            Source::new_u8(width as u32, height as u32, model, &samples).expect("the sizes agree");
+        let source = source(size, model, &samples);
         let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
         let mut residuals: Vec<f64> = samples.iter().map(|_| rng.f64() - 0.4).collect();
 

@@ -252,6 +252,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
+    use crate::encode::testing::{MODELS, source};
 
     /// The weights of a block before they are normalized, directly from the definition.
     fn plain(source: &Source<'_>, block: [usize; 2], scale: usize) -> f64 {
@@ -310,8 +311,7 @@ mod tests {
         // Several bands, the last one of less than a block.
         let (width, height) = (43, 4 * 2 * BAND + 6);
         let samples = noise(width, height);
-        let source = Source::new_u8(width as u32, height as u32, ColorModel::Rgb, &samples)
-            .expect("the sizes agree");
+        let source = source([width, height], ColorModel::Rgb, &samples);
         let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
         let rows = height.div_ceil(BLOCK);
         for scale in 0..SCALES {
@@ -345,7 +345,7 @@ mod tests {
     #[test]
     fn errors_on_even_ground_count_more_than_in_texture() {
         let samples = noise(64, 64);
-        let source = Source::new_u8(64, 64, ColorModel::Rgb, &samples).expect("the sizes agree");
+        let source = source([64, 64], ColorModel::Rgb, &samples);
         let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
         let across: Vec<f32> = (4..64).step_by(8).map(|x| weights.at(x, 32)).collect();
         assert!(across.is_sorted_by(|a, b| a > b), "{across:?}");
@@ -353,14 +353,13 @@ mod tests {
 
     #[test]
     fn every_model_and_size_has_weights() {
-        for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
+        for model in MODELS {
             for [width, height] in [[1, 1], [1, 70], [2, 3], [17, 9]] {
-                let samples = vec![200; width as usize * height as usize * model.channels()];
-                let source =
-                    Source::new_u8(width, height, model, &samples).expect("the sizes agree");
+                let samples = vec![200; width * height * model.channels()];
+                let source = source([width, height], model, &samples);
                 let weights = unobserved(|observer| PerceptualWeights::new(&source, observer));
                 // Errors count the same everywhere in an even picture.
-                let found = weights.at(width as usize - 1, height as usize - 1);
+                let found = weights.at(width - 1, height - 1);
                 assert!((found - 1.0).abs() < 1e-5, "{model:?}, {width}x{height}: {found}");
                 let squares = weights.luma.iter().sum::<f32>().powi(2);
                 assert!((squares - weights.colors as f32).abs() < 1e-5, "{model:?}");

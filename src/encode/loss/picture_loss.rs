@@ -147,6 +147,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
+    use crate::encode::testing::source;
 
     #[test]
     fn what_lies_under_a_gaussian_counts() {
@@ -154,7 +155,7 @@ mod tests {
         let mut rng = fastrand::Rng::with_seed(2);
         let samples: Vec<u8> =
             (0..96 * 96).map(|i| if i % 96 < 48 { 128 } else { rng.u8(..) }).collect();
-        let source = Source::new_u8(96, 96, ColorModel::Gray, &samples).expect("the sizes agree");
+        let source = source([96, 96], ColorModel::Gray, &samples);
         let loss = |tune| unobserved(|observer| PictureLoss::new(&source, tune, observer));
         let visual = loss(Tune::Visual);
         let [even, noise] = [8.0, 88.0].map(|x| visual.weight_near([x, 48.0]));

@@ -223,6 +223,7 @@ pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) ->
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::testing::MODELS;
 
     /// How much a rendering differs from a source, both of which are interleaved, if it comes in strips
     /// of so many rows.
@@ -278,7 +279,7 @@ mod tests {
 
     #[test]
     fn every_model_and_size_has_a_quality() {
-        for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
+        for model in MODELS {
             for size in [[1, 1], [5, 2], [33, 17], [300, 50]] {
                 let mut rng = fastrand::Rng::with_seed(7);
                 let length = size[0] * size[1] * model.channels();

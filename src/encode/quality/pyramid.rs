@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::quality::rows::{Border, Rows};
-    use crate::encode::source::Source;
+    use crate::encode::testing::source;
     use crate::testing::simd_levels;
 
     /// X, Y and B of all pixels of a picture at a 2^scale-th of the size, where `light` is linear.
@@ -172,8 +172,7 @@ mod tests {
         for size in [[COLUMNS + 21, 13], [COLUMNS, ROWS], [1, 1], [9, 3], [2, 7]] {
             let mut rng = fastrand::Rng::with_seed(3);
             let samples: Vec<u8> = (0..size[0] * size[1] * 3).map(|_| rng.u8(..)).collect();
-            let source = Source::new_u8(size[0] as u32, size[1] as u32, ColorModel::Rgb, &samples)
-                .expect("the sizes agree");
+            let source = source(size, ColorModel::Rgb, &samples);
             let linear = |sample: u8| {
                 let encoded = f64::from(sample) / 255.0;
                 if encoded <= 0.04045 {

@@ -267,13 +267,13 @@ fn smooth<P: Samples>(
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::testing::source;
     use crate::testing::simd_levels;
 
     /// The weights of the areas of a gray picture.
     fn weights_of([width, height]: [usize; 2], sample: impl FnMut(usize) -> u8) -> Vec<Weights> {
         let samples: Vec<u8> = (0..width * height).map(sample).collect();
-        let source = Source::new_u8(width as u32, height as u32, ColorModel::Gray, &samples)
-            .expect("the sizes agree");
+        let source = source([width, height], ColorModel::Gray, &samples);
         let shown = Shown { picture: &source, size: [width, height], background: 0.0 };
         let mut found = simd_levels().into_iter().map(|(_, level)| {
             let areas = SmoothAreas::new(&shown, level);

@@ -343,25 +343,20 @@ fn set<S: Simd>(simd: S, rendering: &[f32], samples: SampleLine<'_>, residuals: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::ColorModel;
     use crate::encode::loss::plain_distortion;
     use crate::encode::options::Tune;
     use crate::encode::progress::unobserved;
-    use crate::encode::source::Source;
+    use crate::encode::testing::{MODELS, source, tiled};
 
     #[test]
     fn shifted_residuals_have_the_gradient_of_the_distortion() {
         let (width, height) = (TILE_WIDTH + 5, 2 * TILE_HEIGHT + 3);
         let mut rng = fastrand::Rng::with_seed(5);
-        for model in [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba] {
+        for model in MODELS {
             let channels = model.channels();
             let samples: Vec<u8> =
                 (0..width * height * channels).map(|_| rng.u8(..).saturating_mul(2)).collect();
-            let source = Source::new_u8(width as u32, height as u32, model, &samples)
-                .expect("the sizes agree");
-            let tiled = unobserved(|observer| {
-                TiledSource::new(&source.keeping_invisible(true), Tune::Visual, observer)
-            });
+            let tiled = tiled(source([width, height], model, &samples), Tune::Visual);
             let rendering: Vec<f32> = samples.iter().map(|_| rng.f32() * 1.2 - 0.1).collect();
             let mut residuals = unobserved(|observer| Residuals::new(&tiled, observer));
             residuals.set(&tiled, 0, &rendering);

@@ -8,14 +8,13 @@ use crate::encode::loss::plain_distortion;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
 use crate::encode::source::Source;
+use crate::encode::testing::{MODELS, PARAMETERIZATIONS, source, tiled};
 use crate::gaussian::{Gaussian, Parameterization, component_count};
 use crate::testing::simd_levels;
 
-const WIDTH: u32 = 37;
-const HEIGHT: u32 = 21;
+const WIDTH: usize = 37;
+const HEIGHT: usize = 21;
 const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
-const PARAMETERIZATIONS: [Parameterization; 3] =
-    [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
 /// Runs a pass with an observer that never cancels.
 fn run(
@@ -58,7 +57,7 @@ fn loss(
                         )
                     }
                 };
-                let (dx, dy) = (f64::from(x) + 0.5 - center[0], f64::from(y) + 0.5 - center[1]);
+                let (dx, dy) = (x as f64 + 0.5 - center[0], y as f64 + 0.5 - center[1]);
                 let determinant = xx * yy - xy * xy;
                 let q = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
                 let weight = match kernel {
@@ -71,15 +70,14 @@ fn loss(
                 }
             }
             for (channel, sum) in sums[..channels].iter().enumerate() {
-                let index = (y * WIDTH + x) as usize * channels + channel;
+                let index = (y * WIDTH + x) * channels + channel;
                 let sample = f64::from(source.wide_sample(index)) / 65535.0;
                 residuals.push(sum - sample);
             }
         }
     }
-    let size = [WIDTH as usize, HEIGHT as usize];
     let distortion = match tiled.loss.weights() {
-        Some(weights) => plain_distortion(weights, size, &residuals),
+        Some(weights) => plain_distortion(weights, [WIDTH, HEIGHT], &residuals),
         None => residuals.iter().map(|residual| residual * residual).sum(),
     };
     0.5 * distortion
@@ -144,21 +142,17 @@ fn every_gradient_equals_its_finite_difference() {
     // Without black and white samples, where the residual is clamped. The cut-off is so far out
     // that the discontinuity there is below the resolution of f32.
     let kernels = [Kernel::Quartic, Kernel::Exponential { cutoff: 40.0 }];
-    let colors = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
     let cases = PARAMETERIZATIONS.into_iter().flat_map(|c| kernels.map(|k| (c, k, Tune::Psnr)));
     let visual = (Parameterization::Cholesky, Kernel::Quartic, Tune::Visual);
     for (parameterization, kernel, tune) in cases.chain([visual]) {
-        for color in colors {
+        for color in MODELS {
             let channels = color.channels();
-            let samples: Vec<u8> =
-                (0..WIDTH as usize * HEIGHT as usize * channels).map(|_| rng.u8(1..255)).collect();
-            let source = Source::new_u8(WIDTH, HEIGHT, color, &samples).expect("sizes agree");
+            let samples: Vec<u8> = (0..WIDTH * HEIGHT * channels).map(|_| rng.u8(1..255)).collect();
+            let source = source([WIDTH, HEIGHT], color, &samples);
             let scene = scene(parameterization, channels, &mut rng);
             let exact = scene.iter().map(|components| components.to_array().map(f64::from));
             let exact = exact.collect::<Vec<_>>();
-            let tiled = unobserved(|observer| {
-                TiledSource::new(&source.keeping_invisible(true), tune, observer)
-            });
+            let tiled = tiled(source, tune);
             let found = gradients(&scene, parameterization, kernel, &tiled);
             for (index, found) in found.iter().enumerate() {
                 let found = found.to_array();
@@ -190,7 +184,7 @@ fn every_gradient_equals_its_finite_difference() {
 fn every_simd_level_gives_the_same_bits() {
     let mut rng = fastrand::Rng::with_seed(2);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
-    let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+    let source = source([WIDTH, HEIGHT], ColorModel::Rgb, &samples);
     let scene = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats = splats_of(&scene, Parameterization::Cholesky);
     let run = |level, tiled: &TiledSource| {
@@ -210,9 +204,7 @@ fn every_simd_level_gives_the_same_bits() {
             .collect()
     };
     for tune in [Tune::Visual, Tune::Psnr] {
-        let tiled = unobserved(|observer| {
-            TiledSource::new(&source.keeping_invisible(true), tune, observer)
-        });
+        let tiled = tiled(source, tune);
         let expected = run(Level::baseline(), &tiled);
         assert!(expected.0.squared.0 > 0.0 && expected.0.distortion.0 > 0.0);
         let expected = bits(expected);
@@ -228,10 +220,7 @@ fn every_simd_level_gives_the_same_bits() {
 #[test]
 fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
     let white = [255; 5 * 3 * 3];
-    let source = Source::new_u8(5, 3, ColorModel::Rgb, &white).expect("sizes agree");
-    let tiled = unobserved(|observer| {
-        TiledSource::new(&source.keeping_invisible(true), Tune::Visual, observer)
-    });
+    let tiled = tiled(source([5, 3], ColorModel::Rgb, &white), Tune::Visual);
     let gaussian =
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
@@ -245,13 +234,11 @@ fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
 fn measured_placement_errors_are_those_of_the_tiles_rendered_again() {
     let mut rng = fastrand::Rng::with_seed(3);
     let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
-    let source = Source::new_u8(WIDTH, HEIGHT, ColorModel::Rgb, &samples).expect("sizes agree");
+    let source = source([WIDTH, HEIGHT], ColorModel::Rgb, &samples);
     let scene = scene(Parameterization::Cholesky, 3, &mut rng);
     let splats = splats_of(&scene, Parameterization::Cholesky);
     for tune in [Tune::Visual, Tune::Psnr] {
-        let tiled = unobserved(|observer| {
-            TiledSource::new(&source.keeping_invisible(true), tune, observer)
-        });
+        let tiled = tiled(source, tune);
         let kernel = Kernel::Quartic;
         for norm in [ErrorNorm::L1, ErrorNorm::L3] {
             let mut pass = Pass::new(&tiled);

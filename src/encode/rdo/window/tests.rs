@@ -5,7 +5,7 @@ use crate::color::ColorModel;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
 use crate::encode::rdo::residuals::Residuals;
-use crate::encode::source::Source;
+use crate::encode::testing::{self, MODELS, tiled};
 use crate::encode::tiled_source::TiledSource;
 
 // The window of a Gaussian that covers all is shared by threads.
@@ -44,11 +44,7 @@ fn scene(model: ColorModel, clamped: bool) -> Scene {
         }
     }
     let rendering = (0..WIDTH * HEIGHT * channels).map(|_| random.f32() * 1.4 - 0.2).collect();
-    let size = [WIDTH, HEIGHT].map(|length| length as u32);
-    let of_raster = Source::new_u8(size[0], size[1], model, &source).expect("the sizes agree");
-    let tiled = unobserved(|observer| {
-        TiledSource::new(&of_raster.keeping_invisible(true), Tune::Visual, observer)
-    });
+    let tiled = tiled(testing::source([WIDTH, HEIGHT], model, &source), Tune::Visual);
     Scene { model, source, rendering, tiled }
 }
 
@@ -115,9 +111,6 @@ fn residuals(scene: &Scene) -> Residuals {
     residuals.set(&scene.tiled, 0, &scene.rendering);
     residuals
 }
-
-const MODELS: [ColorModel; 4] =
-    [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
 
 #[test]
 fn changes_are_those_of_the_plain_error() {

@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::encode::fit::training::Training;
+use crate::encode::testing::PARAMETERIZATIONS;
 use crate::gaussian::SHAPE;
 use crate::testing::config;
 
@@ -12,9 +13,6 @@ impl LsqQuantizers {
         self.components.iter().flatten()
     }
 }
-
-const PARAMETERIZATIONS: [Parameterization; 3] =
-    [Parameterization::Covariance, Parameterization::Cholesky, Parameterization::RotationScale];
 
 fn bounds(parameterization: Parameterization) -> Bounds {
     Bounds::new(parameterization, 3, [300, 200])
