@@ -3,7 +3,7 @@
 //! Gaussian Filters").
 
 use super::components::{Bounds, Components};
-use super::pass::Rendered;
+use super::pass::{Pass, Scene};
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
 use super::{paper, parameterization};
 use crate::encode::error::Result;
@@ -34,7 +34,7 @@ struct NewPosition {
     /// nearly all of the error, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
-    /// The negative residual of each channel ([`Rendered::residuals`]), with [`Placement::Spread`].
+    /// The negative residual of each channel ([`Pass::residuals`]), with [`Placement::Spread`].
     missing: [f32; 4],
 }
 
@@ -62,7 +62,9 @@ pub(crate) struct Densifier<'a> {
     pub(crate) options: &'a Densification,
     pub(crate) filter: GaussianFilter,
     /// The last pass over the picture, which measured the placement errors.
-    pub(crate) pass: Rendered<'a>,
+    pub(crate) pass: &'a Pass,
+    /// What it rendered.
+    pub(crate) scene: Scene<'a>,
     pub(crate) bounds: Bounds,
     /// Number of Gaussians before, without those that new ones replace.
     pub(crate) count: usize,
@@ -77,7 +79,7 @@ impl Densifier<'_> {
         rng: &mut fastrand::Rng,
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Components>> {
-        let tiled = self.pass.tiled;
+        let tiled = self.scene.tiled;
         let positions = match self.options.placement {
             Placement::Top => {
                 let errors = |tile| self.errors(tile).errors;
@@ -87,7 +89,7 @@ impl Densifier<'_> {
                 pixels.into_iter().map(position).collect()
             }
             Placement::Spread => {
-                let (grid, sums) = (self.tile_grid(), self.pass.pass.placement_errors());
+                let (grid, sums) = (self.tile_grid(), self.pass.placement_errors());
                 let tiles = |tile| self.errors(tile);
                 spread(count, tiled.width, grid, rng.f64(), sums, tiles, observer)?
             }
@@ -102,7 +104,7 @@ impl Densifier<'_> {
 
     /// Column and row of the pixel at a position.
     fn pixel(&self, position: &NewPosition) -> (usize, usize) {
-        let (pixel, width) = (position.pixel as usize, self.pass.tiled.width);
+        let (pixel, width) = (position.pixel as usize, self.scene.tiled.width);
         (pixel % width, pixel / width)
     }
 
@@ -112,7 +114,7 @@ impl Densifier<'_> {
             NewColor::Zero => [0.0; 4],
             NewColor::Residual(share) => {
                 let (x, y) = self.pixel(position);
-                let weight = self.pass.tiled.loss.weight_at(x, y);
+                let weight = self.scene.tiled.loss.weight_at(x, y);
                 position.missing.map(|missing| share * missing / weight)
             }
         }
@@ -141,7 +143,7 @@ impl Densifier<'_> {
 
     /// Numbers of columns and rows of tiles.
     fn tile_grid(&self) -> [usize; 2] {
-        let TiledSource { width, height, .. } = self.pass.tiled;
+        let TiledSource { width, height, .. } = self.scene.tiled;
         [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
     }
 
@@ -149,8 +151,8 @@ impl Densifier<'_> {
     fn errors(&self, tile: usize) -> TileErrors {
         let [columns, _] = self.tile_grid();
         let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
-        let residuals = self.pass.residuals(tile);
-        let loss = &self.pass.tiled.loss;
+        let residuals = self.pass.residuals(&self.scene, tile);
+        let loss = &self.scene.tiled.loss;
         let errors = loss.placement_errors(corner, &residuals, self.options.error_norm);
         TileErrors { errors, residuals }
     }

@@ -3,7 +3,7 @@
 use super::components::Components;
 use super::densify::{Densifier, MIN_COLOR};
 use super::paper::decoded;
-use super::pass::Rendered;
+use super::pass::Scene;
 use super::trained::Fit;
 use super::training::Portion;
 use crate::encode::error::Result;
@@ -61,17 +61,12 @@ impl Fit<'_> {
         if count + replaced == 0 {
             return Ok(());
         }
-        let pass = Rendered {
-            pass: &self.pass,
-            tiled: self.tiled,
-            splats: &self.splats,
-            kernel: self.training.kernel,
-            base: self.base,
-        };
+        let (kernel, base) = (self.training.kernel, self.base);
         let densifier = Densifier {
             options: &self.training.densification,
             filter: self.training.filter,
-            pass,
+            pass: &self.pass,
+            scene: Scene { tiled: self.tiled, splats: &self.splats, kernel, base },
             bounds: self.bounds,
             count: self.parameters.len() - replaced,
         };

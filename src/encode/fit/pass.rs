@@ -33,6 +33,15 @@ pub(crate) struct SplatGradient {
     pub(crate) color: [f32; 4],
 }
 
+/// What is rendered over a base colour, and compared with a source.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scene<'a> {
+    pub(crate) tiled: &'a TiledSource,
+    pub(crate) splats: &'a [Splat],
+    pub(crate) kernel: Kernel,
+    pub(crate) base: [f32; 4],
+}
+
 /// The bins, results and scratch memory of passes, reused from one pass to the next.
 #[derive(Debug)]
 pub(crate) struct Pass {
@@ -64,18 +73,13 @@ impl Pass {
 
     /// Bins splats by the tiles that they touch. The bins remain valid for a few passes in which
     /// the splats change little: near the cut-off, the weight of a splat is close to 0.
-    pub(crate) fn bin(
-        &mut self,
-        tiled: &TiledSource,
-        splats: &[Splat],
-        kernel: Kernel,
-        observer: &mut Observer<'_>,
-    ) -> Result<()> {
+    pub(crate) fn bin(&mut self, scene: &Scene<'_>, observer: &mut Observer<'_>) -> Result<()> {
         // The slots take most of the memory. They are freed while binning needs memory of its own.
         self.slots = Vec::new();
-        self.bins.rebuild(splats, kernel.cutoff(), observer)?;
+        self.bins.rebuild(scene.splats, scene.kernel.cutoff(), observer)?;
         // Memory that the system clears page by page when it is used, on all threads.
-        self.slots = vec![Slot::default(); self.bins.span_count() * slots_per_span(tiled.channels)];
+        self.slots =
+            vec![Slot::default(); self.bins.span_count() * slots_per_span(scene.tiled.channels)];
         Ok(())
     }
 
@@ -95,21 +99,17 @@ impl Pass {
         self.slots = Vec::new();
     }
 
-    /// Renders over the base colour the `splats`, which [`Pass::bin`] must have binned, and
-    /// computes residuals and gradients. Returns the error of the rendering. Measures the placement
+    /// Renders the splats, which [`Pass::bin`] must have binned, and computes residuals and gradients. Returns the error of the rendering. Measures the placement
     /// errors of tiles if their norm is given.
     pub(crate) fn run(
         &mut self,
-        tiled: &TiledSource,
-        splats: &[Splat],
-        kernel: Kernel,
-        base: [f32; 4],
+        scene: &Scene<'_>,
         norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
     ) -> Result<RenderingError> {
         with_channels!(
-            CHANNELS = tiled.channels,
-            self.run_of::<CHANNELS>(tiled, splats, kernel, base, norm, observer)
+            CHANNELS = scene.tiled.channels,
+            self.run_of::<CHANNELS>(scene, norm, observer)
         )?;
         Ok(self.row_errors.iter().fold(RenderingError::default(), |sum, &error| sum + error))
     }
@@ -167,13 +167,11 @@ impl Pass {
 
     fn run_of<const CHANNELS: usize>(
         &mut self,
-        tiled: &TiledSource,
-        splats: &[Splat],
-        kernel: Kernel,
-        base: [f32; 4],
+        scene: &Scene<'_>,
         norm: Option<ErrorNorm>,
         observer: &mut Observer<'_>,
     ) -> Result<()> {
+        let Scene { tiled, splats, kernel, base } = *scene;
         let tiles = self.bins.columns() * self.bins.rows();
         let bins = &self.bins;
         let per_span = slots_per_span(CHANNELS);
@@ -219,39 +217,31 @@ impl Pass {
         })?;
         Ok(())
     }
-}
 
-/// A pass with what it rendered, from which it can render tiles again.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rendered<'a> {
-    pub(crate) pass: &'a Pass,
-    pub(crate) tiled: &'a TiledSource,
-    pub(crate) splats: &'a [Splat],
-    pub(crate) kernel: Kernel,
-    pub(crate) base: [f32; 4],
-}
-
-impl Rendered<'_> {
     /// Half the gradient of the distortion by the samples of the rendering of a tile, one plane per
     /// channel: where nothing but squared error counts, rendering minus source. It is 0 where the
     /// source is black or white and the rendering lies beyond it, because the output is clamped, and
     /// outside the picture.
-    pub(crate) fn residuals(&self, tile: usize) -> Vec<TilePlane> {
-        with_channels!(CHANNELS = self.tiled.channels, self.residuals_of::<CHANNELS>(tile))
+    pub(crate) fn residuals(&self, scene: &Scene<'_>, tile: usize) -> Vec<TilePlane> {
+        with_channels!(CHANNELS = scene.tiled.channels, self.residuals_of::<CHANNELS>(scene, tile))
     }
 
-    fn residuals_of<const CHANNELS: usize>(&self, tile: usize) -> Vec<TilePlane> {
-        let Pass { level, bins, .. } = self.pass;
+    fn residuals_of<const CHANNELS: usize>(
+        &self,
+        scene: &Scene<'_>,
+        tile: usize,
+    ) -> Vec<TilePlane> {
+        let Self { level, bins, .. } = self;
         let (row, column) = (tile / bins.columns(), tile % bins.columns());
         let spans = bins.spans(row);
         let of_tile = bins.tile_rows()[row].of(column);
-        let splat = |&span: &u32| self.splats[spans[span as usize].splat as usize];
+        let splat = |&span: &u32| scene.splats[spans[span as usize].splat as usize];
         let splats: Vec<Splat> = of_tile.iter().map(splat).collect();
         let indices: Vec<u32> = (0..splats.len() as u32).collect();
-        let tile = TrainingTile::new(self.tiled, [column, row], self.base, &splats, &indices);
+        let tile = TrainingTile::new(scene.tiled, [column, row], scene.base, &splats, &indices);
         let mut states = vec![TileState::ZERO; splats.len()];
         let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-        tile.residuals(*level, self.kernel, &mut states, &mut planes);
+        tile.residuals(*level, scene.kernel, &mut states, &mut planes);
         planes.to_vec()
     }
 }

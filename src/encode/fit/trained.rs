@@ -7,7 +7,7 @@ use super::checkpoint::Checkpoint;
 use super::components::{Bounds, Components};
 use super::paper::{LsqQuantizers, decoded};
 use super::parameters::Parameters;
-use super::pass::Pass;
+use super::pass::{Pass, Scene};
 use super::rate_term::RateTerm;
 use super::training::Training;
 use crate::coding::packed::{PackedCodes, Quantizer};
@@ -171,14 +171,15 @@ impl<'a> Fit<'a> {
         if !self.has_splats {
             self.make_splats(observer)?;
         }
-        let kernel = self.training.kernel;
+        let (kernel, base) = (self.training.kernel, self.base);
+        let scene = Scene { tiled: self.tiled, splats: &self.splats, kernel, base };
         if self.binned_for == 0 {
-            self.pass.bin(self.tiled, &self.splats, kernel, observer)?;
+            self.pass.bin(&scene, observer)?;
             self.binned_for = REBIN_INTERVAL;
         }
         self.binned_for -= 1;
         self.work.evaluations += self.pass.evaluations();
-        self.error = self.pass.run(self.tiled, &self.splats, kernel, self.base, norm, observer)?;
+        self.error = self.pass.run(&scene, norm, observer)?;
         Ok(())
     }
 

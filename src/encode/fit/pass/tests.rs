@@ -17,16 +17,10 @@ const HEIGHT: usize = 21;
 const BASE: [f32; 4] = [0.4, 0.5, 0.45, 0.55];
 
 /// Runs a pass with an observer that never cancels.
-fn run(
-    pass: &mut Pass,
-    tiled: &TiledSource,
-    splats: &[Splat],
-    kernel: Kernel,
-    base: [f32; 4],
-) -> RenderingError {
+fn run(pass: &mut Pass, scene: &Scene<'_>) -> RenderingError {
     unobserved(|observer| {
-        pass.bin(tiled, splats, kernel, observer)?;
-        pass.run(tiled, splats, kernel, base, None, observer)
+        pass.bin(scene, observer)?;
+        pass.run(scene, None, observer)
     })
 }
 
@@ -126,7 +120,7 @@ fn gradients(
 ) -> Vec<Components> {
     let splats = splats_of(scene, parameterization);
     let mut pass = Pass::new(tiled);
-    run(&mut pass, tiled, &splats, kernel, BASE);
+    run(&mut pass, &Scene { tiled, splats: &splats, kernel, base: BASE });
     let gradients = scene.iter().enumerate().map(|(index, components)| {
         let SplatGradient { geometry, color } = pass.gradient(index, tiled.channels);
         let (center, shape) =
@@ -189,7 +183,8 @@ fn every_simd_level_gives_the_same_bits() {
     let splats = splats_of(&scene, Parameterization::Cholesky);
     let run = |level, tiled: &TiledSource| {
         let mut pass = Pass { level, ..Pass::new(tiled) };
-        let error = run(&mut pass, tiled, &splats, Kernel::Quartic, BASE);
+        let kernel = Kernel::Quartic;
+        let error = run(&mut pass, &Scene { tiled, splats: &splats, kernel, base: BASE });
         let gradients = (0..splats.len()).map(|splat| pass.gradient(splat, 3));
         (error, gradients.collect())
     };
@@ -225,7 +220,9 @@ fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
         Gaussian { center: [4.0, 2.0], cholesky: [9.0, 1.0, 7.0], color: [3.0, 3.0, 3.0, 0.0] };
     let splat = Splat::new(&gaussian).expect("it is valid");
     let mut pass = Pass::new(&tiled);
-    let error = run(&mut pass, &tiled, &[splat], Kernel::Quartic, [0.9; 4]);
+    let kernel = Kernel::Quartic;
+    let scene = Scene { tiled: &tiled, splats: &[splat], kernel, base: [0.9; 4] };
+    let error = run(&mut pass, &scene);
     assert_eq!(error, RenderingError::default());
     assert_eq!(pass.gradient(0, 3), SplatGradient::default());
 }
@@ -239,21 +236,19 @@ fn measured_placement_errors_are_those_of_the_tiles_rendered_again() {
     let splats = splats_of(&scene, Parameterization::Cholesky);
     for tune in [Tune::Visual, Tune::Psnr] {
         let tiled = tiled(source, tune);
-        let kernel = Kernel::Quartic;
+        let scene = Scene { tiled: &tiled, splats: &splats, kernel: Kernel::Quartic, base: BASE };
         for norm in [ErrorNorm::L1, ErrorNorm::L3] {
             let mut pass = Pass::new(&tiled);
             unobserved(|observer| {
-                pass.bin(&tiled, &splats, kernel, observer)?;
-                pass.run(&tiled, &splats, kernel, BASE, Some(norm), observer)
+                pass.bin(&scene, observer)?;
+                pass.run(&scene, Some(norm), observer)
             });
             let columns = tiled.width.div_ceil(TILE_WIDTH);
             let expected = pass.placement_errors();
             assert_eq!(expected.len(), columns * tiled.height.div_ceil(TILE_HEIGHT));
-            let rendered =
-                Rendered { pass: &pass, tiled: &tiled, splats: &splats, kernel, base: BASE };
             for (tile, &expected) in expected.iter().enumerate() {
                 let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
-                let planes = rendered.residuals(tile);
+                let planes = pass.residuals(&scene, tile);
                 let found = tiled.loss.placement_errors(corner, &planes, norm);
                 assert!(expected > 0.0);
                 assert_eq!(found.as_flattened().iter().sum::<f32>(), expected);
