@@ -3,7 +3,7 @@
 
 use super::components::{Bounds, Components, Slope};
 use super::paper::{LsqQuantizers, QuantizerGradients, add, decoded};
-use super::parameterization::{self, OwnFrame};
+use super::parameterization::OwnFrame;
 use super::pass::{Pass, SplatGradient};
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
@@ -36,8 +36,7 @@ impl Backward<'_> {
         let parameterization = self.bounds.parameterization;
         let decoded = decoded(self.quantizers, trained);
         let Slope { gradient: by_splat, perceptual_weight } = self.by_splat(index, &decoded);
-        let (center, shape) =
-            parameterization::gradients(&by_splat.geometry, parameterization, decoded.shape);
+        let (center, shape) = parameterization.gradients(&by_splat.geometry, decoded.shape);
         let mut gradient = Components { center, shape, color: by_splat.color };
         if let Some(quantizers) = self.quantizers {
             add(by_quantizers, &quantizers.backward(trained, &decoded, &mut gradient));

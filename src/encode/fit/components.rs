@@ -2,7 +2,6 @@
 
 use glam::Vec2;
 
-use super::parameterization;
 use crate::coding::entropy::CenterGrid;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::render::splat::Splat;
@@ -105,7 +104,7 @@ impl Bounds {
     #[inline]
     pub(crate) fn clamped(self, mut components: Components) -> Components {
         let (shape, max) = (components.shape, self.max_deviation);
-        components.shape = parameterization::clamped(self.parameterization, shape, max);
+        components.shape = self.parameterization.clamped(shape, max);
         self.clamp_center_and_color(&mut components);
         components
     }

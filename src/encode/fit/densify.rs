@@ -3,9 +3,9 @@
 //! Gaussian Filters").
 
 use super::components::{Bounds, Components};
+use super::paper;
 use super::pass::{Pass, Scene};
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
-use super::{paper, parameterization};
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
@@ -131,10 +131,7 @@ impl Densifier<'_> {
         let (x, y) = self.pixel(position);
         let parameterization = self.bounds.parameterization;
         let shape = match self.options.shape {
-            NewShape::Point => parameterization::from_cholesky(
-                parameterization,
-                [variance.sqrt(), 0.0, variance.sqrt()],
-            ),
+            NewShape::Point => parameterization.shape_of([variance.sqrt(), 0.0, variance.sqrt()]),
             NewShape::Random => paper::random_shape(parameterization, variance, rng),
         };
         let center = [x as f32 + 0.5, y as f32 + 0.5];

@@ -14,7 +14,7 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::components::{Bounds, Components, MOST_COLOR, Slope};
-use super::parameterization::{self, MIN_DEVIATION};
+use super::parameterization::MIN_DEVIATION;
 use super::pass::SplatGradient;
 use super::rate_term::RateTerm;
 use super::training::GaussNewton;
@@ -182,7 +182,7 @@ impl Step<'_> {
         match self.bounds.parameterization {
             Parameterization::Cholesky => values,
             other => {
-                let shape = parameterization::from_cholesky(other, values.shape);
+                let shape = other.shape_of(values.shape);
                 self.bounds.clamped(Components { shape, ..values })
             }
         }

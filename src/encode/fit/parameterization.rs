@@ -12,49 +12,122 @@ use crate::gaussian::{Parameterization, inverse_cholesky};
 /// centres of pixels, where it has no effect and no gradient.
 pub(crate) const MIN_DEVIATION: f32 = 0.4;
 
-/// The gradients of the loss by the centre and by the three shape values of `parameterization`.
-///
-/// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
-/// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
-/// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
-#[inline]
-pub(crate) fn gradients(
-    sums: &GeometrySums,
-    parameterization: Parameterization,
-    values: [f32; 3],
-) -> ([f32; 2], [f32; 3]) {
-    let [i11, w, i22] = inverse_cholesky(parameterization.to_cholesky(values));
-    // glam builds matrices from columns.
-    let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
-    let [xx, xy, yy] = sums.second;
-    let moments = Mat2::from_cols(Vec2::new(xx, xy), Vec2::new(xy, yy));
-    let center = m.transpose() * (m * Vec2::from(sums.first));
-    let by_factor = m.transpose() * (m * moments * m.transpose());
-    let shape = match parameterization {
-        Parameterization::Cholesky => [by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y],
-        Parameterization::Covariance => {
-            let by_covariance = by_factor * m * 0.5;
-            // xy stands for both off-diagonal entries.
-            [
-                by_covariance.x_axis.x,
-                by_covariance.x_axis.y + by_covariance.y_axis.x,
-                by_covariance.y_axis.y,
-            ]
+impl Parameterization {
+    /// The gradients of the loss by the centre and by the three shape values.
+    ///
+    /// With M the inverse of the Cholesky factor L, q = |M d|^2. From dM = -M dL M follow
+    /// dLoss/dcentre = M^T M (sum of s d), dLoss/dL = the lower triangle of M^T Z, and
+    /// dLoss/dSigma = M^T Z M / 2, where Z = M (sum of s d d^T) M^T.
+    #[inline]
+    pub(crate) fn gradients(self, sums: &GeometrySums, values: [f32; 3]) -> ([f32; 2], [f32; 3]) {
+        let [i11, w, i22] = inverse_cholesky(self.to_cholesky(values));
+        // glam builds matrices from columns.
+        let m = Mat2::from_cols(Vec2::new(i11, w), Vec2::new(0.0, i22));
+        let [xx, xy, yy] = sums.second;
+        let moments = Mat2::from_cols(Vec2::new(xx, xy), Vec2::new(xy, yy));
+        let center = m.transpose() * (m * Vec2::from(sums.first));
+        let by_factor = m.transpose() * (m * moments * m.transpose());
+        let shape = match self {
+            Self::Cholesky => [by_factor.x_axis.x, by_factor.x_axis.y, by_factor.y_axis.y],
+            Self::Covariance => {
+                let by_covariance = by_factor * m * 0.5;
+                // xy stands for both off-diagonal entries.
+                [
+                    by_covariance.x_axis.x,
+                    by_covariance.x_axis.y + by_covariance.y_axis.x,
+                    by_covariance.y_axis.y,
+                ]
+            }
+            Self::RotationScale => {
+                let by_covariance = by_factor * m * 0.5;
+                let [s1, s2, angle] = values;
+                let (axis1, axis2) = axes(angle);
+                // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
+                let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
+                [
+                    2.0 * s1 * along(axis1, axis1),
+                    2.0 * s2 * along(axis2, axis2),
+                    (s1 * s1 - s2 * s2) * (along(axis1, axis2) + along(axis2, axis1)),
+                ]
+            }
+        };
+        (center.to_array(), shape)
+    }
+
+    /// The shape values of a Cholesky factor.
+    pub(crate) fn shape_of(self, [l11, l21, l22]: [f32; 3]) -> [f32; 3] {
+        let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
+        match self {
+            Self::Cholesky => [l11, l21, l22],
+            Self::Covariance => [xx, xy, yy],
+            Self::RotationScale => {
+                let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
+                let s1 = (mean + half.hypot(xy)).sqrt();
+                // Computed from the determinant, the smaller deviation does not suffer cancellation.
+                [s1, l11 * l22 / s1, 0.5 * xy.atan2(half)]
+            }
         }
-        Parameterization::RotationScale => {
-            let by_covariance = by_factor * m * 0.5;
-            let [s1, s2, angle] = values;
-            let (axis1, axis2) = axes(angle);
-            // Sigma = s1^2 a1 a1^T + s2^2 a2 a2^T, da1/dangle = a2 and da2/dangle = -a1.
-            let along = |a: Vec2, b: Vec2| a.dot(by_covariance * b);
-            [
-                2.0 * s1 * along(axis1, axis1),
-                2.0 * s2 * along(axis2, axis2),
-                (s1 * s1 - s2 * s2) * (along(axis1, axis2) + along(axis2, axis1)),
-            ]
+    }
+
+    /// The shape values of the covariance that `values` stand for, plus `variance` times the identity.
+    pub(crate) fn widened(self, values: [f32; 3], variance: f32) -> [f32; 3] {
+        let [l11, l21, l22] = self.to_cholesky(values);
+        let xx = l11 * l11 + variance;
+        let wide11 = xx.sqrt();
+        let wide21 = l11 * l21 / wide11;
+        let yy = l21 * l21 + l22 * l22 + variance;
+        self.shape_of([wide11, wide21, (yy - wide21 * wide21).max(0.0).sqrt()])
+    }
+
+    /// Shape values clamped so that they are a covariance with standard deviations from about
+    /// [`MIN_DEVIATION`] to about `max`. Values that are not finite become a round Gaussian.
+    #[inline]
+    pub(crate) fn clamped(self, values: [f32; 3], max: f32) -> [f32; 3] {
+        if !values.iter().all(|value| value.is_finite()) {
+            return self.shape_of([1.0, 0.0, 1.0]);
         }
-    };
-    (center.to_array(), shape)
+        let [a, b, c] = values;
+        match self {
+            Self::Cholesky => {
+                let l11 = a.clamp(MIN_DEVIATION, max);
+                let l21 = b.clamp(-max, max);
+                // The smaller deviation is l11 l22 divided by the larger one, and that is about the
+                // length of (l11, l21).
+                let least = MIN_DEVIATION * ((l11 * l11 + l21 * l21).sqrt() / l11).max(1.0);
+                [l11, l21, c.clamp(MIN_DEVIATION, max).max(least)]
+            }
+            Self::Covariance => {
+                let xx = a.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
+                let yy = c.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
+                // Conditional variances stay above the least variance, and so far above 0 that rounding
+                // errors of the determinant do not matter.
+                let square = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0);
+                let max_xy = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
+                [xx, b.clamp(-max_xy, max_xy), yy]
+            }
+            Self::RotationScale => {
+                // Half a turn leaves the ellipse as it is. The remainder of a division is exact, so
+                // angles of any magnitude can be reduced.
+                let half_turn = core::f32::consts::PI;
+                let rest = c % half_turn;
+                let angle = if rest.abs() > 0.5 * half_turn {
+                    rest - half_turn.copysign(rest)
+                } else {
+                    rest
+                };
+                [a.clamp(MIN_DEVIATION, max), b.clamp(MIN_DEVIATION, max), angle]
+            }
+        }
+    }
+
+    /// Which of the three shape values have a logarithmic quantizer: those that are positive and span
+    /// decades (paper, appendix, section "More Analysis Results": log-uniform quantization).
+    pub(crate) fn is_logarithmic(self) -> [bool; 3] {
+        match self {
+            Self::Covariance | Self::Cholesky => [true, false, true],
+            Self::RotationScale => [true, true, false],
+        }
+    }
 }
 
 /// The derivatives of the centre and of the shape values by the directions of a Gaussian's own frame
@@ -114,85 +187,6 @@ impl OwnFrame {
     }
 }
 
-/// The shape values of a Cholesky factor.
-pub(crate) fn from_cholesky(
-    parameterization: Parameterization,
-    [l11, l21, l22]: [f32; 3],
-) -> [f32; 3] {
-    let (xx, xy, yy) = (l11 * l11, l11 * l21, l21 * l21 + l22 * l22);
-    match parameterization {
-        Parameterization::Cholesky => [l11, l21, l22],
-        Parameterization::Covariance => [xx, xy, yy],
-        Parameterization::RotationScale => {
-            let (mean, half) = ((xx + yy) * 0.5, (xx - yy) * 0.5);
-            let s1 = (mean + half.hypot(xy)).sqrt();
-            // Computed from the determinant, the smaller deviation does not suffer cancellation.
-            [s1, l11 * l22 / s1, 0.5 * xy.atan2(half)]
-        }
-    }
-}
-
-/// The shape values of the covariance that `values` stand for, plus `variance` times the identity.
-pub(crate) fn widened(
-    parameterization: Parameterization,
-    values: [f32; 3],
-    variance: f32,
-) -> [f32; 3] {
-    let [l11, l21, l22] = parameterization.to_cholesky(values);
-    let xx = l11 * l11 + variance;
-    let wide11 = xx.sqrt();
-    let wide21 = l11 * l21 / wide11;
-    let yy = l21 * l21 + l22 * l22 + variance;
-    from_cholesky(parameterization, [wide11, wide21, (yy - wide21 * wide21).max(0.0).sqrt()])
-}
-
-/// Shape values clamped so that they are a covariance with standard deviations from about
-/// [`MIN_DEVIATION`] to about `max`. Values that are not finite become a round Gaussian.
-#[inline]
-pub(crate) fn clamped(parameterization: Parameterization, values: [f32; 3], max: f32) -> [f32; 3] {
-    if !values.iter().all(|value| value.is_finite()) {
-        return from_cholesky(parameterization, [1.0, 0.0, 1.0]);
-    }
-    let [a, b, c] = values;
-    match parameterization {
-        Parameterization::Cholesky => {
-            let l11 = a.clamp(MIN_DEVIATION, max);
-            let l21 = b.clamp(-max, max);
-            // The smaller deviation is l11 l22 divided by the larger one, and that is about the
-            // length of (l11, l21).
-            let least = MIN_DEVIATION * ((l11 * l11 + l21 * l21).sqrt() / l11).max(1.0);
-            [l11, l21, c.clamp(MIN_DEVIATION, max).max(least)]
-        }
-        Parameterization::Covariance => {
-            let xx = a.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
-            let yy = c.clamp(MIN_DEVIATION * MIN_DEVIATION, max * max);
-            // Conditional variances stay above the least variance, and so far above 0 that rounding
-            // errors of the determinant do not matter.
-            let square = (xx * yy - MIN_DEVIATION * MIN_DEVIATION * xx.max(yy)).max(0.0);
-            let max_xy = square.min(xx * yy * (1.0 - 1e-5)).sqrt();
-            [xx, b.clamp(-max_xy, max_xy), yy]
-        }
-        Parameterization::RotationScale => {
-            // Half a turn leaves the ellipse as it is. The remainder of a division is exact, so
-            // angles of any magnitude can be reduced.
-            let half_turn = core::f32::consts::PI;
-            let rest = c % half_turn;
-            let angle =
-                if rest.abs() > 0.5 * half_turn { rest - half_turn.copysign(rest) } else { rest };
-            [a.clamp(MIN_DEVIATION, max), b.clamp(MIN_DEVIATION, max), angle]
-        }
-    }
-}
-
-/// Which of the three shape values have a logarithmic quantizer: those that are positive and span
-/// decades (paper, appendix, section "More Analysis Results": log-uniform quantization).
-pub(crate) fn is_logarithmic(parameterization: Parameterization) -> [bool; 3] {
-    match parameterization {
-        Parameterization::Covariance | Parameterization::Cholesky => [true, false, true],
-        Parameterization::RotationScale => [true, true, false],
-    }
-}
-
 /// The directions of the two axes of a Gaussian whose first axis is at this angle to x.
 fn axes(angle: f32) -> (Vec2, Vec2) {
     let (sin, cos) = angle.sin_cos();
@@ -222,7 +216,7 @@ mod tests {
         ) {
             let expected = covariance(Parameterization::Cholesky, [l11, l21, l22]);
             for parameterization in PARAMETERIZATIONS {
-                let values = from_cholesky(parameterization, [l11, l21, l22]);
+                let values = parameterization.shape_of([l11, l21, l22]);
                 let found = covariance(parameterization, values);
                 let scale = expected[0] + expected[2];
                 for (found, expected) in found.iter().zip(expected) {
@@ -239,8 +233,8 @@ mod tests {
         ) {
             let [xx, xy, yy] = covariance(Parameterization::Cholesky, [l11, l21, l22]);
             for parameterization in PARAMETERIZATIONS {
-                let values = from_cholesky(parameterization, [l11, l21, l22]);
-                let wide = widened(parameterization, values, variance);
+                let values = parameterization.shape_of([l11, l21, l22]);
+                let wide = parameterization.widened(values, variance);
                 let found = covariance(parameterization, wide);
                 let scale = xx + yy + variance;
                 for (found, expected) in found.iter().zip([xx + variance, xy, yy + variance]) {
@@ -252,7 +246,7 @@ mod tests {
         #[test]
         fn clamped_shapes_are_valid(values in prop::array::uniform3(any::<f32>())) {
             for parameterization in PARAMETERIZATIONS {
-                let clamped = clamped(parameterization, values, 4096.0);
+                let clamped = parameterization.clamped(values, 4096.0);
                 let cholesky = parameterization.to_cholesky(clamped);
                 let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [0.0; 4] };
                 prop_assert!(
@@ -269,7 +263,7 @@ mod tests {
         const STEP: f32 = 1e-3;
         let (l11, l21, l22) = (3.0, -1.0, 2.0);
         for parameterization in PARAMETERIZATIONS {
-            let values = from_cholesky(parameterization, [l11, l21, l22]);
+            let values = parameterization.shape_of([l11, l21, l22]);
             let frame = OwnFrame::new(parameterization, values);
             assert!(
                 frame
@@ -284,7 +278,7 @@ mod tests {
                     let (d11, d21, d22) = (step * d11, step * d21, step * d22);
                     let changed =
                         [l11 * (1.0 + d11), l21 * (1.0 + d11) + l22 * d21, l22 * (1.0 + d22)];
-                    Vec3::from(from_cholesky(parameterization, changed))
+                    Vec3::from(parameterization.shape_of(changed))
                 };
                 let expected = (at(STEP) - at(-STEP)) / (2.0 * STEP);
                 let found = frame.shape.col(column);
@@ -325,8 +319,8 @@ mod tests {
     #[test]
     fn clamping_keeps_ordinary_shapes() {
         for parameterization in PARAMETERIZATIONS {
-            let values = from_cholesky(parameterization, [3.0, -1.0, 2.0]);
-            assert_eq!(clamped(parameterization, values, 100.0), values, "{parameterization:?}");
+            let values = parameterization.shape_of([3.0, -1.0, 2.0]);
+            assert_eq!(parameterization.clamped(values, 100.0), values, "{parameterization:?}");
         }
     }
 }

@@ -29,7 +29,7 @@ fn values(
         let mut deviation = || 0.4 + 9.0 * rng.f32() * rng.f32();
         let (l11, l22) = (deviation(), deviation());
         let cholesky = [l11, 8.0 * rng.f32() - 4.0, l22];
-        let shape = parameterization::from_cholesky(parameterization, cholesky);
+        let shape = parameterization.shape_of(cholesky);
         let mut color = [0.0; 4];
         color[..channels].fill_with(|| 2.0 * rng.f32() - 1.0);
         Components { center, shape, color }
@@ -57,8 +57,7 @@ fn in_own_frame(
     parameterization: Parameterization,
 ) -> Slope {
     let by_splat = slope.gradient;
-    let (center, shape) =
-        parameterization::gradients(&by_splat.geometry, parameterization, values.shape);
+    let (center, shape) = parameterization.gradients(&by_splat.geometry, values.shape);
     let (center, shape) = OwnFrame::new(parameterization, values.shape).gradient(center, shape);
     let gradient = Components { center, shape, color: by_splat.color };
     Slope { gradient, perceptual_weight: slope.perceptual_weight }
@@ -228,7 +227,7 @@ fn gradient(
 fn a_gaussian_alone_comes_to_its_optimum() {
     for parameterization in PARAMETERIZATIONS {
         let from = |[l11, l21, l22]: [f32; 3], center: [f32; 2], color: f32| {
-            let shape = parameterization::from_cholesky(parameterization, [l11, l21, l22]);
+            let shape = parameterization.shape_of([l11, l21, l22]);
             Components { center, shape, color: [color, 0.0, 0.0, 0.0] }
         };
         let optimum = from([5.0, -2.0, 3.0], [24.0, 22.0], 0.5);

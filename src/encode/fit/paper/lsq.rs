@@ -52,7 +52,7 @@ impl LsqQuantizers {
         options: &training::Quantization,
     ) -> Self {
         let is_covariance = bounds.parameterization == Parameterization::Covariance;
-        let is_logarithmic = parameterization::is_logarithmic(bounds.parameterization);
+        let is_logarithmic = bounds.parameterization.is_logarithmic();
         // A variance is the square of a deviation.
         let power = if is_covariance { 2.0 } else { 1.0 };
         let min_logarithm = power * parameterization::MIN_DEVIATION.ln();

@@ -1,7 +1,6 @@
 //! Where the paper puts new Gaussians, and their shapes (section "Distortion Driven Densification").
 
 use crate::encode::error::Result;
-use crate::encode::fit::parameterization;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 use crate::gaussian::Parameterization;
@@ -54,15 +53,13 @@ pub(in crate::encode::fit) fn random_shape(
 ) -> [f32; 3] {
     loop {
         let mut shape = [(); 3].map(|()| rng.f32());
-        for (value, positive) in
-            shape.iter_mut().zip(parameterization::is_logarithmic(parameterization))
-        {
+        for (value, positive) in shape.iter_mut().zip(parameterization.is_logarithmic()) {
             *value += if positive { 0.5 } else { 0.0 };
         }
         if parameterization == Parameterization::RotationScale {
             shape[2] *= core::f32::consts::TAU;
         }
-        let wide = parameterization::widened(parameterization, shape, variance);
+        let wide = parameterization.widened(shape, variance);
         if wide.iter().all(|value| value.is_finite()) {
             return wide;
         }

@@ -3,7 +3,6 @@
 use super::*;
 use crate::color::ColorModel;
 use crate::encode::fit::components::Components;
-use crate::encode::fit::parameterization;
 use crate::encode::loss::plain_distortion;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
@@ -94,7 +93,7 @@ fn scene(
             let factor = Parameterization::RotationScale.to_cholesky([s1, s2, angle]);
             let shape = match parameterization {
                 Parameterization::RotationScale => [s1, s2, angle],
-                _ => parameterization::from_cholesky(parameterization, factor),
+                _ => parameterization.shape_of(factor),
             };
             let center = [rng.f32() * 45.0 - 4.0, rng.f32() * 27.0 - 3.0];
             let mut color = [0.0; 4];
@@ -123,8 +122,7 @@ fn gradients(
     run(&mut pass, &Scene { tiled, splats: &splats, kernel, base: BASE });
     let gradients = scene.iter().enumerate().map(|(index, components)| {
         let SplatGradient { geometry, color } = pass.gradient(index, tiled.channels);
-        let (center, shape) =
-            parameterization::gradients(&geometry, parameterization, components.shape);
+        let (center, shape) = parameterization.gradients(&geometry, components.shape);
         Components { center, shape, color }
     });
     gradients.collect()

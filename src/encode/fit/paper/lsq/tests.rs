@@ -28,7 +28,7 @@ fn values(parameterization: Parameterization, count: usize, seed: u64) -> Vec<Co
             let (s1, s2) = (number(-1.5, 5.0).exp(), number(-1.5, 2.0).exp());
             let factor = Parameterization::RotationScale.to_cholesky([s1, s2, number(-3.0, 3.0)]);
             let center = [number(-5.0, 305.0), number(-5.0, 205.0)];
-            let shape = parameterization::from_cholesky(parameterization, factor);
+            let shape = parameterization.shape_of(factor);
             let [c0, c1, c2] = [(); 3].map(|()| number(-0.5, 1.0));
             let color = [c0, c1, c2, 0.0];
             bounds(parameterization).clamped(Components { center, shape, color })
