@@ -61,9 +61,8 @@ impl Bled {
             Self::Eight(samples) => size_of_val(&samples[..]),
             Self::Sixteen(samples) => size_of_val(&samples[..]),
         };
-        let size = [source.width() as usize, source.height() as usize];
-        samples
-            + sizes(size).map(|[width, height]| width * height * size_of::<Cell>()).sum::<usize>()
+        let cells = sizes(source.size()).map(|[width, height]| width * height).sum::<usize>();
+        samples + cells * size_of::<Cell>()
     }
 }
 

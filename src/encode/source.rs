@@ -1,7 +1,7 @@
 //! The picture to encode.
 
 use super::error::SourceError;
-use crate::color::{ColorModel, SampleDepth};
+use crate::color::{ColorModel, SampleDepth, with_channels};
 use crate::container::MAX_SIDE;
 
 /// A picture in the caller's memory: interleaved samples, rows from the top, without padding.
@@ -79,6 +79,11 @@ impl<'a> Source<'a> {
     /// Backgrounds that the picture is judged over, where a full sample is 1.
     pub(crate) fn backgrounds(&self) -> &'static [f32] {
         if self.color.has_alpha() { &[0.0, 1.0] } else { &[0.0] }
+    }
+
+    /// Width and height in pixels.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.width as usize, self.height as usize]
     }
 
     /// Number of pixels.
@@ -162,12 +167,7 @@ fn deinterleave<T: Copy + Into<f32>>(
     channels: usize,
     planes: &mut [[f32; SPAN]; 4],
 ) {
-    match channels {
-        1 => deinterleave_of::<_, 1>(samples, planes),
-        2 => deinterleave_of::<_, 2>(samples, planes),
-        3 => deinterleave_of::<_, 3>(samples, planes),
-        _ => deinterleave_of::<_, 4>(samples, planes),
-    }
+    with_channels!(CHANNELS = channels, deinterleave_of::<_, CHANNELS>(samples, planes));
 }
 
 #[inline(always)]

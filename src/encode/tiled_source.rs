@@ -42,7 +42,7 @@ impl TiledSource {
         let bled_memory = bled.as_ref().map_or(0, |bled| bled.memory(source));
         let bled_source = bled.as_ref().map(|bled| bled.source(source));
         let source = bled_source.as_ref().unwrap_or(source);
-        let (width, height) = (source.width() as usize, source.height() as usize);
+        let [width, height] = source.size();
         let channels = source.color().channels();
         let size = [width, height, channels];
         let (planes, sums) = match source.samples() {

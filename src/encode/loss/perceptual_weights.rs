@@ -62,8 +62,7 @@ impl PerceptualWeights {
         let colors = model.channels() - usize::from(model.has_alpha());
         let shares = if colors == 1 { [1.0, 0.0, 0.0] } else { LUMA };
         let backgrounds = source.backgrounds();
-        let columns = (source.width() as usize).div_ceil(BLOCK);
-        let rows = (source.height() as usize).div_ceil(BLOCK);
+        let [columns, rows] = source.size().map(|side| side.div_ceil(BLOCK));
         let mut blocks = vec![[0.0; SCALES]; columns * rows];
         let mut means = [0.0; SCALES];
         for (scale, share) in BY_SCALE.into_iter().enumerate() {
@@ -113,7 +112,7 @@ impl PerceptualWeights {
 
     /// Size in bytes of what else [`PerceptualWeights::new`] needs.
     pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
-        let (width, height) = (source.width() as usize, source.height() as usize);
+        let [width, height] = source.size();
         let tasks = height.div_ceil(BAND * BLOCK).min(rayon::current_num_threads());
         let rows = (BAND * BLOCK + 2 * RADII[RADII.len() - 1]).min(height);
         let sums = tasks * (width + 1) * (rows + 1) * size_of::<[f64; 2]>();
@@ -168,7 +167,7 @@ impl LumaBand {
     ) -> Self {
         let side = 1 << scale;
         let most = RADII[RADII.len() - 1] / side;
-        let size = [source.width() as usize, source.height() as usize];
+        let size = source.size();
         let [width, height] = size.map(|length| length.div_ceil(side));
         let channels = source.color().channels();
         let first = (first * (BLOCK / side)).saturating_sub(most);
@@ -256,7 +255,7 @@ mod tests {
 
     /// The weights of a block before they are normalized, directly from the definition.
     fn plain(source: &Source<'_>, block: [usize; 2], scale: usize) -> f64 {
-        let [width, height] = [source.width() as usize, source.height() as usize];
+        let [width, height] = source.size();
         let side = 1 << scale;
         let luma = |x: usize, y: usize| {
             let at = (y * width + x) * 3;

@@ -29,13 +29,12 @@ impl PictureLoss {
         tune: Tune,
         observer: &mut Observer<'_>,
     ) -> Result<Self> {
-        let size = [source.width() as usize, source.height() as usize];
         let half_step = 0.5 / f32::from(source.depth().max_sample());
         let weights = match tune {
             Tune::Visual => Some(PerceptualWeights::new(source, observer)?),
             Tune::Psnr => None,
         };
-        Ok(Self { size, half_step, weights })
+        Ok(Self { size: source.size(), half_step, weights })
     }
 
     /// The perceptual weights, unless all errors count the same.

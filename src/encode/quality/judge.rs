@@ -75,8 +75,7 @@ pub(crate) struct Judge<'a> {
 
 impl<'a> Judge<'a> {
     pub(crate) fn new(source: &'a Source<'a>) -> Self {
-        let size = [source.width() as usize, source.height() as usize];
-        let level = Level::new();
+        let (size, level) = (source.size(), Level::new());
         let smooth = |&background: &f32| {
             SmoothAreas::new(&Shown { picture: source, size, background }, level)
         };
@@ -104,8 +103,7 @@ impl<'a> Judge<'a> {
 /// Size in bytes of what a judgement holds: a strip of the rendering, and rows of both pictures.
 pub(crate) fn memory(source: &Source<'_>) -> usize {
     let (width, height) = (source.width(), source.height());
-    let size = [width as usize, height as usize];
-    let scales = [Scales::of_metric(size), Scales::of_mirrored(size)];
+    let scales = [Scales::of_metric(source.size()), Scales::of_mirrored(source.size())];
     let rows = strips::rows(width, height);
     let held = scales.iter().flatten().map(|scales| scales.memory(rows)).sum::<usize>();
     strips::memory(width, height, source.color().channels()) + source.backgrounds().len() * held
@@ -133,7 +131,7 @@ struct View<'a> {
 impl<'a> Judgement<'a> {
     pub(crate) fn new(judge: &'a Judge<'a>) -> Self {
         let source = judge.source;
-        let size = [source.width() as usize, source.height() as usize];
+        let size = source.size();
         let view = |(&background, smooth)| View {
             background,
             smooth,
@@ -172,7 +170,7 @@ impl View<'_> {
     fn see(&mut self, source: &Source<'_>, strip: &Strip<'_>, level: Level) {
         let (region, background) = (strip.region, self.background);
         let (first, rows) = (region.y as usize, region.height as usize);
-        let size = [source.width() as usize, source.height() as usize];
+        let size = source.size();
         let source = Shown { picture: source, size, background };
         let rendering = Shown { picture: strip, size, background };
         let smooth = self.smooth;

@@ -117,7 +117,7 @@ pub(crate) struct Gradients {
 
 impl Gradients {
     pub(crate) fn new(source: &Source<'_>) -> Self {
-        let size = [source.width() as usize, source.height() as usize];
+        let size = source.size();
         let columns = size[0].div_ceil(AREA);
         let mut areas = vec![false; columns * size[1].div_ceil(AREA)];
         for &background in source.backgrounds() {
