@@ -205,7 +205,7 @@ impl Pass {
                     states.resize(indices.len(), TileState::ZERO);
                 }
                 let states = &mut states[..indices.len()];
-                let of_tile = tile.run(level, kernel, states, slots, &mut planes);
+                let of_tile = tile.run(level, kernel, states, Some(slots), &mut planes);
                 *by_tile = of_tile.distortion.0 as f32;
                 *error = *error + of_tile;
                 if let (Some(norm), Some(sum)) = (norm, placement_errors.get_mut(column)) {
@@ -241,7 +241,7 @@ impl Pass {
         let tile = TrainingTile::new(scene.tiled, [column, row], scene.base, &splats, &indices);
         let mut states = vec![TileState::ZERO; splats.len()];
         let mut planes = [[[0.0; TILE_WIDTH]; TILE_HEIGHT]; CHANNELS];
-        tile.residuals(*level, scene.kernel, &mut states, &mut planes);
+        tile.run(*level, scene.kernel, &mut states, None, &mut planes);
         planes.to_vec()
     }
 }

@@ -128,7 +128,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         }
     }
 
-    /// Forward pass, residuals, backward pass. Returns the error.
+    /// Forward pass, residuals, and, if there are `slots`, backward pass. Returns the error.
     ///
     /// `states` is scratch memory with one plane for each splat of the tile. The gradient sums are
     /// added to `slots`, which has [`slots_per_span`] slots for each of `splats`. `planes` receives
@@ -138,7 +138,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         level: Level,
         kernel: Kernel,
         states: &mut [TileState],
-        slots: &mut [Slot],
+        slots: Option<&mut [Slot]>,
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
         match kernel {
@@ -155,35 +155,16 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         level: Level,
         kernel: K,
         states: &mut [TileState],
-        slots: &mut [Slot],
+        slots: Option<&mut [Slot]>,
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
         dispatch!(level, simd => {
             let error = self.forward(simd, kernel, states, planes);
-            self.backward(simd, kernel, states, slots, planes);
+            if let Some(slots) = slots {
+                self.backward(simd, kernel, states, slots, planes);
+            }
             error
         })
-    }
-
-    /// The forward pass alone: what [`Self::run`] leaves in `planes`.
-    pub(super) fn residuals(
-        &self,
-        level: Level,
-        kernel: Kernel,
-        states: &mut [TileState],
-        planes: &mut [TilePlane; CHANNELS],
-    ) {
-        match kernel {
-            Kernel::Exponential { cutoff } => {
-                let kernel = simd_kernel::Exponential { cutoff };
-                dispatch!(level, simd => self.forward(simd, kernel, states, planes))
-            }
-            Kernel::Quartic => {
-                dispatch!(level, simd => {
-                    self.forward(simd, simd_kernel::Quartic, states, planes)
-                })
-            }
-        };
     }
 
     #[inline(always)]
