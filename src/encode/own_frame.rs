@@ -160,6 +160,7 @@ impl GeometryChange {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::testing::weight;
 
     /// The change from one Gaussian's geometry to that of another.
     fn between(from: &Gaussian, to: &Gaussian) -> GeometryChange {
@@ -174,21 +175,15 @@ mod tests {
         }
     }
 
-    /// What a Gaussian adds to the first channel at a point.
-    fn value(gaussian: &Gaussian, x: f64, y: f64) -> f64 {
-        let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
-        let u = (x - f64::from(gaussian.center[0])) / l11;
-        let v = (y - f64::from(gaussian.center[1]) - l21 * u) / l22;
-        f64::from(gaussian.color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
-    }
-
     /// The integral of the squared difference of two Gaussians, as a sum over fine pixels.
     fn difference(first: &Gaussian, second: &Gaussian) -> f64 {
         let steps = 400;
         let at = |step: i32| f64::from(step) / f64::from(steps) * 30.0 - 15.0;
         let pixel = (30.0 / f64::from(steps)).powi(2);
         let points = (0..steps).flat_map(|row| (0..steps).map(move |column| (at(column), at(row))));
-        points.map(|(x, y)| (value(first, x, y) - value(second, x, y)).powi(2) * pixel).sum()
+        // What a Gaussian adds to the first channel.
+        let value = |gaussian: &Gaussian, at| f64::from(gaussian.color[0]) * weight(gaussian, at);
+        points.map(|(x, y)| (value(first, [x, y]) - value(second, [x, y])).powi(2) * pixel).sum()
     }
 
     fn gaussian() -> Gaussian {

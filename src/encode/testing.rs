@@ -5,7 +5,7 @@ use super::progress::unobserved;
 use super::source::Source;
 use super::tiled_source::TiledSource;
 use crate::color::ColorModel;
-use crate::gaussian::Parameterization;
+use crate::gaussian::{Gaussian, Parameterization};
 
 pub(crate) const MODELS: [ColorModel; 4] =
     [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
@@ -22,4 +22,22 @@ pub(crate) fn source(size: [usize; 2], model: ColorModel, samples: &[u8]) -> Sou
 pub(crate) fn tiled(source: Source<'_>, tune: Tune) -> TiledSource {
     let source = source.keeping_invisible(true);
     unobserved(|observer| TiledSource::new(&source, tune, observer))
+}
+
+/// The quartic kernel of a Gaussian at a point, in f64.
+pub(crate) fn weight(gaussian: &Gaussian, [x, y]: [f64; 2]) -> f64 {
+    let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
+    let u = (x - f64::from(gaussian.center[0])) / l11;
+    let v = (y - f64::from(gaussian.center[1]) - l21 * u) / l22;
+    (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
+}
+
+/// The residual of a sample of 8 bits, clamped as the output is.
+pub(crate) fn residual(value: f32, sample: u8) -> f64 {
+    let residual = f64::from(value) - f64::from(sample) / 255.0;
+    match sample {
+        0 => residual.max(0.0),
+        255 => residual.min(0.0),
+        _ => residual,
+    }
 }

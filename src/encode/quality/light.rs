@@ -148,6 +148,12 @@ fn linear<S: Simd>(simd: S, encoded: f32x16<S>) -> f32x16<S> {
     encoded.simd_le(0.04045).select(encoded * (1.0 / 12.92), light)
 }
 
+/// The linear light of an encoded sample, directly from the definition of sRGB.
+#[cfg(test)]
+pub(super) fn plain_linear(encoded: f64) -> f64 {
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 /// The responses to linear light in the order of [`Channel`]; that of blue only if it is wanted.
 #[inline(always)]
 pub(super) fn responses<S: Simd>(
@@ -185,16 +191,17 @@ fn cube_root<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::dispatch;
+    use fearless_simd::{Level, dispatch};
 
     use super::*;
     use crate::testing::simd_levels;
 
     /// Applies a function to many numbers from 0 to 1 at every SIMD level, which must not matter.
-    fn applied(function: impl Fn(f32) -> f64, found: impl Fn(Lanes) -> Vec<Lanes>, most: f64) {
+    fn applied(function: impl Fn(f32) -> f64, found: impl Fn(Level, Lanes) -> Lanes, most: f64) {
         for first in (0..65_536).step_by(16) {
             let values: Lanes = core::array::from_fn(|lane| (first + lane) as f32 / 65_535.0);
-            let results = found(values);
+            let results = simd_levels().into_iter().map(|(_, level)| found(level, values));
+            let results: Vec<Lanes> = results.collect();
             for result in &results {
                 assert_eq!(result, &results[0], "the SIMD level matters");
             }
@@ -208,29 +215,18 @@ mod tests {
 
     #[test]
     fn light_is_that_of_srgb() {
-        let expected = |encoded: f32| {
-            let encoded = f64::from(encoded);
-            if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-        };
-        let found = |values: Lanes| {
-            let levels = simd_levels().into_iter();
-            let at_level = |level| dispatch!(level, simd => *linear(simd, f32x16::load_array(simd, values)).as_array());
-            levels.map(|(_, level)| at_level(level)).collect()
-        };
+        let expected = |encoded: f32| plain_linear(f64::from(encoded));
+        let found = |level, values: Lanes| dispatch!(level, simd => *linear(simd, f32x16::load_array(simd, values)).as_array());
         applied(expected, found, 1.2e-5);
     }
 
     #[test]
     fn responses_are_cube_roots() {
         let expected = |light: f32| f64::from(light + BIAS).cbrt();
-        let found = |values: Lanes| {
-            let levels = simd_levels().into_iter();
-            let at_level = |level| {
-                dispatch!(level, simd => {
-                    *cube_root(simd, f32x16::load_array(simd, values) + BIAS).as_array()
-                })
-            };
-            levels.map(|(_, level)| at_level(level)).collect()
+        let found = |level, values: Lanes| {
+            dispatch!(level, simd => {
+                *cube_root(simd, f32x16::load_array(simd, values) + BIAS).as_array()
+            })
         };
         applied(expected, found, 4e-7);
     }

@@ -132,6 +132,7 @@ mod tests {
 
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::quality::light::plain_linear;
     use crate::encode::quality::rows::{Border, Rows};
     use crate::encode::testing::source;
     use crate::testing::simd_levels;
@@ -173,14 +174,7 @@ mod tests {
             let mut rng = fastrand::Rng::with_seed(3);
             let samples: Vec<u8> = (0..size[0] * size[1] * 3).map(|_| rng.u8(..)).collect();
             let source = source(size, ColorModel::Rgb, &samples);
-            let linear = |sample: u8| {
-                let encoded = f64::from(sample) / 255.0;
-                if encoded <= 0.04045 {
-                    encoded / 12.92
-                } else {
-                    ((encoded + 0.055) / 1.055).powf(2.4)
-                }
-            };
+            let linear = |sample: u8| plain_linear(f64::from(sample) / 255.0);
             let [width, height] = size;
             let pixels = samples.chunks_exact(3);
             let light: Vec<[f64; 3]> =

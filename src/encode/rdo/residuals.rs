@@ -346,7 +346,7 @@ mod tests {
     use crate::encode::loss::plain_distortion;
     use crate::encode::options::Tune;
     use crate::encode::progress::unobserved;
-    use crate::encode::testing::{MODELS, source, tiled};
+    use crate::encode::testing::{self, MODELS, source, tiled};
 
     #[test]
     fn shifted_residuals_have_the_gradient_of_the_distortion() {
@@ -366,12 +366,7 @@ mod tests {
             let mut plain: Vec<f64> = (0..samples.len())
                 .map(|at| {
                     let value = rendering[at % channels * width * height + at / channels];
-                    let residual = f64::from(value) - f64::from(samples[at]) / 255.0;
-                    match samples[at] {
-                        0 => residual.max(0.0),
-                        255 => residual.min(0.0),
-                        _ => residual,
-                    }
+                    testing::residual(value, samples[at])
                 })
                 .collect();
             for at in 0..plain.len() {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::encode::fit::parameterization::OwnFrame;
 use crate::encode::loss::Distortion;
+use crate::encode::testing::weight;
 use crate::gaussian::{Gaussian, component_count};
 use crate::testing::simd_levels;
 
@@ -186,15 +187,12 @@ fn step_alone(
 
 /// The quartic kernel of a Gaussian at all pixels.
 fn rendering(components: &Components, parameterization: Parameterization) -> Vec<f64> {
-    let Gaussian { center, cholesky, color } = components.gaussian(parameterization);
-    let [l11, l21, l22] = cholesky.map(f64::from);
+    let gaussian = components.gaussian(parameterization);
     let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
     pixels
         .map(|(x, y)| {
-            let at = |pixel: i32| (f64::from(pixel) + 0.5) / f64::from(DENSITY);
-            let u = (at(x) - f64::from(center[0])) / l11;
-            let v = (at(y) - f64::from(center[1]) - l21 * u) / l22;
-            f64::from(color[0]) * (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
+            let at = [x, y].map(|pixel| (f64::from(pixel) + 0.5) / f64::from(DENSITY));
+            f64::from(gaussian.color[0]) * weight(&gaussian, at)
         })
         .collect()
 }

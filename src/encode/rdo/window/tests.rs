@@ -5,7 +5,7 @@ use crate::color::ColorModel;
 use crate::encode::options::Tune;
 use crate::encode::progress::unobserved;
 use crate::encode::rdo::residuals::Residuals;
-use crate::encode::testing::{self, MODELS, tiled};
+use crate::encode::testing::{self, MODELS, residual, tiled};
 use crate::encode::tiled_source::TiledSource;
 
 // The window of a Gaussian that covers all is shared by threads.
@@ -28,13 +28,8 @@ fn scene(model: ColorModel, clamped: bool) -> Scene {
     let mut random = fastrand::Rng::with_seed(3);
     let mut source: Vec<u8> = (0..WIDTH * HEIGHT * channels)
         .map(|_| match random.u8(..) {
-            value @ (0..40 | 216..) if clamped => {
-                if value < 40 {
-                    0
-                } else {
-                    255
-                }
-            }
+            0..40 if clamped => 0,
+            216.. if clamped => 255,
             value => value.clamp(1, 254),
         })
         .collect();
@@ -64,13 +59,9 @@ fn gaussians_kept_or_not() -> impl Iterator<Item = (Gaussian, usize)> {
     gaussians().into_iter().flat_map(|gaussian| [(gaussian, MOST_KEPT), (gaussian, 0)])
 }
 
-/// The quartic kernel of a Gaussian at a pixel, in f64.
+/// The quartic kernel of a Gaussian at a pixel.
 fn plain_weight(gaussian: &Gaussian, pixel: usize) -> f64 {
-    let [l11, l21, l22] = gaussian.cholesky.map(f64::from);
-    let (x, y) = (pixel % WIDTH, pixel / WIDTH);
-    let u = (x as f64 + 0.5 - f64::from(gaussian.center[0])) / l11;
-    let v = (y as f64 + 0.5 - f64::from(gaussian.center[1]) - l21 * u) / l22;
-    (1.0 - (u * u + v * v) / 4.0).max(0.0).powi(2)
+    testing::weight(gaussian, [pixel % WIDTH, pixel / WIDTH].map(|at| at as f64 + 0.5))
 }
 
 /// The residuals in f64 with a Gaussian, times `factor`, added to the rendering after it was clamped, in
@@ -80,13 +71,7 @@ fn plain_residuals(scene: &Scene, gaussian: &Gaussian, factor: f64) -> Vec<f64> 
     let samples = scene.source.iter().enumerate();
     let residuals = samples.map(|(at, &sample)| {
         let (pixel, channel) = (at / channels, at % channels);
-        let value = f64::from(scene.rendering[channel * WIDTH * HEIGHT + pixel]);
-        let residual = value - f64::from(sample) / 255.0;
-        let clamped = match sample {
-            0 => residual.max(0.0),
-            255 => residual.min(0.0),
-            _ => residual,
-        };
+        let clamped = residual(scene.rendering[channel * WIDTH * HEIGHT + pixel], sample);
         clamped + factor * plain_weight(gaussian, pixel) * f64::from(gaussian.color[channel])
     });
     residuals.collect()
