@@ -5,6 +5,7 @@
 //! Training renders exactly what the file will hold: the values pass through the same quantizers
 //! that the file stores, and are decoded by the same function that the decoder calls.
 
+use core::ops::Range;
 use std::sync::Arc;
 
 use super::ranges::{MIN_SCALE, covering, least_error_range, range};
@@ -12,16 +13,15 @@ use super::vector_quantizer::VectorQuantizer;
 use crate::coding::packed::{MAX_PARAMETER, Quantizer, UniformQuantizer};
 use crate::encode::fit::components::{Bounds, Components};
 use crate::encode::fit::{parameterization, training};
-use crate::gaussian::{MAX_COMPONENTS, Parameterization, component_count};
+use crate::gaussian::{CENTER, MAX_COMPONENTS, Parameterization, SHAPE, component_count};
 
 /// The quantizers of all components during training.
 #[derive(Clone, Debug)]
 pub(crate) struct LsqQuantizers {
     /// There is none where something else takes the place of LSQ+.
     components: Vec<Option<LsqQuantizer>>,
-    /// What takes the place of LSQ+.
-    center: Option<Arc<dyn VectorQuantizer>>,
-    color: Option<Arc<dyn VectorQuantizer>>,
+    /// What takes the place of LSQ+, with the components that it quantizes.
+    others: Vec<(Range<usize>, Arc<dyn VectorQuantizer>)>,
     bounds: Bounds,
     /// Steps of Adam so far.
     age: i32,
@@ -88,13 +88,11 @@ impl LsqQuantizers {
             component.clamp();
             Some(component)
         });
-        let mut quantizers = Self {
-            components: components.collect(),
-            center: options.center.clone(),
-            color: options.color.clone(),
-            bounds,
-            age: 0,
-        };
+        let center = options.center.clone().map(|other| (CENTER, other));
+        let color = SHAPE.end..component_count(bounds.channels);
+        let color = options.color.clone().map(|other| (color, other));
+        let others = center.into_iter().chain(color).collect();
+        let mut quantizers = Self { components: components.collect(), others, bounds, age: 0 };
         quantizers.adapt(values);
         quantizers
     }
@@ -107,17 +105,12 @@ impl LsqQuantizers {
     /// The codes of a Gaussian. If rounding makes a covariance invalid, the code of its
     /// off-diagonal entry moves towards that of 0 until the covariance is valid.
     pub(crate) fn codes(&self, values: &Components) -> Components<u32> {
-        let mut values = *values;
-        if let Some(quantizer) = &self.center {
-            quantizer.quantize(&mut values.center);
-        }
-        if let Some(quantizer) = &self.color {
-            quantizer.quantize(&mut values.color[..self.bounds.channels]);
+        let mut values = values.to_array();
+        for (range, other) in &self.others {
+            other.quantize(&mut values[range.clone()]);
         }
         let mut codes = [0; MAX_COMPONENTS];
-        for ((code, value), component) in
-            codes.iter_mut().zip(values.to_array()).zip(&self.components)
-        {
+        for ((code, value), component) in codes.iter_mut().zip(values).zip(&self.components) {
             *code = component.as_ref().map_or(value.to_bits(), |component| component.code(value));
         }
         let mut codes = Components::from_array(codes);
@@ -164,16 +157,12 @@ impl LsqQuantizers {
         decoded: &Components,
         by_value: &mut Components,
     ) -> QuantizerGradients {
-        if let Some(quantizer) = &self.center {
-            quantizer.add_gradient(&trained.center, &mut by_value.center);
-        }
-        if let Some(quantizer) = &self.color {
-            let channels = ..self.bounds.channels;
-            quantizer.add_gradient(&trained.color[channels], &mut by_value.color[channels]);
-        }
         let mut by_quantizer = [[0.0; 2]; MAX_COMPONENTS];
         let mut gradient = by_value.to_array();
         let [trained, decoded] = [trained, decoded].map(|values| values.to_array());
+        for (range, other) in &self.others {
+            other.add_gradient(&trained[range.clone()], &mut gradient[range.clone()]);
+        }
         for (index, component) in self.components.iter().enumerate() {
             let Some(component) = component else { continue };
             let UniformQuantizer { scale, offset, .. } = component.quantizer;
@@ -220,14 +209,10 @@ impl LsqQuantizers {
     }
 
     fn adapt(&mut self, values: &[Components]) {
-        if let Some(quantizer) = &mut self.center {
-            let centers: Vec<&[f32]> = values.iter().map(|values| &values.center[..]).collect();
-            *quantizer = quantizer.adapted(&centers);
-        }
-        if let Some(quantizer) = &mut self.color {
-            let channels = ..self.bounds.channels;
-            let colors: Vec<&[f32]> = values.iter().map(|values| &values.color[channels]).collect();
-            *quantizer = quantizer.adapted(&colors);
+        for (range, other) in &mut self.others {
+            let values: Vec<_> = values.iter().map(|values| values.to_array()).collect();
+            let values: Vec<_> = values.iter().map(|values| &values[range.clone()]).collect();
+            *other = other.adapted(&values);
         }
     }
 

@@ -5,7 +5,6 @@ use proptest::prelude::*;
 use super::*;
 use crate::encode::fit::training::Training;
 use crate::encode::testing::PARAMETERIZATIONS;
-use crate::gaussian::SHAPE;
 use crate::testing::config;
 
 impl LsqQuantizers {
