@@ -48,11 +48,9 @@ struct TileErrors {
 impl TileErrors {
     /// The negative residuals at a pixel of the tile; 0 for absent channels.
     fn missing(&self, x: usize, y: usize) -> [f32; 4] {
-        let mut missing = [0.0; 4];
-        for (value, plane) in missing.iter_mut().zip(&self.residuals) {
-            *value = -plane[y][x];
-        }
-        missing
+        core::array::from_fn(|channel| {
+            self.residuals.get(channel).map_or(0.0, |plane| -plane[y][x])
+        })
     }
 }
 
@@ -102,24 +100,6 @@ impl Densifier<'_> {
         Ok(positions.iter().map(|at| self.new_gaussian(at, variance, rng)).collect())
     }
 
-    /// Column and row of the pixel at a position.
-    fn pixel(&self, position: &NewPosition) -> (usize, usize) {
-        let (pixel, width) = (position.pixel as usize, self.scene.tiled.width);
-        (pixel % width, pixel / width)
-    }
-
-    /// The colour of a new Gaussian.
-    fn color(&self, position: &NewPosition) -> [f32; 4] {
-        match self.options.color {
-            NewColor::Zero => [0.0; 4],
-            NewColor::Residual(share) => {
-                let (x, y) = self.pixel(position);
-                let weight = self.scene.tiled.loss.weight_at(x, y);
-                position.missing.map(|missing| share * missing / weight)
-            }
-        }
-    }
-
     /// A new Gaussian, where `variance` is the filter's.
     fn new_gaussian(
         &self,
@@ -128,14 +108,22 @@ impl Densifier<'_> {
         rng: &mut fastrand::Rng,
     ) -> Components {
         let variance = variance * position.variance_share;
-        let (x, y) = self.pixel(position);
+        let tiled = self.scene.tiled;
+        let (x, y) = (position.pixel as usize % tiled.width, position.pixel as usize / tiled.width);
         let parameterization = self.bounds.parameterization;
         let shape = match self.options.shape {
             NewShape::Point => parameterization.shape_of([variance.sqrt(), 0.0, variance.sqrt()]),
             NewShape::Random => paper::random_shape(parameterization, variance, rng),
         };
         let center = [x as f32 + 0.5, y as f32 + 0.5];
-        self.bounds.clamped(Components { center, shape, color: self.color(position) })
+        let color = match self.options.color {
+            NewColor::Zero => [0.0; 4],
+            NewColor::Residual(share) => {
+                let weight = tiled.loss.weight_at(x, y);
+                position.missing.map(|missing| share * missing / weight)
+            }
+        };
+        self.bounds.clamped(Components { center, shape, color })
     }
 
     /// Numbers of columns and rows of tiles.
