@@ -111,6 +111,14 @@ fn splats_of(scene: &[Components], parameterization: Parameterization) -> Vec<Sp
     scene.iter().map(splat).collect()
 }
 
+/// The samples of a picture of noise, and splats.
+fn noise_and_splats(seed: u64) -> (Vec<u8>, Vec<Splat>) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let samples = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+    let scene = scene(Parameterization::Cholesky, 3, &mut rng);
+    (samples, splats_of(&scene, Parameterization::Cholesky))
+}
+
 fn gradients(
     scene: &[Components],
     parameterization: Parameterization,
@@ -174,11 +182,8 @@ fn every_gradient_equals_its_finite_difference() {
 
 #[test]
 fn every_simd_level_gives_the_same_bits() {
-    let mut rng = fastrand::Rng::with_seed(2);
-    let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+    let (samples, splats) = noise_and_splats(2);
     let source = source([WIDTH, HEIGHT], ColorModel::Rgb, &samples);
-    let scene = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats = splats_of(&scene, Parameterization::Cholesky);
     let run = |level, tiled: &TiledSource| {
         let mut pass = Pass { level, ..Pass::new(tiled) };
         let kernel = Kernel::Quartic;
@@ -227,11 +232,8 @@ fn pixels_outside_the_picture_and_values_above_white_are_no_error() {
 
 #[test]
 fn measured_placement_errors_are_those_of_the_tiles_rendered_again() {
-    let mut rng = fastrand::Rng::with_seed(3);
-    let samples: Vec<u8> = (0..WIDTH * HEIGHT * 3).map(|_| rng.u8(..)).collect();
+    let (samples, splats) = noise_and_splats(3);
     let source = source([WIDTH, HEIGHT], ColorModel::Rgb, &samples);
-    let scene = scene(Parameterization::Cholesky, 3, &mut rng);
-    let splats = splats_of(&scene, Parameterization::Cholesky);
     for tune in [Tune::Visual, Tune::Psnr] {
         let tiled = tiled(source, tune);
         let scene = Scene { tiled: &tiled, splats: &splats, kernel: Kernel::Quartic, base: BASE };
