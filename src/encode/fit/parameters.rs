@@ -79,8 +79,8 @@ impl Parameters {
     }
 
     /// Takes one step against the gradients, where `factor` scales all learning rates; Adam does without
-    /// the rate term. `splats`, unless
-    /// it is empty, becomes those of the new values. Returns the gradient by the quantizers.
+    /// the rate term. `splats`, unless it is empty, becomes those of the new values. Returns the gradient by
+    /// the quantizers.
     pub(crate) fn step(
         &mut self,
         backward: &Backward<'_>,
