@@ -144,46 +144,62 @@ impl Step<'_> {
         splats: &mut [Splat],
         mut slope: impl FnMut(usize, &Components) -> Slope<G>,
     ) {
-        let parameterization = self.bounds.parameterization;
         dispatch!(level, simd => {
-            let blocks = values.chunks_mut(LANES).zip(states.chunks_mut(LANES)).enumerate();
-            for (block, (values, states)) in blocks {
-                let first = block * LANES;
-                let mut slopes = [Slope { gradient: G::default(), perceptual_weight: 1.0 }; LANES];
-                let mut of_lanes = [values[0]; LANES];
-                let mut states_of_lanes = [State::NEW; LANES];
-                for lane in 0..values.len() {
-                    slopes[lane] = slope(first + lane, &values[lane]);
-                    of_lanes[lane] = values[lane];
-                    of_lanes[lane].shape = parameterization.to_cholesky(values[lane].shape);
-                    states_of_lanes[lane] = states[lane];
-                }
-                let made = self.step(simd, &mut of_lanes, &mut states_of_lanes, &slopes);
-                for lane in 0..values.len() {
-                    values[lane] = self.trained(of_lanes[lane]);
-                    states[lane] = states_of_lanes[lane];
-                }
-                if let Some(splats) = splats.get_mut(first..first + values.len()) {
-                    if parameterization == Parameterization::Cholesky {
-                        splats.copy_from_slice(&made[..values.len()]);
-                    } else {
-                        for lane in 0..values.len() {
-                            splats[lane] = values[lane].splat(parameterization);
-                        }
-                    }
-                }
+            let (blocks, rest) = values.as_chunks_mut::<LANES>();
+            let (state_blocks, rest_states) = states.as_chunks_mut::<LANES>();
+            let count = blocks.len() * LANES;
+            for (block, (values, states)) in blocks.iter_mut().zip(state_blocks).enumerate() {
+                let splats = splats.get_mut(block * LANES..(block + 1) * LANES);
+                let slope = |lane, values: &_| slope(block * LANES + lane, values);
+                self.block(simd, values, states, LANES, splats, slope);
+            }
+            if let Some(&any) = rest.first() {
+                let (mut values, mut states) = ([any; LANES], [State::NEW; LANES]);
+                values[..rest.len()].copy_from_slice(rest);
+                states[..rest.len()].copy_from_slice(rest_states);
+                let splats = splats.get_mut(count..count + rest.len());
+                let slope = |lane, values: &_| slope(count + lane, values);
+                self.block(simd, &mut values, &mut states, rest.len(), splats, slope);
+                rest.copy_from_slice(&values[..rest.len()]);
+                rest_states.copy_from_slice(&states[..rest.len()]);
             }
         });
     }
 
-    /// The trained values of a Gaussian whose shape is its Cholesky factor, and clamped.
+    /// [`Self::run`] for sixteen Gaussians, of which the first `count` are there.
     #[inline(always)]
-    fn trained(&self, values: Components) -> Components {
-        match self.bounds.parameterization {
-            Parameterization::Cholesky => values,
-            other => {
-                let shape = other.shape_of(values.shape);
-                self.bounds.clamped(Components { shape, ..values })
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn block<S: Simd, G: Gradient>(
+        &self,
+        simd: S,
+        values: &mut [Components; LANES],
+        states: &mut [State; LANES],
+        count: usize,
+        splats: Option<&mut [Splat]>,
+        mut slope: impl FnMut(usize, &Components) -> Slope<G>,
+    ) {
+        let parameterization = self.bounds.parameterization;
+        let is_cholesky = parameterization == Parameterization::Cholesky;
+        let mut slopes = [Slope { gradient: G::default(), perceptual_weight: 1.0 }; LANES];
+        for lane in 0..count {
+            slopes[lane] = slope(lane, &values[lane]);
+        }
+        if !is_cholesky {
+            for lane in 0..LANES {
+                values[lane].shape = parameterization.to_cholesky(values[lane].shape);
+            }
+        }
+        let made = self.step(simd, values, states, &slopes);
+        if !is_cholesky {
+            for lane in 0..LANES {
+                let shape = parameterization.shape_of(values[lane].shape);
+                values[lane] = self.bounds.clamped(Components { shape, ..values[lane] });
+            }
+        }
+        if let Some(splats) = splats {
+            for lane in 0..splats.len() {
+                let of_values = || values[lane].splat(parameterization);
+                splats[lane] = if is_cholesky { made[lane] } else { of_values() };
             }
         }
     }
