@@ -1,7 +1,8 @@
 //! Header, metadata and statistics as plain objects, which can be sent between threads.
 
 use image_gip::{
-    Coding, ColorModel, Header, Kernel, QuantizationSteps, Metadata, Parameterization, StreamDecoder,
+    Coding, ColorModel, Header, Kernel, Metadata, Parameterization, QuantizationSteps,
+    StreamDecoder,
 };
 use js_sys::{Array, Float64Array, Object, Reflect, Uint8Array};
 use wasm_bindgen::prelude::*;
