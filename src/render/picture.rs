@@ -17,9 +17,9 @@ use crate::region::Region;
 /// A picture that can be rendered: a header and the Gaussians that have arrived.
 ///
 /// Rendering evaluates the sum of the Gaussians at the centres of pixels: those of the output, at
-/// the stored size or a larger one, or those that a smaller output is averaged from, for the whole picture or a region, with all Gaussians or only the
-/// first ones. The samples are specified bit for bit (spec, section 9): they depend neither on the
-/// machine nor on SIMD or threads.
+/// the stored size or a larger one, or those that a smaller output is averaged from, for the whole
+/// picture or a region, with all Gaussians or only the first ones. The samples are specified bit for
+/// bit (spec, section 9): they depend neither on the machine nor on SIMD or threads.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture<'a> {
     header: &'a Header,
@@ -114,8 +114,8 @@ impl<'a> Picture<'a> {
     }
 
     /// Renders as [`Picture::render_planes`], but strip by strip from the top, each in the memory of the
-    /// last one. At the stored size, strips have `bands` times [`BAND_HEIGHT`] rows, except the last one. Every strip is
-    /// shown to `visit` with its place in the region, until that returns an error.
+    /// last one. At the stored size, strips have `bands` times [`BAND_HEIGHT`] rows, except the last one.
+    /// Every strip is shown to `visit` with its place in the region, until that returns an error.
     ///
     /// # Errors
     /// That of `visit`.

@@ -99,8 +99,8 @@ impl Pass {
         self.slots = Vec::new();
     }
 
-    /// Renders the splats, which [`Pass::bin`] must have binned, and computes residuals and gradients. Returns the error of the rendering. Measures the placement
-    /// errors of tiles if their norm is given.
+    /// Renders the splats, which [`Pass::bin`] must have binned, and computes residuals and gradients. Returns
+    /// the error of the rendering. Measures the placement errors of tiles if their norm is given.
     pub(crate) fn run(
         &mut self,
         scene: &Scene<'_>,

@@ -44,8 +44,8 @@ fn largest(count: usize, map: &[f32]) -> Vec<u32> {
     order
 }
 
-/// [`NewShape::Random`](crate::training::NewShape::Random): random shape values, plus the filter's variance. In the paper's
-/// parameterization, not every draw is a covariance; an invalid one is drawn again.
+/// [`NewShape::Random`](crate::training::NewShape::Random): random shape values, plus the filter's
+/// variance. In the paper's parameterization, not every draw is a covariance; an invalid one is drawn again.
 pub(in crate::encode::fit) fn random_shape(
     parameterization: Parameterization,
     variance: f32,
