@@ -26,7 +26,7 @@ impl Fit<'_> {
     }
 
     /// The bits of a component on average, if the picture has this distortion.
-    pub(super) fn component_bits(&self, distortion: Distortion) -> f64 {
+    fn component_bits(&self, distortion: Distortion) -> f64 {
         if self.len() == 0 {
             return rate_model::USUAL_COMPONENT_BITS;
         }

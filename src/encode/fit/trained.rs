@@ -57,7 +57,7 @@ pub(crate) struct Fit<'a> {
     /// The quantizers, once quantization-aware training has started.
     pub(super) quantizers: Option<LsqQuantizers>,
     /// The squared error before quantization started; 0 without it.
-    pub(super) float_error: SquaredError,
+    float_error: SquaredError,
     /// The state of least error since Gaussians were last added or removed.
     pub(super) best: Option<Checkpoint>,
     pub(super) pass: Pass,
@@ -66,7 +66,7 @@ pub(crate) struct Fit<'a> {
     /// The splats of the last pass; after a step, those of the next one if `has_splats`.
     pub(super) splats: Vec<Splat>,
     /// Whether `splats` are those of the present values.
-    pub(super) has_splats: bool,
+    has_splats: bool,
     /// The error of the last pass.
     pub(super) error: RenderingError,
     pub(super) work: Work,
@@ -184,7 +184,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Sets the splats to those of the present values.
-    pub(super) fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<()> {
+    fn make_splats(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         let (parameterization, quantizers) = (self.bounds.parameterization, &self.quantizers);
         reset(&mut self.splats, self.parameters.len(), Splat::NOWHERE);
         let items = self.parameters.values.iter().zip(&mut self.splats);

@@ -131,7 +131,7 @@ impl Fit<'_> {
 
     /// Ends training: renders the values of the last step, keeps them if they are the best, and
     /// frees memory.
-    pub(super) fn settle(&mut self, observer: &mut Observer<'_>) -> Result<()> {
+    fn settle(&mut self, observer: &mut Observer<'_>) -> Result<()> {
         self.binned_for = 0;
         self.forward(Next::Pass, observer)?;
         self.keep_if_best();
