@@ -10,19 +10,21 @@ use crate::table::{decibels, from_decibels, mean};
 pub(crate) enum Metric {
     Ssimulacra2,
     Butteraugli,
+    Cvvdp,
     MsSsim,
     Psnr,
 }
 
 impl Metric {
     /// In the order of the report: the nearer to what people see, the earlier.
-    pub(crate) const ALL: [Self; 4] =
-        [Self::Ssimulacra2, Self::Butteraugli, Self::MsSsim, Self::Psnr];
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Ssimulacra2, Self::Butteraugli, Self::Cvvdp, Self::MsSsim, Self::Psnr];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Ssimulacra2 => "SSIMULACRA2",
             Self::Butteraugli => "Butteraugli",
+            Self::Cvvdp => "CVVDP",
             Self::MsSsim => "MS-SSIM",
             Self::Psnr => "PSNR",
         }
@@ -33,6 +35,7 @@ impl Metric {
         match self {
             Self::Ssimulacra2 => "SSIMULACRA2",
             Self::Butteraugli => "Butteraugli, 3-norm",
+            Self::Cvvdp => "CVVDP in JOD",
             Self::MsSsim => "MS-SSIM in dB",
             Self::Psnr => "PSNR in dB",
         }
@@ -48,6 +51,7 @@ impl Metric {
         match self {
             Self::Ssimulacra2 => distortion.ssimulacra2,
             Self::Butteraugli => -distortion.butteraugli,
+            Self::Cvvdp => distortion.cvvdp,
             Self::MsSsim => decibels(distortion.ms_ssim),
             Self::Psnr => distortion.psnr,
         }
@@ -73,7 +77,7 @@ impl Metric {
             Self::Ssimulacra2 => format!("{shown:.1}"),
             Self::Butteraugli => format!("{shown:.3}"),
             Self::MsSsim => format!("{:.4} ({shown:.2})", from_decibels(shown)),
-            Self::Psnr => format!("{shown:.2}"),
+            Self::Cvvdp | Self::Psnr => format!("{shown:.2}"),
         }
     }
 }
@@ -84,12 +88,12 @@ mod tests {
 
     #[test]
     fn better_pictures_have_higher_levels() {
-        let good = Distortion { psnr: 40.0, ms_ssim: 0.99, ssimulacra2: 90.0, butteraugli: 0.5 };
-        let bad = Distortion { psnr: 30.0, ms_ssim: 0.9, ssimulacra2: -9.0, butteraugli: 3.0 };
+        let good = Distortion::from([40.0, 0.99, 90.0, 0.5, 9.5]);
+        let bad = Distortion::from([30.0, 0.9, -9.0, 3.0, 7.0]);
         let levels = |of: &Distortion| Metric::ALL.map(|metric| metric.level(of));
         assert!(levels(&good).iter().zip(levels(&bad)).all(|(good, bad)| *good > bad));
         let cells = Metric::ALL.map(|metric| metric.cell(metric.level(&good)));
-        assert_eq!(cells, ["90.0", "0.500", "0.9900 (20.00)", "40.00"]);
+        assert_eq!(cells, ["90.0", "0.500", "9.50", "0.9900 (20.00)", "40.00"]);
     }
 
     #[test]

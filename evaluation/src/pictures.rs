@@ -36,21 +36,23 @@ pub(crate) struct Distortion {
     pub(crate) ssimulacra2: f64,
     /// Butteraugli's 3-norm.
     pub(crate) butteraugli: f64,
+    /// In JOD.
+    pub(crate) cvvdp: f64,
 }
 
 impl Distortion {
     /// What CSV files call the values.
-    pub(crate) const COLUMNS: [&str; 4] = ["psnr", "msssim", "ssimulacra2", "butteraugli"];
+    pub(crate) const COLUMNS: [&str; 5] = ["psnr", "msssim", "ssimulacra2", "butteraugli", "cvvdp"];
 
     /// In the order of [`Self::COLUMNS`].
-    pub(crate) fn values(&self) -> [f64; 4] {
-        [self.psnr, self.ms_ssim, self.ssimulacra2, self.butteraugli]
+    pub(crate) fn values(&self) -> [f64; 5] {
+        [self.psnr, self.ms_ssim, self.ssimulacra2, self.butteraugli, self.cvvdp]
     }
 }
 
-impl From<[f64; 4]> for Distortion {
-    fn from([psnr, ms_ssim, ssimulacra2, butteraugli]: [f64; 4]) -> Self {
-        Self { psnr, ms_ssim, ssimulacra2, butteraugli }
+impl From<[f64; 5]> for Distortion {
+    fn from([psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp]: [f64; 5]) -> Self {
+        Self { psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp }
     }
 }
 
@@ -77,6 +79,7 @@ impl TestPicture {
             ms_ssim: metrics::ms_ssim(&self.rgb, decoded, width as usize, 3, 255.0),
             ssimulacra2: visual::ssimulacra2(&self.rgb, decoded, width, height)?,
             butteraugli: visual::butteraugli_3_norm(&self.rgb, decoded, width, height)?,
+            cvvdp: visual::cvvdp(&self.rgb, decoded, width, height)?,
         })
     }
 

@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn the_worst_picture_is_the_furthest_from_the_mean() {
         let file = |name: &str, ssimulacra2: f64| {
-            let distortion = Distortion { psnr: 30.0, ms_ssim: 0.9, ssimulacra2, butteraugli: 1.0 };
+            let distortion = Distortion::from([30.0, 0.9, ssimulacra2, 1.0, 8.0]);
             (name.to_owned(), Point { bytes: 1.0, rate: 0.5, distortion })
         };
         let near = vec![file("a", 49.0), file("b", 51.0), file("c", 53.0)];

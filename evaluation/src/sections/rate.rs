@@ -76,6 +76,8 @@ fn introduction() -> String {
         "Compared with: {DESCRIPTION} Ours ({}) is asked for: {}. SSIMULACRA2 is 100 for equal pictures; 90 \
          is hard to tell from the source, 70 is high quality, 50 medium, 30 low. Butteraugli is \
          its 3-norm at 80 nits: lower is better. Both equal what the tools of libjxl 0.11 print. \
+         CVVDP is ColorVideoVDP for a monitor of 24 inches at 60 cm (standard_fhd), in JOD: 10 for \
+         equal pictures; of two that are 1 apart, three in four people choose the one with more. \
          BD-rate is from {} to {} bits per pixel: how much larger (+) or smaller (-) our files are \
          at equal quality.\n",
         ours.join(", "),

@@ -20,12 +20,12 @@ pub(super) struct Point {
 
 /// The measurements of files that any section has needed so far.
 #[derive(Debug)]
-pub(super) struct RateStore(Store<3, 6>);
+pub(super) struct RateStore(Store<3, 7>);
 
 impl RateStore {
     pub(super) fn open(bench: &Bench) -> Result<Self> {
-        let [psnr, ms_ssim, ssimulacra2, butteraugli] = Distortion::COLUMNS;
-        let values = ["bytes", "bpp", psnr, ms_ssim, ssimulacra2, butteraugli];
+        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
+        let values = ["bytes", "bpp", psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp];
         Ok(Self(bench.store("rate.csv", ["codec", "quality", "image"], values)?))
     }
 
@@ -66,8 +66,8 @@ impl RateStore {
     ) -> Result<Point> {
         let values = self.0.get(version, key, || {
             let (bytes, rate, distortion) = measure()?;
-            let [psnr, ms_ssim, ssimulacra2, butteraugli] = distortion.values();
-            Ok([bytes, rate, psnr, ms_ssim, ssimulacra2, butteraugli])
+            let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = distortion.values();
+            Ok([bytes, rate, psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp])
         })?;
         let [bytes, rate, distortion @ ..] = values;
         Ok(Point { bytes, rate, distortion: Distortion::from(distortion) })

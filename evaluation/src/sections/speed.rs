@@ -69,7 +69,7 @@ struct CodecRow {
     setting: String,
     rate: f64,
     /// In the order of [`Metric::ALL`].
-    levels: [f64; 4],
+    levels: [f64; 5],
     /// Seconds with one thread and with all.
     encode: [f64; 2],
     decode: [f64; 2],
@@ -91,7 +91,7 @@ fn pictures(bench: &Bench) -> Vec<TestPicture> {
 }
 
 fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
-    let [psnr, ms_ssim, ssimulacra2, butteraugli] = Distortion::COLUMNS;
+    let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
     let mut store = bench.store(
         "speed.csv",
         ["codec", "quality", "threads", "image"],
@@ -102,6 +102,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
             ms_ssim,
             ssimulacra2,
             butteraugli,
+            cvvdp,
             "encode_seconds",
             "decode_seconds",
         ],
@@ -159,9 +160,9 @@ fn values(
     bytes: f64,
     distortion: &Distortion,
     [encode, decode]: [f64; 2],
-) -> [f64; 8] {
-    let [psnr, ms_ssim, ssimulacra2, butteraugli] = distortion.values();
-    [bytes, picture.rate(bytes), psnr, ms_ssim, ssimulacra2, butteraugli, encode, decode]
+) -> [f64; 9] {
+    let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = distortion.values();
+    [bytes, picture.rate(bytes), psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp, encode, decode]
 }
 
 /// Means over the pictures. `get` measures one with a number of threads.
@@ -169,19 +170,19 @@ fn row(
     codec: &'static str,
     setting: &str,
     pictures: &[TestPicture],
-    mut get: impl FnMut(usize, Threads) -> Result<[f64; 8]>,
+    mut get: impl FnMut(usize, Threads) -> Result<[f64; 9]>,
 ) -> Result<CodecRow> {
-    let mut all = |threads| -> Result<Vec<[f64; 8]>> {
+    let mut all = |threads| -> Result<Vec<[f64; 9]>> {
         (0..pictures.len()).map(|picture| get(picture, threads)).collect()
     };
     let (one, pool) = (all(Threads::One)?, all(Threads::Pool)?);
-    let of = |all: &[[f64; 8]], column: usize| {
+    let of = |all: &[[f64; 9]], column: usize| {
         mean(all.iter().map(|values| values[column])).unwrap_or(f64::NAN)
     };
     let level = |metric: Metric| {
-        let levels = one.iter().map(|&[_, _, psnr, ms_ssim, ssimulacra2, butteraugli, _, _]| {
-            metric.level(&Distortion::from([psnr, ms_ssim, ssimulacra2, butteraugli]))
-        });
+        let levels = one
+            .iter()
+            .map(|&[_, _, distortion @ .., _, _]| metric.level(&Distortion::from(distortion)));
         metric.mean(levels).unwrap_or(f64::NAN)
     };
     Ok(CodecRow {
@@ -189,8 +190,8 @@ fn row(
         setting: setting.to_owned(),
         rate: of(&one, 1),
         levels: Metric::ALL.map(level),
-        encode: [of(&one, 6), of(&pool, 6)],
-        decode: [of(&one, 7), of(&pool, 7)],
+        encode: [of(&one, 7), of(&pool, 7)],
+        decode: [of(&one, 8), of(&pool, 8)],
     })
 }
 
