@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::pictures::{Distortion, TestPicture};
+use crate::pictures::TestPicture;
 use crate::provenance::FOLDER;
 
 /// A codec with the settings to sweep.
@@ -84,7 +84,6 @@ pub(crate) struct RoundTrip {
     pub(crate) bytes: f64,
     /// The samples that were decoded.
     pub(crate) decoded: Vec<u8>,
-    pub(crate) distortion: Distortion,
     pub(crate) encode_seconds: f64,
     pub(crate) decode_seconds: f64,
 }
@@ -144,8 +143,7 @@ impl Worker {
             bail!("the worker answered `{answer}`");
         };
         let decoded = fs::read(&self.decoded)?;
-        let distortion = picture.distortion(&decoded)?;
-        Ok(RoundTrip { bytes, decoded, distortion, encode_seconds, decode_seconds })
+        Ok(RoundTrip { bytes, decoded, encode_seconds, decode_seconds })
     }
 
     /// The median time in seconds of decoding the last file so many times more.

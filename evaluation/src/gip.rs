@@ -52,13 +52,22 @@ pub(crate) fn encode(
     picture: &TestPicture,
     threads: Threads,
 ) -> Result<MeasuredFile> {
-    let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
+    let source = source(picture)?;
     let encoder = encoder.with_threads(threads);
     let (encoded, memory) = memory::peak(|| encoder.encode(&source));
     let encoded = encoded?;
     let file = encoded.bytes;
     let (bytes, distortion) = (file.len() as f64, distortion(&file, picture)?);
     Ok(MeasuredFile { file, bytes, report: encoded.report, distortion, memory })
+}
+
+/// Encodes a picture with all threads.
+pub(crate) fn file(encoder: Encoder, picture: &TestPicture) -> Result<Vec<u8>> {
+    Ok(encoder.with_threads(Threads::Pool).encode(&source(picture)?)?.bytes)
+}
+
+fn source(picture: &TestPicture) -> Result<Source<'_>> {
+    Ok(Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?)
 }
 
 /// Decodes a file, or the beginning of one, and passes its picture on.

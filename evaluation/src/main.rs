@@ -16,6 +16,7 @@ mod report;
 mod sections;
 mod store;
 mod table;
+mod versions;
 mod visual;
 
 use std::fs;

@@ -11,7 +11,6 @@ use image_gip::{
 };
 
 use super::rate_store::RateStore;
-use super::rate_store::nearest;
 use crate::baselines::{BASELINES, Baseline, SEQUENTIAL_JPEG};
 use crate::bench::{Bench, timing_version};
 use crate::comparison::list_or_none;
@@ -21,6 +20,7 @@ use crate::memory;
 use crate::pictures::TestPicture;
 use crate::provenance::cores;
 use crate::table::{Table, mean, median};
+use crate::versions::nearest;
 
 /// Rates of the files, in bits per pixel.
 const RATES: [f64; 3] = [0.25, 0.5, 1.0];
@@ -402,7 +402,7 @@ fn theirs(
                 &mut || worker.decode_again(RUNS_PER_TURN),
             ],
         )?;
-        Ok([picture.rate(trip.bytes), trip.distortion.psnr, theirs, share])
+        Ok([picture.rate(trip.bytes), picture.distortion(&trip.decoded)?.psnr, theirs, share])
     })
 }
 

@@ -3,13 +3,14 @@
 use anyhow::{Context, Result};
 use image_gip::{ColorModel, Source, Target, Threads};
 
-use super::rate_store::{RateStore, nearest};
+use super::rate_store::RateStore;
 use crate::baselines::{BASELINES, Baseline};
 use crate::bench::{Bench, timing_version};
 use crate::curve::Curve;
 use crate::pictures::TestPicture;
 use crate::store::Store;
 use crate::table::{Table, mean, median};
+use crate::versions::nearest;
 use crate::{gip, memory};
 
 const QUICK_EFFORTS: [u8; 3] = [1, 3, 5];

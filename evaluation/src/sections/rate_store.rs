@@ -54,7 +54,8 @@ impl RateStore {
     ) -> Result<Point> {
         self.point(versions, [baseline.id, setting, &picture.name], || {
             let trip = worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?;
-            Ok((trip.bytes, picture.rate(trip.bytes), trip.distortion))
+            let distortion = picture.distortion(&trip.decoded)?;
+            Ok((trip.bytes, picture.rate(trip.bytes), distortion))
         })
     }
 
@@ -71,41 +72,5 @@ impl RateStore {
         })?;
         let [bytes, rate, distortion @ ..] = values;
         Ok(Point { bytes, rate, distortion: Distortion::from(distortion) })
-    }
-}
-
-/// The setting whose rate is nearest to `wanted`, by bisection. `settings` go from small files to
-/// large ones.
-pub(super) fn nearest<'a>(
-    settings: &[&'a str],
-    wanted: f64,
-    mut rate: impl FnMut(&str) -> Result<f64>,
-) -> Result<&'a str> {
-    let (mut low, mut high) = (0, settings.len() - 1);
-    while high - low > 1 {
-        let middle = usize::midpoint(low, high);
-        if rate(settings[middle])? < wanted { low = middle } else { high = middle }
-    }
-    let below = wanted / rate(settings[low])?;
-    let above = rate(settings[high])? / wanted;
-    Ok(settings[if below.max(1.0 / below) < above.max(1.0 / above) { low } else { high }])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_setting_is_found() {
-        let find = |rates: &[f64]| {
-            let names: Vec<String> = rates.iter().map(f64::to_string).collect();
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            nearest(&names, 0.5, |name| Ok(name.parse()?)).expect("all are numbers").to_owned()
-        };
-        assert_eq!(find(&[0.1, 0.2, 0.45, 0.6, 0.9]), "0.45");
-        assert_eq!(find(&[0.1, 0.2, 0.3, 0.52, 0.9]), "0.52");
-        assert_eq!(find(&[0.1, 0.2]), "0.2");
-        assert_eq!(find(&[0.7, 0.8, 0.9]), "0.7");
-        assert_eq!(find(&[0.4]), "0.4");
     }
 }

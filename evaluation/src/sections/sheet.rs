@@ -3,19 +3,17 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use image::{RgbImage, imageops};
-use image_gip::{Target, Threads};
+use image_gip::Target;
 
 use super::crops::{Crop, extremes};
-use super::rate_store::RateStore;
-use super::rate_store::nearest;
-use crate::baselines::{BASELINES, Baseline};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
 use crate::pictures::{PictureSet, TestPicture};
 use crate::table::Table;
+use crate::versions::{self, Version};
 use crate::visual;
 
 /// The rate of our files, in bits per pixel: low enough to see the differences.
@@ -67,11 +65,19 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
 }
 
 /// A picture as one codec shows it.
-struct Version {
+struct Shown {
     codec: &'static str,
     rate: f64,
     ssimulacra2: f64,
     samples: Vec<u8>,
+}
+
+impl Shown {
+    fn new(codec: &'static str, picture: &TestPicture, version: Version) -> Result<Self> {
+        let rate = picture.rate(version.bytes);
+        let ssimulacra2 = picture.distortion(&version.samples)?.ssimulacra2;
+        Ok(Self { codec, rate, ssimulacra2, samples: version.samples })
+    }
 }
 
 /// One crop of a picture, side by side as all show it.
@@ -90,68 +96,48 @@ struct Pair {
 }
 
 fn pairs(bench: &mut Bench, set: &PictureSet) -> Result<Vec<Pair>> {
-    let mut files = RateStore::open(bench)?;
-    set.pictures.iter().map(|picture| pair(bench, &mut files, picture)).collect()
+    set.pictures.iter().map(|picture| pair(bench, picture)).collect()
 }
 
-fn pair(bench: &mut Bench, files: &mut RateStore, picture: &TestPicture) -> Result<Pair> {
-    let mut versions = vec![ours(bench, picture)?];
+fn pair(bench: &mut Bench, picture: &TestPicture) -> Result<Pair> {
+    let ours = ours(bench, picture)?;
+    let bytes = ours.bytes;
+    let mut shown = vec![Shown::new(gip::NAME, picture, ours)?];
     for name in OTHERS {
-        let other = BASELINES.iter().find(|baseline| baseline.name == name);
-        let other = other.context("it is a baseline")?;
-        versions.push(theirs(bench, files, other, picture, versions[0].rate)?);
+        let (worker, _) = bench.baselines()?;
+        let other = versions::baseline_called(name)?;
+        let theirs = Version::baseline(worker, other, picture, bytes)?;
+        shown.push(Shown::new(name, picture, theirs)?);
     }
-    let error = |version: &Version| {
+    let error = |version: &Shown| {
         visual::ssimulacra2_map(&picture.rgb, &version.samples, picture.width, picture.height)
     };
-    let (ours, others) = (error(&versions[0])?, error(&versions[1])?);
+    let (ours, others) = (error(&shown[0])?, error(&shown[1])?);
     let ahead: Vec<f64> =
         ours.iter().zip(&others).map(|(ours, others)| f64::from(others - ours)).collect();
     let side = SIDE.min(picture.width).min(picture.height);
     let strips = extremes(&ahead, picture.width, side);
-    let strips = strips.map(|crop| strip(picture, &versions, crop, side));
-    Ok(Pair { strips, scores: versions.iter().map(|version| version.ssimulacra2).collect() })
+    let strips = strips.map(|crop| strip(picture, &shown, crop, side));
+    Ok(Pair { strips, scores: shown.iter().map(|version| version.ssimulacra2).collect() })
 }
 
 fn ours(bench: &Bench, picture: &TestPicture) -> Result<Version> {
     let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
     let file = bench.file(&name, || {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
-        Ok(gip::encode(encoder, picture, Threads::Pool)?.file)
+        gip::file(encoder, picture)
     })?;
-    let samples = gip::decode(&file, Threads::Pool)?;
-    let ssimulacra2 = picture.distortion(&samples)?.ssimulacra2;
-    let rate = picture.rate(file.len() as f64);
-    Ok(Version { codec: gip::NAME, rate, ssimulacra2, samples })
+    Version::of_file(&file)
 }
 
-/// A baseline at the quality whose rate is nearest.
-fn theirs(
-    bench: &mut Bench,
-    files: &mut RateStore,
-    other: &'static Baseline,
-    picture: &TestPicture,
-    rate: f64,
-) -> Result<Version> {
-    let (worker, versions) = bench.baselines()?;
-    let all: Vec<String> = (1..=100).map(|quality| quality.to_string()).collect();
-    let all: Vec<&str> = all.iter().map(String::as_str).collect();
-    let setting = nearest(&all, rate, |setting| {
-        Ok(files.baseline(worker, &versions, other, setting, picture)?.rate)
-    })?;
-    let trip = worker.round_trip(other.id, setting, picture, Some(1), [1; 2])?;
-    let (rate, ssimulacra2) = (picture.rate(trip.bytes), trip.distortion.ssimulacra2);
-    Ok(Version { codec: other.name, rate, ssimulacra2, samples: trip.decoded })
-}
-
-fn strip(picture: &TestPicture, versions: &[Version], crop: Crop, side: u32) -> Strip {
+fn strip(picture: &TestPicture, shown: &[Shown], crop: Crop, side: u32) -> Strip {
     let cut = |samples: &[u8]| {
         let whole = RgbImage::from_raw(picture.width, picture.height, samples.to_vec());
         let whole = whole.expect("as many samples as the picture has");
         imageops::crop_imm(&whole, crop.x, crop.y, side, side).to_image()
     };
     let mut tiles = vec![(format!("{}, original", picture.name), cut(&picture.rgb))];
-    for Version { codec, rate, ssimulacra2, samples } in versions {
+    for Shown { codec, rate, ssimulacra2, samples } in shown {
         tiles.push((format!("{codec} {rate:.2} bpp: {ssimulacra2:.1}"), cut(samples)));
     }
     Strip { picture: picture.name.clone(), crop, tiles }

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use image_gip::{Target, Threads};
 
-use super::rate_store::{RateStore, nearest};
+use super::rate_store::RateStore;
 use super::{encoding, growth};
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::{Bench, timing_version};
@@ -14,6 +14,7 @@ use crate::pictures::{Distortion, TestPicture};
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::provenance::cores;
 use crate::table::{Table, mean};
+use crate::versions::nearest;
 
 /// The rate of all files, approximately, in bits per pixel.
 const RATE: f64 = 0.5;
@@ -144,7 +145,8 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
                 let trip =
                     worker.round_trip(baseline.id, setting, picture, threads, [REPEATS; 2])?;
                 let times = [trip.encode_seconds, trip.decode_seconds];
-                Ok(values(picture, trip.bytes, &trip.distortion, times))
+                let distortion = picture.distortion(&trip.decoded)?;
+                Ok(values(picture, trip.bytes, &distortion, times))
             })
         })?);
     }
