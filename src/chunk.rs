@@ -28,6 +28,8 @@ impl ChunkType {
     pub const GAUS: Self = Self(*b"GAUS");
     /// The bounds of the layers: where each of them shows.
     pub const BNDS: Self = Self(*b"bNDS");
+    /// The texture: the Gaussians of its map.
+    pub const TXTR: Self = Self(*b"tXTR");
     /// The end of the file, always the last chunk.
     pub const GEND: Self = Self(*b"GEND");
     /// An ICC profile.

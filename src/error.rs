@@ -87,6 +87,14 @@ impl DecodeError {
         Self::Unsupported { chunk, what }
     }
 
+    /// The same error, of the chunk that has such data in it.
+    pub(crate) fn in_chunk(self, chunk: ChunkType) -> Self {
+        match self {
+            Self::Malformed { reason, .. } => Self::Malformed { chunk, reason },
+            other => other,
+        }
+    }
+
     /// Whether the file ended too early: with more bytes, decoding could have continued.
     #[must_use]
     pub fn is_unexpected_end(&self) -> bool {

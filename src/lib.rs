@@ -112,6 +112,7 @@ mod render;
 mod simd;
 #[cfg(test)]
 mod testing;
+mod texture;
 mod threads;
 
 #[cfg(all(feature = "encode", feature = "image"))]

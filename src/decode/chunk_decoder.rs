@@ -15,6 +15,7 @@ use crate::layers::bounds::LayerBounds;
 use crate::limits::Limits;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
+use crate::texture::Texture;
 use crate::threads::Threads;
 
 /// Most bytes in the payload of `GHDR` and of `QNTZ`: nine quantizers of twelve bytes (spec,
@@ -33,6 +34,7 @@ pub(super) struct ChunkDecoder {
     pub(super) quantization: Option<Quantization>,
     /// The bounds of every layer that the header declares, if the file has them.
     bounds: Option<Vec<LayerBounds>>,
+    pub(super) texture: Option<Texture>,
     /// Entropy-coded layers that have arrived and are not decoded yet.
     pending: PendingLayers,
     pub(super) metadata: Metadata,
@@ -114,10 +116,11 @@ impl ChunkDecoder {
         self.preamble_memory() + self.pending.memory() + gaussians + layers
     }
 
-    /// The memory of what stands before the layers, in bytes: metadata and bounds.
+    /// The memory of what stands before the layers, in bytes: metadata, bounds and texture.
     fn preamble_memory(&self) -> u64 {
         let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<LayerBounds>();
-        self.metadata.memory() + bounds as u64
+        let texture = self.texture.as_ref().map_or(0, Texture::memory);
+        self.metadata.memory() + bounds as u64 + texture
     }
 
     /// Checks what a header declares against the limits.
@@ -169,8 +172,13 @@ impl ChunkDecoder {
             ChunkType::BNDS if self.layers.is_empty() && self.bounds.is_some() => {
                 malformed("appears twice")
             }
+            ChunkType::TXTR if self.layers.is_empty() && self.texture.is_some() => {
+                malformed("appears twice")
+            }
             // After the first layer, these have no meaning in version 1.
-            ChunkType::BNDS if self.layers.is_empty() => self.collect_within_limits(length),
+            ChunkType::BNDS | ChunkType::TXTR if self.layers.is_empty() => {
+                self.collect_within_limits(length)
+            }
             _ if Metadata::includes(chunk) && self.layers.is_empty() => {
                 self.collect_within_limits(length)
             }
@@ -251,6 +259,10 @@ impl ChunkDecoder {
                 let Some(header) = &self.header else { return Ok(()) };
                 self.bounds = Some(LayerBounds::parse_all(payload, header)?);
             }
+            (ChunkType::TXTR, Stage::Collect { payload, .. }) => {
+                let payload = core::mem::take(payload);
+                self.insert_texture(&payload)?;
+            }
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
                 self.metadata.insert(chunk, payload)?;
@@ -285,6 +297,18 @@ impl ChunkDecoder {
         let declared = self.declared_layers();
         reserve(&mut self.layers, 1, declared);
         self.layers.push(count as u32);
+    }
+
+    /// Decodes the texture, if there is memory for it and for all Gaussians.
+    fn insert_texture(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
+        let Some(header) = &self.header else { return Ok(()) };
+        let count = Texture::count(payload, header)?;
+        self.limits.check_gaussians(count)?;
+        let texture = payload.len() as u64 + u64::from(count) * size_of::<Gaussian>() as u64;
+        let layers = Self::memory_of_layers(header);
+        self.limits.check_memory(self.preamble_memory() + layers + texture)?;
+        self.texture = Some(Texture::parse(payload, header)?);
+        Ok(())
     }
 
     /// Decodes the pending layers up to the first that is malformed.

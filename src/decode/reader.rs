@@ -186,7 +186,7 @@ impl<R: Read> Decoder<R> {
         if let Some(gaussians) = self.stream.visible_gaussians(&self.options) {
             let copies = gaussians.len() as u64 * size_of::<Gaussian>() as u64;
             let memory = self.stream.memory() + copies;
-            let picture = Picture::new(self.header(), &gaussians, self.stream.limits(), memory);
+            let picture = self.decoded().with_gaussians(&gaussians, memory);
             return render(&picture, &self.options);
         }
         self.decode_pending()?;

@@ -17,6 +17,7 @@ use crate::orientation::Orientation;
 use crate::render::Picture;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
+use crate::texture::Texture;
 use crate::threads::Threads;
 
 /// Decodes bytes as they arrive, in pieces of any size, and does no I/O.
@@ -117,12 +118,6 @@ impl StreamDecoder {
     pub fn set_limits(&mut self, limits: Limits) -> Result<(), DecodeError> {
         self.chunks.limits = limits;
         self.header().map_or(Ok(()), |header| self.chunks.check_header(header))
-    }
-
-    /// The limits.
-    #[cfg(feature = "std")]
-    pub(super) fn limits(&self) -> &Limits {
-        &self.chunks.limits
     }
 
     /// Takes the next bytes of the file. Returns how many of them belong to the file: all, unless
@@ -237,6 +232,15 @@ impl StreamDecoder {
         &self.chunks.gaussians
     }
 
+    /// The Gaussians of the texture's map, in file order: see [`Picture`]. Empty for a picture without
+    /// texture, and until it has arrived. Their pixels are the map's nodes, one for every eight pixels of the
+    /// picture along each axis; their colours are the amplitudes of three octaves, and the direction (spec,
+    /// section 9.7).
+    #[must_use]
+    pub fn texture(&self) -> &[Gaussian] {
+        self.chunks.texture.as_ref().map_or(&[], Texture::gaussians)
+    }
+
     /// The number of Gaussians in each layer that has arrived, in file order.
     #[must_use]
     pub fn layers(&self) -> &[u32] {
@@ -255,7 +259,8 @@ impl StreamDecoder {
     pub fn picture(&self) -> Option<Picture<'_>> {
         let chunks = &self.chunks;
         let header = chunks.header.as_ref()?;
-        Some(Picture::new(header, &chunks.gaussians, &chunks.limits, chunks.memory()))
+        let picture = Picture::new(header, &chunks.gaussians, &chunks.limits, chunks.memory());
+        Some(picture.with_texture(chunks.texture.as_ref()))
     }
 
     /// Whether header and metadata are complete, since a layer or the end of the file has arrived,

@@ -38,6 +38,11 @@ impl Axis {
         self.grid as u32
     }
 
+    /// Side of the whole output in pixels.
+    pub(super) fn output(self) -> u32 {
+        self.output as u32
+    }
+
     /// The pixels of the grid that those of the output touch.
     pub(crate) fn span(self, pixels: Range<u32>) -> Range<u32> {
         let first = u64::from(pixels.start) * self.grid / self.output;

@@ -3,7 +3,7 @@
 //! The grid of pixels in which the Gaussians are evaluated is divided into bands of four rows of
 //! tiles. [`band`] finds the Gaussians that may show in each band, and prepares its splats;
 //! [`tile_lists`] finds those that touch each tile; [`tile`] adds them up; [`area_average`] makes the
-//! pixels of a smaller output; and [`output`] converts the sums to samples. Threads work on different
+//! pixels of a smaller output; [`texture_view`] makes the texture that is added; and [`output`] converts the sums to samples. Threads work on different
 //! [`strips`] of the output.
 
 mod area_average;
@@ -17,6 +17,7 @@ pub(crate) mod range_lists;
 pub(crate) mod simd_kernel;
 pub(crate) mod splat;
 mod strips;
+mod texture_view;
 mod tile;
 pub(crate) mod tile_grid;
 mod tile_lists;

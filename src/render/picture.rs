@@ -1,25 +1,29 @@
 //! A picture, and all ways to render it.
 
+use alloc::vec;
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
 use super::band::RenderInput;
 use super::output::Sample;
 use super::strips::PreparedRender;
-use super::view::RenderOptions;
+use super::texture_view::TextureView;
+use super::view::{RenderOptions, View};
 use crate::container::Header;
 use crate::error::{DecodeError, LimitKind, RequestError};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 #[cfg(feature = "encode")]
 use crate::region::Region;
+use crate::texture::Texture;
 
 /// A picture that can be rendered: a header and the Gaussians that have arrived.
 ///
 /// Rendering evaluates the sum of the Gaussians at the centres of pixels: those of the output, at
 /// the stored size or a larger one, or those that a smaller output is averaged from, for the whole
-/// picture or a region, with all Gaussians or only the first ones. The samples are specified bit for
-/// bit (spec, section 9): they depend neither on the machine nor on SIMD or threads.
+/// picture or a region, with all Gaussians or only the first ones. Where the picture has texture, noise of
+/// the strength that the file says is added. The samples are specified bit for bit (spec, section 9):
+/// they depend neither on the machine nor on SIMD or threads.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture<'a> {
     header: &'a Header,
@@ -27,6 +31,7 @@ pub struct Picture<'a> {
     limits: &'a Limits,
     /// The memory that the decoder holds, in bytes.
     decoder_memory: u64,
+    texture: Option<&'a Texture>,
 }
 
 impl<'a> Picture<'a> {
@@ -36,7 +41,18 @@ impl<'a> Picture<'a> {
         limits: &'a Limits,
         decoder_memory: u64,
     ) -> Self {
-        Self { header, gaussians, limits, decoder_memory }
+        Self { header, gaussians, limits, decoder_memory, texture: None }
+    }
+
+    /// The picture with a texture.
+    pub(crate) fn with_texture(self, texture: Option<&'a Texture>) -> Self {
+        Self { texture, ..self }
+    }
+
+    /// The picture with other Gaussians, for which the decoder holds so much memory.
+    #[cfg(feature = "std")]
+    pub(crate) fn with_gaussians(self, gaussians: &'a [Gaussian], decoder_memory: u64) -> Self {
+        Self { gaussians, decoder_memory, ..self }
     }
 
     /// The header.
@@ -170,6 +186,40 @@ impl<'a> Picture<'a> {
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
         let input = RenderInput { gaussians, view, kernel: self.header.kernel };
-        PreparedRender::new(input, self.header, color, self.limits, self.decoder_memory, options)
+        let texture = match self.texture.filter(|_| options.texture) {
+            Some(texture) => self.texture_view(texture, &view, options)?,
+            None => None,
+        };
+        PreparedRender::new(
+            input,
+            texture,
+            self.header,
+            color,
+            self.limits,
+            self.decoder_memory,
+            options,
+        )
+    }
+    /// The texture of a view, for which the map is rendered like a picture.
+    fn texture_view(
+        &self,
+        texture: &Texture,
+        view: &View,
+        options: &RenderOptions,
+    ) -> Result<Option<TextureView>, DecodeError> {
+        let map = texture.header();
+        // Its size follows that of the picture, which was checked.
+        let (max_width, max_height, max_pixels) = (u32::MAX, u32::MAX, u64::MAX);
+        let limits = Limits { max_width, max_height, max_pixels, ..self.limits.clone() };
+        let sides = [self.header, map].map(|header| [header.width, header.height]);
+        TextureView::new(sides[0], sides[1], view, |nodes| {
+            let samples = nodes.pixels() * map.color.channels() as u64;
+            let memory = self.decoder_memory + samples * size_of::<f32>() as u64;
+            limits.check_memory(memory)?;
+            let mut sums = vec![0.0; samples as usize];
+            let picture = Picture::new(map, texture.gaussians(), &limits, memory);
+            picture.render_planes(&options.for_map(nodes), &mut sums)?;
+            Ok(sums)
+        })
     }
 }

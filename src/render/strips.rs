@@ -8,6 +8,7 @@ use core::ops::Range;
 use super::area_average::{AreaAverage, Averaging};
 use super::band::{BAND_ROWS, Band, Bands, RenderInput};
 use super::output::{self, Destination, Sample};
+use super::texture_view::{TextureRow, TextureView};
 use super::tile::{PairPlane, Tile};
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
 use super::view::{RenderOptions, View};
@@ -27,10 +28,13 @@ const STRIP_MEMORY: u64 = 128;
 pub(super) struct PreparedRender<'a> {
     pub(super) input: RenderInput<'a>,
     bands: Bands,
+    texture: Option<TextureView>,
     /// For an output that is smaller than the picture.
     averaging: Option<Averaging>,
     /// The number of channels of the picture.
     channels: usize,
+    /// Whether the last of them is alpha.
+    has_alpha: bool,
     /// For each channel of the output the plane that it is copied from; see [`output::sources`].
     pub(super) sources: &'static [Option<usize>],
     base: [f32; 4],
@@ -45,6 +49,7 @@ impl<'a> PreparedRender<'a> {
     /// When memory or work would exceed the limits.
     pub(super) fn new(
         input: RenderInput<'a>,
+        texture: Option<TextureView>,
         header: &Header,
         color: ColorModel,
         limits: &Limits,
@@ -61,13 +66,16 @@ impl<'a> PreparedRender<'a> {
         let strips = u64::from(view.output.height).div_ceil(strip_height(view) as u64);
         let threads = strips.min(options.threads.count() as u64);
         let averages = averaging.map_or(0, |averaging| averaging.memory()) * threads;
-        let memory = memory + strips * STRIP_MEMORY + averages;
+        let (held, by_thread) = texture.as_ref().map_or((0, 0), TextureView::memory);
+        let memory = memory + strips * STRIP_MEMORY + averages + held + by_thread * threads;
         let bands = Bands::new(&input, options.backend, limits, memory, options.threads)?;
         Ok(Self {
             input,
             bands,
+            texture,
             averaging,
             channels: header.color.channels(),
+            has_alpha: header.color.has_alpha(),
             sources: output::sources(header.color, color),
             base: header.base(),
             backend: options.backend,
@@ -91,7 +99,7 @@ impl<'a> PreparedRender<'a> {
         self.sort(&mut strips);
         threads::for_each(threads, strips, |memory: &mut Memory, (strip, out)| {
             match &self.averaging {
-                None => self.band(&mut memory.band, strip, &mut |planes, x, y| {
+                None => self.band(&mut memory.rows, strip, &mut |planes, x, y| {
                     let mut destination = Destination { x, rows: &mut out[y * stride..], stride };
                     output::write_interleaved(self.backend, planes, self.sources, &mut destination);
                 }),
@@ -120,7 +128,7 @@ impl<'a> PreparedRender<'a> {
         self.sort(&mut parts);
         threads::for_each(threads, parts, |memory: &mut Memory, (strip, mut part)| {
             match &self.averaging {
-                None => self.band(&mut memory.band, strip, &mut |planes, x, y| {
+                None => self.band(&mut memory.rows, strip, &mut |planes, x, y| {
                     output::write_planes(planes, (x, y), self.sources, &mut part, width);
                 }),
                 Some(averaging) => self.averaged(memory, averaging, strip, &mut |y, means| {
@@ -152,18 +160,18 @@ impl<'a> PreparedRender<'a> {
         let end = (output.y + output.height).min(first + self.strip_height() as u32);
         let lines = axes[1].span(first..end);
         let (top, bottom) = ((lines.start - grid.y) as usize, (lines.end - grid.y) as usize);
-        let Memory { band: of_band, average } = memory;
+        let Memory { rows, average } = memory;
         average.begin(averaging);
         let mut row = first;
         for band in top / BAND_HEIGHT..bottom.div_ceil(BAND_HEIGHT) {
-            of_band.prepare(&self.bands, band, &self.input, self.backend);
+            rows.band.prepare(&self.bands, band, &self.input, self.backend);
             for tiles in 0..self.bands.rows(band) {
                 let y = band * BAND_HEIGHT + tiles * TILE_HEIGHT;
                 let inside = y.max(top)..(y + TILE_HEIGHT).min(bottom);
                 if inside.is_empty() {
                     continue;
                 }
-                self.row(of_band, band, tiles, &mut |planes, x| average.take(averaging, planes, x));
+                self.row(rows, band, tiles, &mut |planes, x| average.take(averaging, planes, x));
                 for line in inside {
                     let of_grid = grid.y + line as u32;
                     // A row of the grid may be in two rows of the output.
@@ -183,11 +191,11 @@ impl<'a> PreparedRender<'a> {
     /// with its first column in the region and its first row in the band, in pixels.
     fn band(
         &self,
-        memory: &mut Band,
+        memory: &mut RowMemory,
         band: usize,
         write: &mut dyn FnMut(&[PairPlane], usize, usize),
     ) {
-        memory.prepare(&self.bands, band, &self.input, self.backend);
+        memory.band.prepare(&self.bands, band, &self.input, self.backend);
         for row in 0..self.bands.rows(band) {
             self.row(memory, band, row, &mut |planes, x| write(planes, x, row * TILE_HEIGHT));
         }
@@ -197,7 +205,7 @@ impl<'a> PreparedRender<'a> {
     /// column in the region.
     fn row(
         &self,
-        memory: &mut Band,
+        memory: &mut RowMemory,
         band: usize,
         row: usize,
         write: &mut dyn FnMut(&[PairPlane], usize),
@@ -208,7 +216,7 @@ impl<'a> PreparedRender<'a> {
     /// Renders one row of tiles of a picture with `CHANNELS` channels.
     fn row_of<const CHANNELS: usize>(
         &self,
-        memory: &mut Band,
+        memory: &mut RowMemory,
         band: usize,
         row: usize,
         write: &mut dyn FnMut(&[PairPlane], usize),
@@ -217,17 +225,26 @@ impl<'a> PreparedRender<'a> {
         let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];
         let top = self.input.view.region.y + (band * BAND_HEIGHT + row * TILE_HEIGHT) as u32;
         let columns = self.bands.columns();
-        let (lists, blocks) = memory.row(self.backend, columns, row);
+        let RowMemory { band, texture } = memory;
+        let texture = match &self.texture {
+            Some(view) => texture.prepare(view, self.backend, top),
+            None => None,
+        };
+        let (lists, blocks) = band.row(self.backend, columns, row);
         for first in (0..columns).step_by(2) {
             for (half, column) in (first..columns.min(first + 2)).enumerate() {
                 let x = (column * TILE_WIDTH) as u32;
                 let origin = (self.input.view.region.x + x, top);
-                let splats = lists.splats(column);
-                Tile { origin, base, blocks, splats, kernel: self.input.kernel }.render(
-                    self.backend,
-                    half,
-                    &mut planes,
-                );
+                Tile {
+                    origin,
+                    base,
+                    texture: texture.map(|row| row.from(column * TILE_WIDTH)),
+                    has_alpha: self.has_alpha,
+                    blocks,
+                    splats: lists.splats(column),
+                    kernel: self.input.kernel,
+                }
+                .render(self.backend, half, &mut planes);
             }
             write(&planes, first * TILE_WIDTH);
         }
@@ -243,6 +260,13 @@ fn strip_height(view: &View) -> usize {
 /// What a thread renders with.
 #[derive(Default)]
 struct Memory {
-    band: Band,
+    rows: RowMemory,
     average: AreaAverage,
+}
+
+/// What it renders a row of tiles with.
+#[derive(Default)]
+struct RowMemory {
+    band: Band,
+    texture: TextureRow,
 }

@@ -21,6 +21,26 @@ const VECTOR_ROWS: usize = 2;
 /// One channel of two tiles side by side: height x width sums.
 pub(crate) type PairPlane = [[f32; PAIR_WIDTH]; TILE_HEIGHT];
 
+/// Rows of values, of which the first of each row are those of a tile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileTexture<'a> {
+    pub(crate) values: &'a [f32],
+    /// Values from one row to the next.
+    pub(crate) stride: usize,
+}
+
+impl<'a> TileTexture<'a> {
+    /// That of a tile which begins so many columns later.
+    pub(crate) fn from(self, column: usize) -> Self {
+        Self { values: &self.values[column..], ..self }
+    }
+
+    #[inline(always)]
+    fn rows(self) -> impl Iterator<Item = &'a [f32; TILE_WIDTH]> {
+        self.values.chunks(self.stride).map(|row| row.first_chunk().expect("a row of a tile"))
+    }
+}
+
 /// A tile to render.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile<'a, const CHANNELS: usize> {
@@ -28,6 +48,10 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
     pub(crate) origin: (u32, u32),
     /// The base colour.
     pub(crate) base: [f32; CHANNELS],
+    /// What is added to the colours.
+    pub(crate) texture: Option<TileTexture<'a>>,
+    /// Whether the last channel is no colour.
+    pub(crate) has_alpha: bool,
     /// All splats of the band.
     pub(crate) blocks: &'a [Block],
     /// The splats that are added to this tile, in file order.
@@ -53,9 +77,23 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         }
     }
 
+    /// The number of channels that texture is added to.
+    fn colors(&self) -> usize {
+        CHANNELS - usize::from(self.has_alpha)
+    }
+
     fn render_scalar(&self, left: usize, planes: &mut [PairPlane; CHANNELS]) {
         for (plane, base) in planes.iter_mut().zip(self.base) {
             plane.iter_mut().for_each(|row| row[left..][..TILE_WIDTH].fill(base));
+        }
+        if let Some(texture) = self.texture {
+            for plane in planes.iter_mut().take(self.colors()) {
+                for (row, texture) in plane.iter_mut().zip(texture.rows()) {
+                    for (sum, texture) in row[left..].iter_mut().zip(texture) {
+                        *sum += texture;
+                    }
+                }
+            }
         }
         for (block, lane) in self.splats {
             let splat = &self.blocks[block][lane];
@@ -91,6 +129,20 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         let mut sums = [[f32x16::splat(simd, 0.0); TILE_HEIGHT / VECTOR_ROWS]; CHANNELS];
         for (sums, base) in sums.iter_mut().zip(self.base) {
             *sums = [f32x16::splat(simd, base); TILE_HEIGHT / VECTOR_ROWS];
+        }
+        if let Some(texture) = self.texture {
+            let mut rows = texture.rows().map(
+                #[inline(always)]
+                |row| f32x8::load_array_ref(simd, row),
+            );
+            for row in 0..TILE_HEIGHT / VECTOR_ROWS {
+                if let (Some(upper), Some(lower)) = (rows.next(), rows.next()) {
+                    let texture = upper.combine(lower);
+                    for sums in sums.iter_mut().take(self.colors()) {
+                        sums[row] += texture;
+                    }
+                }
+            }
         }
         let mut splats = self.splats;
         while let Some((block, lane)) = splats.next() {
@@ -181,9 +233,19 @@ mod tests {
         let splats = TileSplats::new(&entries);
         let base = [0.5; CHANNELS];
         let mut planes = [[[0.0; PAIR_WIDTH]; TILE_HEIGHT]; CHANNELS];
+        let values = (0..PAIR_WIDTH * TILE_HEIGHT).map(|at| 0.7 - 0.021 * at as f32);
+        let values: Vec<f32> = values.collect();
+        let texture = TileTexture { values: &values[3..], stride: PAIR_WIDTH };
         for half in 0..2 {
-            let origin = (origin.0 + (half * TILE_WIDTH) as u32, origin.1);
-            let tile = Tile { origin, base, blocks: &blocks, splats, kernel };
+            let tile = Tile {
+                origin: (origin.0 + (half * TILE_WIDTH) as u32, origin.1),
+                base,
+                texture: (half == 1).then_some(texture),
+                has_alpha: CHANNELS.is_multiple_of(2),
+                blocks: &blocks,
+                splats,
+                kernel,
+            };
             tile.render(backend, half, &mut planes);
         }
         planes.into_iter().flatten().flatten().map(f32::to_bits).collect()

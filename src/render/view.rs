@@ -21,6 +21,7 @@ pub struct RenderOptions {
     region: Option<Region>,
     color: Option<ColorModel>,
     pub(crate) prefix: Option<u32>,
+    pub(super) texture: bool,
     pub(crate) threads: Threads,
     pub(super) backend: Backend,
 }
@@ -32,6 +33,7 @@ impl Default for RenderOptions {
             region: None,
             color: None,
             prefix: None,
+            texture: true,
             threads: Threads::Pool,
             backend: Backend::fastest(),
         }
@@ -72,6 +74,14 @@ impl RenderOptions {
         self
     }
 
+    /// Whether the picture's texture is rendered: noise in place of what the file has no samples of, such as
+    /// sand, water and leaves (spec, section 9.7). Default `true`. Without it the picture is smoother, and
+    /// nearer to the source sample by sample.
+    pub fn with_texture(mut self, texture: bool) -> Self {
+        self.texture = texture;
+        self
+    }
+
     /// Writes the samples in another colour model, which must have all channels of the file's own:
     /// gray is repeated as red, green and blue, and an alpha channel that is missing is opaque
     /// (spec, section 9.6).
@@ -94,6 +104,12 @@ impl RenderOptions {
     pub fn with_reference(mut self, reference: bool) -> Self {
         self.backend = if reference { Backend::reference() } else { Backend::fastest() };
         self
+    }
+
+    /// Those of the nodes of a texture's map that the output needs.
+    pub(super) fn for_map(&self, nodes: Region) -> Self {
+        let Self { threads, backend, .. } = *self;
+        Self { region: Some(nodes), threads, backend, ..Self::default() }
     }
 
     /// Renders with the code for a SIMD level.

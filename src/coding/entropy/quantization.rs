@@ -168,11 +168,17 @@ impl Quantization {
             return Err(malformed("the length is not four bytes per step"));
         }
         let steps: Vec<f32> = payload.chunks_exact(4).map(LittleEndian::read_f32).collect();
-        if !steps.iter().all(|step| STEPS.contains(step)) {
-            return Err(malformed("a step that is not within 2^-20 to 2^10"));
-        }
         let (geometry, color) = steps.split_first_chunk().expect("four steps at least");
-        Ok(Self::new(*geometry, color.to_vec()))
+        Self::checked(*geometry, color.to_vec())
+    }
+
+    /// [`Quantization::new`], of steps that come from a file.
+    pub(crate) fn checked(geometry: [f32; GEOMETRY], color: Vec<f32>) -> Result<Self, DecodeError> {
+        if !geometry.iter().chain(&color).all(|step| STEPS.contains(step)) {
+            let reason = "a step that is not within 2^-20 to 2^10";
+            return Err(DecodeError::malformed(ChunkType::QNTZ, reason));
+        }
+        Ok(Self::new(geometry, color))
     }
 
     /// The steps.

@@ -1,0 +1,261 @@
+//! The texture of an output: that of the stored pixels, and where the grid is finer, a cubic interpolation
+//! of it (spec, section 9.7).
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use super::tile::TileTexture;
+use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
+use super::view::View;
+use crate::error::DecodeError;
+use crate::region::Region;
+use crate::simd::Backend;
+use crate::texture::{CELL, NodeMap, Synthesis};
+
+/// Points of a cubic interpolation.
+const TAPS: usize = 4;
+
+/// The texture of a picture, as an output needs it.
+#[derive(Debug)]
+pub(super) struct TextureView {
+    map: NodeMap,
+    /// The columns of cells that the output needs.
+    cells: Range<i32>,
+    columns: Sampling,
+    rows: Sampling,
+    /// The columns of the grid, and its first row.
+    grid: Range<u32>,
+    top: u32,
+    /// For each of them the first of its taps, counted from the first pixel of the cells, and their weights;
+    /// empty where the grid is that of the stored pixels.
+    taps: Vec<(u32, [f32; TAPS])>,
+}
+
+/// How the pixels of a grid along an axis follow from the stored ones.
+#[derive(Clone, Copy, Debug)]
+enum Sampling {
+    /// They are the same.
+    Stored,
+    /// There are more of them. The sides are in pixels.
+    Cubic { stored: u32, grid: u32 },
+}
+
+impl TextureView {
+    /// The texture of a view, with the sides of the picture and of its map; `None` where it does not show.
+    /// `render` gives the sums of the map at some of its nodes: channels x height x width.
+    ///
+    /// # Errors
+    /// Those of `render`.
+    pub(super) fn new(
+        sides: [u32; 2],
+        map_sides: [u32; 2],
+        view: &View,
+        render: impl FnOnce(Region) -> Result<Vec<f32>, DecodeError>,
+    ) -> Result<Option<Self>, DecodeError> {
+        let scales = [0, 1].map(|axis| view.axes[axis].output() as f32 / sides[axis] as f32);
+        let fade = (8.0 * scales[0].min(scales[1]) - 1.0).clamp(0.0, 1.0);
+        if fade <= 0.0 {
+            return Ok(None);
+        }
+        let [columns, rows] = [0, 1].map(|axis| {
+            let (stored, grid) = (sides[axis], view.axes[axis].grid());
+            if grid > stored { Sampling::Cubic { stored, grid } } else { Sampling::Stored }
+        });
+        let Region { x, y, width, height } = view.region;
+        let grid = x..x + width;
+        // The last tile may have columns that are not in the region.
+        let cells = columns.cells(x..x + width.next_multiple_of(TILE_WIDTH as u32));
+        let nodes = |cells: &Range<i32>, side: u32| {
+            let last = side as i32 - 1;
+            (cells.start - 1).clamp(0, last) as u32..(cells.end + 1).clamp(0, last) as u32 + 1
+        };
+        let across = nodes(&cells, map_sides[0]);
+        let down = nodes(&rows.cells(y..y + height), map_sides[1]);
+        let nodes = Region {
+            x: across.start,
+            y: down.start,
+            width: across.end - across.start,
+            height: down.end - down.start,
+        };
+        let map = NodeMap::new(nodes, render(nodes)?, fade);
+        let taps = match columns {
+            Sampling::Stored => Vec::new(),
+            Sampling::Cubic { .. } => grid
+                .clone()
+                .map(|column| {
+                    let (first, weights) = columns.taps(column);
+                    ((first - cells.start * CELL as i32) as u32, weights)
+                })
+                .collect(),
+        };
+        Ok(Some(Self { map, cells, columns, rows, grid, top: y, taps }))
+    }
+
+    /// Bytes of memory that it holds, and that each thread needs.
+    pub(super) fn memory(&self) -> (u64, u64) {
+        let taps = size_of_val(&self.taps[..]);
+        let values =
+            self.cell_rows() * CELL * self.width() + self.width() + TILE_HEIGHT * self.stride();
+        (self.map.memory() + taps as u64, (values * size_of::<f32>()) as u64)
+    }
+
+    /// Rows of cells that a row of tiles may need.
+    fn cell_rows(&self) -> usize {
+        match self.rows {
+            Sampling::Stored if self.top.is_multiple_of(CELL as u32) => 1,
+            Sampling::Stored => 2,
+            // Eleven rows of pixels.
+            Sampling::Cubic { .. } => 3,
+        }
+    }
+
+    /// Whether rows of tiles are rows of cells.
+    fn is_of_cells(&self) -> bool {
+        matches!(self.columns, Sampling::Stored) && self.cell_rows() == 1
+    }
+
+    /// Stored pixels in a row of the cells.
+    fn width(&self) -> usize {
+        self.cells.len() * CELL
+    }
+
+    /// Values in a row of the grid, which ends with a whole pair of tiles.
+    fn stride(&self) -> usize {
+        self.grid.len().next_multiple_of(PAIR_WIDTH)
+    }
+}
+
+impl Sampling {
+    /// The stored pixels that those of the grid need, and by them the cells.
+    fn cells(self, grid: Range<u32>) -> Range<i32> {
+        let pixels = self.stored(grid);
+        pixels.start.div_euclid(CELL as i32)..(pixels.end - 1).div_euclid(CELL as i32) + 1
+    }
+
+    fn stored(self, grid: Range<u32>) -> Range<i32> {
+        match self {
+            Self::Stored => grid.start as i32..grid.end as i32,
+            Self::Cubic { .. } => self.taps(grid.start).0..self.taps(grid.end - 1).0 + TAPS as i32,
+        }
+    }
+
+    /// The first of the stored pixels that a pixel of a finer grid is interpolated from, and the weights of
+    /// Catmull and Rom.
+    fn taps(self, pixel: u32) -> (i32, [f32; TAPS]) {
+        let Self::Cubic { stored, grid } = self else {
+            return (pixel as i32 - 1, [0.0, 1.0, 0.0, 0.0]);
+        };
+        let (stored, grid) = (i64::from(stored), i64::from(grid));
+        let place = (2 * i64::from(pixel) + 1) * stored - grid;
+        let t = place.rem_euclid(2 * grid) as f32 / (2 * grid) as f32;
+        let weights = [
+            ((1.0 - 0.5 * t) * t - 0.5) * t,
+            (1.5 * t - 2.5) * t * t + 1.0,
+            ((2.0 - 1.5 * t) * t + 0.5) * t,
+            (0.5 * t - 0.5) * t * t,
+        ];
+        (place.div_euclid(2 * grid) as i32 - 1, weights)
+    }
+}
+
+/// The texture of a row of tiles, and what a thread needs to make it.
+#[derive(Debug, Default)]
+pub(super) struct TextureRow {
+    synthesis: Box<Synthesis>,
+    /// Rows of cells, each in the place that its number has by the remainder.
+    cells: Vec<CellRow>,
+    /// A row of stored pixels between rows.
+    mixed: Vec<f32>,
+    /// [`TILE_HEIGHT`] rows of the grid, unless they are those of a row of cells.
+    values: Vec<f32>,
+}
+
+/// The texture of a row of cells, as long as it is needed.
+#[derive(Debug, Default)]
+struct CellRow {
+    row: Option<i32>,
+    shows: bool,
+    /// [`CELL`] rows of values.
+    values: Vec<f32>,
+}
+
+impl TextureRow {
+    /// Makes the texture of the row of tiles whose first row of the grid is `top`; `None` if there is none.
+    pub(super) fn prepare<'a>(
+        &'a mut self,
+        view: &TextureView,
+        backend: Backend,
+        top: u32,
+    ) -> Option<TileTexture<'a>> {
+        backend.run(
+            #[inline(always)]
+            || self.prepare_with(view, top),
+        )
+    }
+
+    #[inline(always)]
+    fn prepare_with<'a>(&'a mut self, view: &TextureView, top: u32) -> Option<TileTexture<'a>> {
+        let grid = top..top + TILE_HEIGHT as u32;
+        let width = view.width();
+        self.cells.resize_with(view.cell_rows(), CellRow::default);
+        let place = |row: i32| row.rem_euclid(view.cell_rows() as i32) as usize;
+        let mut shows = false;
+        for row in view.rows.cells(grid.clone()) {
+            let cells = &mut self.cells[place(row)];
+            if cells.row != Some(row) {
+                cells.row = Some(row);
+                cells.values.resize(width * CELL, 0.0);
+                let columns = view.cells.clone();
+                let values = &mut cells.values;
+                cells.shows = self.synthesis.cells(&view.map, row, columns, values, width);
+            }
+            shows |= cells.shows;
+        }
+        if !shows {
+            return None;
+        }
+        let first = (view.grid.start as i32 - view.cells.start * CELL as i32) as usize;
+        if view.is_of_cells() {
+            let values = &self.cells[place((top / CELL as u32) as i32)].values[first..];
+            return Some(TileTexture { values, stride: width });
+        }
+        let stride = view.stride();
+        self.values.resize(stride * TILE_HEIGHT, 0.0);
+        self.mixed.resize(width, 0.0);
+        let stored = |row: i32| {
+            let cells = &self.cells[place(row.div_euclid(CELL as i32))];
+            &cells.values[row.rem_euclid(CELL as i32) as usize * width..][..width]
+        };
+        for (row, line) in grid.zip(self.values.chunks_exact_mut(stride)) {
+            let values = match view.rows {
+                Sampling::Stored => stored(row as i32),
+                Sampling::Cubic { .. } => {
+                    let (first, weights) = view.rows.taps(row);
+                    let rows = [0, 1, 2, 3].map(|tap| stored(first + tap));
+                    for (column, mixed) in self.mixed.iter_mut().enumerate() {
+                        *mixed = interpolated(rows.map(|row| row[column]), weights);
+                    }
+                    &self.mixed[..]
+                }
+            };
+            let line = &mut line[..view.grid.len()];
+            match view.columns {
+                Sampling::Stored => line.copy_from_slice(&values[first..][..view.grid.len()]),
+                Sampling::Cubic { .. } => {
+                    for (value, &(first, weights)) in line.iter_mut().zip(&view.taps) {
+                        let taps = values[first as usize..].first_chunk();
+                        *value = interpolated(*taps.expect("the cells hold all taps"), weights);
+                    }
+                }
+            }
+        }
+        Some(TileTexture { values: &self.values, stride })
+    }
+}
+
+#[inline(always)]
+fn interpolated(values: [f32; TAPS], weights: [f32; TAPS]) -> f32 {
+    let [a, b, c, d] = core::array::from_fn(|tap| values[tap] * weights[tap]);
+    ((a + b) + c) + d
+}

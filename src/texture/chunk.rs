@@ -1,0 +1,95 @@
+//! `tXTR`: the Gaussians of a texture's map (spec, section 5.7).
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use byteorder::{ByteOrder, LittleEndian};
+
+use super::map;
+use crate::chunk::ChunkType;
+#[cfg(feature = "encode")]
+use crate::coding::entropy::Code;
+use crate::coding::entropy::{LayerCoder, Quantization};
+use crate::container::Header;
+use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
+
+/// The steps of position, size, ratio and slant.
+const GEOMETRY: [f32; 4] = [1.095_445_1, 0.774_596_7, 0.866_025_4, 1.732_050_8];
+/// Bytes of the colour step, which precedes the layer.
+const STEP_BYTES: usize = size_of::<f32>();
+
+/// The texture of a picture: the Gaussians of its map.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Texture {
+    /// The header of the map.
+    header: Header,
+    gaussians: Vec<Gaussian>,
+}
+
+impl Texture {
+    /// Reads the number of Gaussians in a payload, of which a map has at most as many as nodes.
+    ///
+    /// # Errors
+    /// When the payload is too short, or declares too many.
+    pub(crate) fn count(payload: &[u8], picture: &Header) -> Result<u32, DecodeError> {
+        let malformed = |reason| DecodeError::malformed(ChunkType::TXTR, reason);
+        let layer = payload.get(STEP_BYTES..).ok_or_else(|| malformed("too short for a step"))?;
+        let map = map::header(picture);
+        let most = u64::from(map.width) * u64::from(map.height);
+        let (count, _) = LayerCoder::read_count(layer, u32::MAX)
+            .map_err(|error| error.in_chunk(ChunkType::TXTR))?;
+        if count as u64 > most {
+            return Err(malformed("more Gaussians than nodes"));
+        }
+        Ok(count as u32)
+    }
+
+    /// Reads a payload, the number of whose Gaussians was checked.
+    ///
+    /// # Errors
+    /// When it is malformed.
+    pub(crate) fn parse(payload: &[u8], picture: &Header) -> Result<Self, DecodeError> {
+        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
+        let header = map::header(picture);
+        let step = LittleEndian::read_f32(payload);
+        let quantization = quantization(step).map_err(named)?;
+        let coder = LayerCoder::new(&quantization, &header);
+        let (count, bytes) =
+            LayerCoder::read_count(&payload[STEP_BYTES..], u32::MAX).map_err(named)?;
+        let mut gaussians = Vec::with_capacity(count);
+        let mut receive = |code, shape: &_| {
+            gaussians.push(quantization.gaussian(&code, shape, &coder.grid, header.color));
+        };
+        coder.read(count, bytes, None, &mut receive).map_err(named)?;
+        Ok(Self { header, gaussians })
+    }
+
+    /// The payload of a map with these codes, which it sorts into the order of the file.
+    #[cfg(feature = "encode")]
+    pub(crate) fn to_payload(codes: &mut [Code], step: f32, picture: &Header) -> Vec<u8> {
+        let quantization = quantization(step).expect("a valid step");
+        let layer = LayerCoder::new(&quantization, &map::header(picture)).write(codes);
+        [&step.to_le_bytes(), &layer.payload[..]].concat()
+    }
+
+    /// The header of the map.
+    pub(crate) fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The Gaussians of the map.
+    pub(crate) fn gaussians(&self) -> &[Gaussian] {
+        &self.gaussians
+    }
+
+    /// Bytes of memory that it holds.
+    pub(crate) fn memory(&self) -> u64 {
+        (self.gaussians.capacity() * size_of::<Gaussian>()) as u64
+    }
+}
+
+/// The quantization grid of a map with this colour step.
+fn quantization(step: f32) -> Result<Quantization, DecodeError> {
+    Quantization::checked(GEOMETRY, vec![step; map::CHANNELS])
+}

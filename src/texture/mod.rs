@@ -1,0 +1,14 @@
+//! Texture: what a picture has too much of to store it sample by sample, as noise of the strength that a
+//! map gives (spec, sections 5.7 and 9.7).
+//!
+//! [`chunk`] reads and writes the Gaussians of the map, [`map`] says what the map's values mean,
+//! [`noise`] makes the patterns, and [`synthesis`] adds them up.
+
+mod chunk;
+mod map;
+mod noise;
+mod synthesis;
+
+pub(crate) use chunk::Texture;
+pub(crate) use map::{CELL, NodeMap};
+pub(crate) use synthesis::Synthesis;
