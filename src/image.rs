@@ -76,6 +76,7 @@ pub struct GipDecoder<R> {
     limits: Limits,
     /// Width and height of the whole output in pixels.
     size: (u32, u32),
+    texture: bool,
 }
 
 impl<R: Read> GipDecoder<R> {
@@ -94,7 +95,7 @@ impl<R: Read> GipDecoder<R> {
     pub fn new_with_limits(reader: R, limits: Limits) -> ImageResult<Self> {
         let decoder = Decoder::new_with_limits(reader, limits.clone())?;
         let size = (decoder.header().width, decoder.header().height);
-        Ok(Self { decoder, limits, size })
+        Ok(Self { decoder, limits, size, texture: true })
     }
 
     /// Renders the whole picture with `width` x `height` pixels instead of its stored size; see
@@ -113,10 +114,16 @@ impl<R: Read> GipDecoder<R> {
         Ok(())
     }
 
+    /// Whether the picture's texture is rendered; see [`RenderOptions::with_texture`]. Default `true`.
+    pub fn set_texture(&mut self, texture: bool) {
+        self.texture = texture;
+    }
+
     /// Renders a region into rows that begin `row_pitch` bytes apart.
     fn render(&mut self, region: Region, buf: &mut [u8], row_pitch: usize) -> ImageResult<()> {
         let (width, height) = self.size;
         let options = RenderOptions::new().with_size(width, height).with_region(region);
+        let options = options.with_texture(self.texture);
         self.decoder.set_options(options);
         let depth = self.decoder.header().depth;
         let row = region.width as usize * usize::from(self.color_type().bytes_per_pixel());

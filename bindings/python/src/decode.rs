@@ -36,6 +36,8 @@ use crate::{metadata, threads};
 ///         encoded picture had.
 ///     out: The array to decode into: C-contiguous, aligned, writeable, not masked, of the shape of the
 ///         result.
+///     texture: Whether the texture of the picture is rendered: the noise in place of sand, water or
+///         leaves. Without it the picture is smoother, and nearer to the source sample by sample.
 ///     threads: The number of threads, 1 to 1024. With 1, the work is done on the caller's thread. The
 ///         samples are the same.
 ///     limits: What the file may cost at most. Default: Limits().
@@ -53,7 +55,7 @@ use crate::{metadata, threads};
 ///         and for float32 of several channels.
 ///     OSError: The file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, threads=1, limits=None))]
+#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, texture=true, threads=1, limits=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn decode<'py>(
     py: Python<'py>,
@@ -65,11 +67,13 @@ pub(crate) fn decode<'py>(
     background: Option<&Bound<'py, PyAny>>,
     dtype: Option<&Bound<'py, PyAny>>,
     out: Option<&Bound<'py, PyAny>>,
+    texture: bool,
     #[pyo3(from_py_with = threads::checked)] threads: usize,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let prefix = None;
     let request =
-        Request { size, scale, region, mode, background, dtype, out, prefix: None, threads };
+        Request { size, scale, region, mode, background, dtype, out, prefix, texture, threads };
     let rendering = request.check()?;
     let file = Bytes::of_file(src)?;
     let bytes = file.as_slice()?;

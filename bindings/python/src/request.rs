@@ -32,6 +32,7 @@ pub(crate) struct Request<'a, 'py> {
     pub(crate) out: Option<&'a Bound<'py, PyAny>>,
     /// Render only the first Gaussians of the file.
     pub(crate) prefix: Option<Integer<'py>>,
+    pub(crate) texture: bool,
     pub(crate) threads: usize,
 }
 
@@ -48,7 +49,7 @@ pub(crate) struct Rendering {
 impl Request<'_, '_> {
     /// Refuses numbers and names that are out of range.
     pub(crate) fn check(&self) -> PyResult<Rendering> {
-        let mut options = RenderOptions::new();
+        let mut options = RenderOptions::new().with_texture(self.texture);
         let most = RenderOptions::MAX_OUTPUT_SIDE;
         let side = |name: &str, side: &Integer<'_>| side.within(name, 1..=most);
         if let Some((width, height)) = &self.size {

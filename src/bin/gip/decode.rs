@@ -184,7 +184,8 @@ fn render_options(
     let scale = |scale| (scaled(whole.0, scale), scaled(whole.1, scale));
     let (width, height) = args.size.or(args.scale.map(scale)).unwrap_or(whole);
     let (stored_width, stored_height) = orientation.turned_size(width, height);
-    let mut options = RenderOptions::new().with_size(stored_width, stored_height);
+    let mut options =
+        RenderOptions::new().with_size(stored_width, stored_height).with_texture(!args.no_texture);
     if let Some(region) = args.region {
         options = options.with_region(orientation.stored_region(region, width, height)?);
     }

@@ -39,6 +39,7 @@ def decode(
     background: float | Iterable[float] | None = None,
     dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
+    texture: bool = True,
     threads: int = 1,
     limits: Limits | None = None,
 ) -> NDArray[Any]: ...
@@ -86,6 +87,7 @@ class StreamDecoder:
         dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         prefix: int | None = None,
+        texture: bool = True,
         threads: int = 1,
     ) -> NDArray[Any]: ...
     def gaussians(self) -> NDArray[Any]: ...

@@ -67,11 +67,28 @@ class GipImageFile(ImageFile.ImageFile):
             self.info["xmp"] = header.xmp
         if header.texts:
             self.info["texts"] = header.texts
+        self._texture = True
         self._set_size(header.size, is_draft=False)
 
     def _set_size(self, size: tuple[int, int], *, is_draft: bool) -> None:
         self._size = size
-        self.tile = [ImageFile._Tile("gip", (0, 0, *size), 0, (is_draft,))]
+        self.tile = [ImageFile._Tile("gip", (0, 0, *size), 0, (is_draft, self._texture))]
+
+    @property
+    def texture(self) -> bool:
+        """Whether the texture of the picture is rendered: the noise in place of sand, water or leaves.
+
+        It can be set until the picture is loaded.
+        """
+        return self._texture
+
+    @texture.setter
+    def texture(self, texture: bool) -> None:
+        if not self.tile:
+            raise ValueError("the picture is loaded already")
+        self._texture = bool(texture)
+        ((name, extents, offset, (is_draft, _)),) = self.tile
+        self.tile = [ImageFile._Tile(name, extents, offset, (is_draft, self._texture))]
 
     def draft(
         self, mode: str | None, size: tuple[int, int] | None
@@ -144,16 +161,16 @@ class _Decoder(ImageFile.PyDecoder):
     def decode(self, buffer: Any) -> tuple[int, int]:
         assert self.fd is not None
         assert self.im is not None
-        (is_draft,) = self.args
+        is_draft, texture = self.args
         stream = StreamDecoder(limits=_LIMITS)
         try:
             self._read(self.fd, stream, self.im.size if is_draft else None)
             if self.mode == "I;16":
-                samples = stream.image(size=self.im.size, dtype=np.uint16)
+                samples = stream.image(size=self.im.size, dtype=np.uint16, texture=texture)
                 # Pillow's has the less significant byte first.
                 samples = samples.astype("<u2", copy=False)
             else:
-                samples = stream.image(size=self.im.size, dtype=np.uint8)
+                samples = stream.image(size=self.im.size, dtype=np.uint8, texture=texture)
         except GipError as error:
             raise OSError(str(error)) from error
         # It takes any buffer, without copying it.

@@ -117,6 +117,9 @@ pub(crate) struct Batch {
     #[arg(long, help_heading = "Decoding", value_name = "EXT", default_value = "png",
           requires = "decoding", value_parser = extension)]
     pub(crate) format: String,
+    /// Leave out the texture of decoded pictures: the noise in place of sand, water or leaves.
+    #[arg(long, help_heading = "Decoding", requires = "decoding")]
+    pub(crate) no_texture: bool,
     #[command(flatten)]
     pub(crate) keep: Keep,
     #[command(flatten)]
@@ -154,6 +157,7 @@ mod tests {
             assert!(parse(&[flags, &["--format", "jpg"]].concat()).is_some());
         }
         assert!(parse(&["--format", "jpg"]).is_none());
+        assert!(parse(&["--no-texture"]).is_none());
         assert!(parse(&["--decode", "--thumbnail", "64"]).is_none());
         assert!(parse(&["--decode", "--format", "gip"]).is_none());
     }

@@ -45,6 +45,10 @@ pub(crate) struct Decode {
     /// the upright output, after --scale or --size.
     #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = region)]
     pub(crate) region: Option<Region>,
+    /// Leave out the picture's texture: the noise in place of sand, water or leaves. The picture is then
+    /// smoother, and nearer to the source sample by sample.
+    #[arg(long)]
+    pub(crate) no_texture: bool,
     /// If the file is truncated or damaged, write the picture of the Gaussians that can be decoded,
     /// and print a warning, instead of failing.
     #[arg(long)]

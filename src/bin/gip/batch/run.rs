@@ -237,7 +237,7 @@ fn bar(length: usize) -> Result<ProgressBar> {
 mod tests {
     use super::*;
     use crate::source::Reading;
-    use image_gip::Limits;
+    use image_gip::{Limits, RenderOptions};
 
     #[test]
     #[cfg(unix)]
@@ -245,7 +245,8 @@ mod tests {
         let room = tempfile::tempdir().expect("a place for temporary files");
         let reading = Reading { limits: Limits::default(), allow_partial: false };
         let extension = "png".into();
-        let task = Task::Decode { extension, reading, bounds: None, policy: None };
+        let options = RenderOptions::new();
+        let task = Task::Decode { extension, reading, options, bounds: None, policy: None };
         let (budget, stop) = (Budget::new(1), Stop::default());
         let (items, rest, preserve_times) = (Vec::new(), Rest::default(), false);
         let batch = Batch { task, items, rest, preserve_times, jobs: 1, budget, stop };

@@ -38,6 +38,7 @@ pub(crate) enum Task {
     Decode {
         extension: String,
         reading: Reading,
+        options: RenderOptions,
         bounds: Option<(u32, u32)>,
         policy: Option<MetadataPolicy>,
     },
@@ -66,7 +67,9 @@ impl Task {
             let (extension, bounds) = (args.format.clone(), args.thumbnail);
             let policy =
                 if bounds.is_some() { policy } else { policy.or(Some(MetadataPolicy::All)) };
-            return Self::Decode { extension, reading, bounds, policy };
+            let options = RenderOptions::new().with_threads(Threads::One);
+            let options = options.with_texture(!args.no_texture);
+            return Self::Decode { extension, reading, options, bounds, policy };
         }
         let encoder = args.encoder.encoder().with_limits(limits).with_threads(Threads::One);
         Self::Encode { encoder: Box::new(encoder), reading, policy: policy.unwrap_or_default() }
@@ -109,8 +112,8 @@ impl Task {
             Self::Encode { encoder, reading, policy } => {
                 encode(encoder, reading, *policy, item, budget, stop)
             }
-            Self::Decode { reading, bounds, policy, .. } => {
-                decode(reading, *bounds, *policy, item, budget, stop)
+            Self::Decode { reading, options, bounds, policy, .. } => {
+                decode(reading, options.clone(), *bounds, *policy, item, budget, stop)
             }
         }
     }
@@ -177,6 +180,7 @@ fn encode(
 
 fn decode(
     reading: &Reading,
+    mut options: RenderOptions,
     bounds: Option<(u32, u32)>,
     policy: Option<MetadataPolicy>,
     item: &Item,
@@ -189,7 +193,6 @@ fn decode(
     let mut decoder =
         Decoder::new_with_limits(file, reading.limits.clone()).with_context(context)?;
     let metadata = decoder.metadata().clone();
-    let mut options = RenderOptions::new().with_threads(Threads::One);
     if let Some(bounds) = bounds {
         let (width, height) = fitted(decoder.header(), metadata.orientation(), bounds);
         options = options.with_size(width, height);
