@@ -1,7 +1,6 @@
 //! The texture of an output: that of the stored pixels, and where the grid is finer, a cubic interpolation
 //! of it (spec, section 9.7).
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -11,7 +10,7 @@ use super::view::View;
 use crate::error::DecodeError;
 use crate::region::Region;
 use crate::simd::Backend;
-use crate::texture::{CELL, NodeMap, Synthesis};
+use crate::texture::{CELL, NodeMap, make_cells};
 
 /// Points of a cubic interpolation.
 const TAPS: usize = 4;
@@ -162,7 +161,6 @@ impl Sampling {
 /// The texture of a row of tiles, and what a thread needs to make it.
 #[derive(Debug, Default)]
 pub(super) struct TextureRow {
-    synthesis: Box<Synthesis>,
     /// Rows of cells, each in the place that its number has by the remainder.
     cells: Vec<CellRow>,
     /// A row of stored pixels between rows.
@@ -208,7 +206,7 @@ impl TextureRow {
                 cells.values.resize(width * CELL, 0.0);
                 let columns = view.cells.clone();
                 let values = &mut cells.values;
-                cells.shows = self.synthesis.cells(&view.map, row, columns, values, width);
+                cells.shows = make_cells(&view.map, row, columns, values, width);
             }
             shows |= cells.shows;
         }

@@ -144,18 +144,17 @@ impl NodeMap {
         &self,
         row: i32,
         first: i32,
-        count: usize,
         gains: &mut [Gains<NODES>; OCTAVES],
     ) {
         let mut sums = [[0.0; NODES]; CHANNELS];
         let planes = self.sums.chunks_exact(self.shows.len());
-        let inside = first - self.region.x as i32;
+        let inside = (first - self.region.x as i32) as usize;
         for (sums, plane) in sums.iter_mut().zip(planes) {
             let line = self.row_of(plane, row);
-            if let Some(line) = line.get(inside as usize..).and_then(|line| line.get(..count)) {
-                sums[..count].copy_from_slice(line);
+            if let Some(line) = line.get(inside..).and_then(<[f32]>::first_chunk) {
+                *sums = *line;
             } else {
-                for (column, sum) in (first..).zip(&mut sums[..count]) {
+                for (column, sum) in (first..).zip(sums) {
                     *sum = line[self.column(column)];
                 }
             }

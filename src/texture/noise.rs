@@ -21,8 +21,7 @@ pub(super) struct Pattern {
     pub(super) octave: usize,
 }
 
-/// Rows of a pattern's lattice, of at most `WIDTH` points.
-#[derive(Debug)]
+/// Rows of a pattern's lattice, of `WIDTH` points each, which are a multiple of four.
 pub(super) struct Lattice<const WIDTH: usize> {
     pattern: Pattern,
     first: i32,
@@ -33,22 +32,16 @@ pub(super) struct Lattice<const WIDTH: usize> {
     numbers: [[f32; WIDTH]; 3],
 }
 
-impl<const WIDTH: usize> Default for Lattice<WIDTH> {
-    fn default() -> Self {
-        let pattern = Pattern { kind: 0, octave: 0 };
-        Self { pattern, first: 0, row: None, numbers: [[0.0; WIDTH]; 3] }
-    }
-}
-
 impl<const WIDTH: usize> Lattice<WIDTH> {
-    /// Begins with another pattern. The first column is a multiple of four.
-    pub(super) fn begin(&mut self, pattern: Pattern, first: i32) {
-        (self.pattern, self.first, self.row) = (pattern, first, None);
+    /// Rows that begin with column `first`, a multiple of four.
+    #[inline(always)]
+    pub(super) fn new(pattern: Pattern, first: i32) -> Self {
+        Self { pattern, first, row: None, numbers: [[0.0; WIDTH]; 3] }
     }
 
-    /// The values in row `row`. Their number is a multiple of four.
+    /// The values in row `row`.
     #[inline(always)]
-    pub(super) fn row(&mut self, row: i32, values: &mut [f32]) {
+    pub(super) fn row(&mut self, row: i32, values: &mut [f32; WIDTH]) {
         match self.pattern.kind {
             0 => self.isotropic(row, values),
             1 => self.horizontal(row, values),
@@ -57,75 +50,78 @@ impl<const WIDTH: usize> Lattice<WIDTH> {
     }
 
     #[inline(always)]
-    fn isotropic(&mut self, row: i32, values: &mut [f32]) {
-        let pairs = values.as_chunks_mut::<2>().0;
-        // With slices of one length, the compiler leaves out the checks of indices and vectorizes the loops.
-        let [a, b, c] = self.numbers.each_mut().map(|numbers| &mut numbers[..pairs.len()]);
+    fn isotropic(&mut self, row: i32, values: &mut [f32; WIDTH]) {
+        let [a, b, c] = &mut self.numbers;
         if self.row != Some(row >> 1) {
             self.row = Some(row >> 1);
             let (first, seed) = (self.first >> 1, self.pattern.seed(row >> 1));
-            for block in 0..pairs.len() {
+            for block in 0..WIDTH / 2 {
                 [a[block], b[block], c[block]] = numbers(first + block as i32, seed);
             }
         }
         let sign = if row & 1 == 0 { 1.0 } else { -1.0 };
-        for block in 0..pairs.len() {
+        for block in 0..WIDTH / 2 {
             let (mean, difference) = (sign * a[block], b[block] + sign * c[block]);
-            pairs[block] = [mean + difference, mean - difference];
+            values[2 * block] = mean + difference;
+            values[2 * block + 1] = mean - difference;
         }
     }
 
     #[inline(always)]
-    fn horizontal(&mut self, row: i32, values: &mut [f32]) {
+    fn horizontal(&mut self, row: i32, values: &mut [f32; WIDTH]) {
         if self.row != Some(row >> 2) {
             self.row = Some(row >> 2);
-            let seed = self.pattern.seed(row >> 2);
-            let mut near = numbers(self.first >> 2, seed);
-            for point in (0..values.len()).step_by(4) {
-                let far = numbers((self.first + point as i32 + 4) >> 2, seed);
-                for (numbers, (near, far)) in self.numbers.iter_mut().zip(near.iter().zip(far)) {
-                    let along = ALONG.map(|along| near + (far - near) * along);
-                    numbers[point..point + 4].copy_from_slice(&along);
+            let (first, seed) = (self.first >> 2, self.pattern.seed(row >> 2));
+            let mut near = numbers(first, seed);
+            for block in 0..WIDTH / 4 {
+                let far = numbers(first + block as i32 + 1, seed);
+                for (points, (near, far)) in self.numbers.iter_mut().zip(near.iter().zip(far)) {
+                    for (at, along) in ALONG.iter().enumerate() {
+                        points[4 * block + at] = near + (far - near) * along;
+                    }
                 }
                 near = far;
             }
         }
         let [a, b, c] = &self.numbers;
         let signs = SIGNS[(row & 3) as usize];
-        for (value, ((a, b), c)) in values.iter_mut().zip(a.iter().zip(b).zip(c)) {
-            *value = signs[0] * a + signs[1] * b + signs[2] * c;
+        for point in 0..WIDTH {
+            values[point] = signs[0] * a[point] + signs[1] * b[point] + signs[2] * c[point];
         }
     }
 
     #[inline(always)]
-    fn vertical(&mut self, row: i32, values: &mut [f32]) {
+    fn vertical(&mut self, row: i32, values: &mut [f32; WIDTH]) {
         let [near, far, _] = &mut self.numbers;
         if self.row != Some(row >> 2) {
-            let (pattern, first) = (self.pattern, self.first);
-            let fill = |row: i32, points: &mut [f32; WIDTH]| {
-                let seed = pattern.seed(row);
-                let blocks = points[..values.len()].as_chunks_mut::<4>().0;
-                for (block, points) in (first >> 2..).zip(blocks) {
-                    let numbers = numbers(block, seed);
-                    *points = SIGNS.map(|signs| signed(numbers, signs));
-                }
-            };
             if self.row == Some((row >> 2) - 1) {
-                core::mem::swap(near, far);
+                *near = *far;
             } else {
-                fill(row >> 2, near);
+                self.pattern.across(row >> 2, self.first >> 2, near);
             }
-            fill((row >> 2) + 1, far);
+            self.pattern.across((row >> 2) + 1, self.first >> 2, far);
             self.row = Some(row >> 2);
         }
         let along = ALONG[(row & 3) as usize];
-        for (value, (near, far)) in values.iter_mut().zip(near.iter().zip(far)) {
-            *value = *near + (*far - *near) * along;
+        for point in 0..WIDTH {
+            values[point] = near[point] + (far[point] - near[point]) * along;
         }
     }
 }
 
 impl Pattern {
+    /// The values of a row of blocks, from block `first` on, each in a row across the streaks.
+    #[inline(always)]
+    fn across<const WIDTH: usize>(self, row: i32, first: i32, values: &mut [f32; WIDTH]) {
+        let seed = self.seed(row);
+        for block in 0..WIDTH / 4 {
+            let [a, b, c] = numbers(first + block as i32, seed);
+            for (at, signs) in SIGNS.iter().enumerate() {
+                values[4 * block + at] = signs[0] * a + signs[1] * b + signs[2] * c;
+            }
+        }
+    }
+
     /// The seed of a row of blocks.
     fn seed(self, row: i32) -> u32 {
         let pattern = self.kind * (OCTAVES + 1) + self.octave;
@@ -142,9 +138,4 @@ fn numbers(block: i32, seed: u32) -> [f32; 3] {
     let mut hash = (block as u32).wrapping_mul(0x9E37_79B1).wrapping_add(seed);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x2C1B_3C6D);
     [hash >> 2 & 1023, hash >> 12 & 1023, hash >> 22].map(|bits| (2 * bits as i32 - 1023) as f32)
-}
-
-#[inline(always)]
-fn signed(numbers: [f32; 3], signs: [f32; 3]) -> f32 {
-    signs[0] * numbers[0] + signs[1] * numbers[1] + signs[2] * numbers[2]
 }
