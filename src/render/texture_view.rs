@@ -4,13 +4,16 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
+#[cfg(feature = "std")]
+use fearless_simd::{dispatch, f32x8, prelude::*};
+
 use super::tile::TileTexture;
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
 use super::view::View;
 use crate::error::DecodeError;
 use crate::region::Region;
 use crate::simd::Backend;
-use crate::texture::{CELL, NodeMap, make_cells};
+use crate::texture::{CELL, NodeMap, make_cells, ramp};
 
 /// Points of a cubic interpolation.
 const TAPS: usize = 4;
@@ -186,14 +189,29 @@ impl TextureRow {
         backend: Backend,
         top: u32,
     ) -> Option<TileTexture<'a>> {
-        backend.run(
-            #[inline(always)]
-            || self.prepare_with(view, top),
-        )
+        match backend {
+            Backend::Reference => self.prepare_with(view, top, ramp),
+            #[cfg(feature = "std")]
+            Backend::Simd(level) => dispatch!(level, simd => {
+                let steps = f32x8::load_array(simd, ramp(0.0, 1.0));
+                self.prepare_with(
+                    view,
+                    top,
+                    // Of the plain code, compilers make scattered stores.
+                    #[inline(always)]
+                    |left, change| (f32x8::splat(simd, left) + steps * change).to_array(),
+                )
+            }),
+        }
     }
 
     #[inline(always)]
-    fn prepare_with<'a>(&'a mut self, view: &TextureView, top: u32) -> Option<TileTexture<'a>> {
+    fn prepare_with<'a>(
+        &'a mut self,
+        view: &TextureView,
+        top: u32,
+        ramp: impl Fn(f32, f32) -> [f32; CELL] + Copy,
+    ) -> Option<TileTexture<'a>> {
         let grid = top..top + TILE_HEIGHT as u32;
         let width = view.width();
         self.cells.resize_with(view.cell_rows(), CellRow::default);
@@ -206,7 +224,7 @@ impl TextureRow {
                 cells.values.resize(width * CELL, 0.0);
                 let columns = view.cells.clone();
                 let values = &mut cells.values;
-                cells.shows = make_cells(&view.map, row, columns, values, width);
+                cells.shows = make_cells(&view.map, row, columns, values, width, ramp);
             }
             shows |= cells.shows;
         }

@@ -11,4 +11,4 @@ mod synthesis;
 
 pub(crate) use chunk::Texture;
 pub(crate) use map::{CELL, NodeMap};
-pub(crate) use synthesis::make_cells;
+pub(crate) use synthesis::{make_cells, ramp};

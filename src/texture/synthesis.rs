@@ -21,6 +21,7 @@ const QUARTER: usize = FULL / 4;
 
 /// Sets the texture of cells in row `row`, which are given by their columns: [`CELL`] rows of `stride`
 /// values, of which the first is that of the first cell. Returns whether any of them can be other than 0.
+/// `ramp` is [`ramp`], or the same with SIMD.
 #[inline(always)]
 pub(crate) fn make_cells(
     map: &NodeMap,
@@ -28,6 +29,7 @@ pub(crate) fn make_cells(
     cells: Range<i32>,
     out: &mut [f32],
     stride: usize,
+    ramp: impl Fn(f32, f32) -> [f32; CELL] + Copy,
 ) -> bool {
     out.fill(0.0);
     let mut shows = false;
@@ -39,7 +41,7 @@ pub(crate) fn make_cells(
         |part| {
             shows = true;
             let x = (part.start - cells.start) as usize * CELL;
-            make_part(map, row, part, &mut out[x..], stride);
+            make_part(map, row, part, &mut out[x..], stride, ramp);
         },
     );
     shows
@@ -47,7 +49,14 @@ pub(crate) fn make_cells(
 
 /// That of at most [`CELLS`] cells.
 #[inline(always)]
-fn make_part(map: &NodeMap, row: i32, cells: Range<i32>, out: &mut [f32], stride: usize) {
+fn make_part(
+    map: &NodeMap,
+    row: i32,
+    cells: Range<i32>,
+    out: &mut [f32],
+    stride: usize,
+    finest_ramp: impl Fn(f32, f32) -> [f32; CELL],
+) {
     // It is even, so that the blocks of all lattices begin there.
     let first = (cells.start - 1) & !1;
     let mut gains = [[[[0.0; NODES]; PATTERNS]; OCTAVES]; NODE_ROWS];
@@ -56,18 +65,18 @@ fn make_part(map: &NodeMap, row: i32, cells: Range<i32>, out: &mut [f32], stride
     }
     let part = Part { gains, row, first };
     let mut quarter = [[0.0; QUARTER]; 4];
-    part.add_octave::<{ CELL / 4 }, _>(2, 2 * row - 1, &mut quarter);
+    part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
     let mut half = [[0.0; HALF]; 6];
     for (index, line) in half.iter_mut().enumerate() {
         // The row above the cells is the lower half of a coarser row.
         enlarge(&quarter, index + 1, line);
     }
-    part.add_octave::<{ CELL / 2 }, _>(1, 4 * row - 1, &mut half);
+    part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
     let mut full = [[0.0; FULL]; CELL];
     for (index, line) in full.iter_mut().enumerate() {
         enlarge(&half, index + 2, line);
     }
-    part.add_octave::<CELL, _>(0, CELL as i32 * row, &mut full);
+    part.add_octave(0, CELL as i32 * row, &mut full, finest_ramp);
     let (x, width) = ((cells.start - first) as usize * CELL, cells.len() * CELL);
     for (line, full) in out.chunks_mut(stride).zip(&full) {
         line[..width].copy_from_slice(&full[x..x + width]);
@@ -85,15 +94,16 @@ struct Part {
 
 impl Part {
     /// Adds the patterns of an octave to rows of its lattice, from row `row` on. `POINTS` are those of a cell
-    /// along each axis.
+    /// along each axis; `ramp` has the values at these points, from the one at the node before them and its
+    /// change up to the next node.
     #[inline(always)]
     fn add_octave<const POINTS: usize, const WIDTH: usize>(
         &self,
         octave: usize,
         row: i32,
         lines: &mut [[f32; WIDTH]],
+        ramp: impl Fn(f32, f32) -> [f32; POINTS],
     ) {
-        let steps: [f32; POINTS] = core::array::from_fn(|at| (at as f32 + 0.5) / POINTS as f32);
         let points = POINTS as i32;
         // The row of nodes above a row of points.
         let above = |row: i32| (row.div_euclid(points) - (self.row - 1)) as usize;
@@ -115,14 +125,14 @@ impl Part {
             for (gains, between) in gains.iter().zip(&mut between[rows.clone()]) {
                 let gains = &gains[octave][kind];
                 for (pair, cell) in gains.windows(2).zip(between.as_chunks_mut().0) {
-                    *cell = steps.map(|step| pair[0] + (pair[1] - pair[0]) * step);
+                    *cell = ramp(pair[0], pair[1] - pair[0]);
                 }
             }
             let mut lattice = Lattice::<WIDTH>::new(Pattern { kind, octave }, self.first * points);
             let mut noise = [0.0; WIDTH];
             for (row, line) in (row..).zip(&mut *lines) {
                 lattice.row(row, &mut noise);
-                let down = steps[row.rem_euclid(points) as usize];
+                let down = step::<POINTS>(row.rem_euclid(points) as usize);
                 let [above, below] = [above(row), above(row) + 1].map(|row| &between[row]);
                 for at in 0..WIDTH {
                     line[at] += (above[at] + (below[at] - above[at]) * down) * noise[at];
@@ -130,6 +140,18 @@ impl Part {
             }
         }
     }
+}
+
+/// How far a point in a cell is on the way from one node to the next.
+#[inline(always)]
+pub(crate) const fn step<const POINTS: usize>(at: usize) -> f32 {
+    (at as f32 + 0.5) / POINTS as f32
+}
+
+/// The values at the points of a cell between two nodes, from that at the first of them and its change.
+#[inline(always)]
+pub(crate) fn ramp<const POINTS: usize>(left: f32, change: f32) -> [f32; POINTS] {
+    core::array::from_fn(|at| left + change * step::<POINTS>(at))
 }
 
 /// Enlarges a lattice by two along both axes, and sets row `index` of the result: its values are three quarters
