@@ -275,3 +275,61 @@ fn interpolated(values: [f32; TAPS], weights: [f32; TAPS]) -> f32 {
     let [a, b, c, d] = core::array::from_fn(|tap| values[tap] * weights[tap]);
     ((a + b) + c) + d
 }
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kernel::Kernel;
+    use crate::testing::{config, simd_levels};
+
+    /// A picture's sides, those of an output, a region of it, and a seed for the map.
+    fn outputs() -> impl Strategy<Value = ((u32, u32), (u32, u32), Region, u64)> {
+        let sides = |most: u32| (1..most, 1..most);
+        (sides(300), sides(400), any::<u64>()).prop_flat_map(|(stored, output, seed)| {
+            let part = |side: u32| (0..side).prop_flat_map(move |at| (Just(at), 1..=side - at));
+            (part(output.0), part(output.1)).prop_map(move |((x, width), (y, height))| {
+                (stored, output, Region { x, y, width, height }, seed)
+            })
+        })
+    }
+
+    proptest! {
+        #![proptest_config(config(60))]
+
+        #[test]
+        fn every_simd_level_gives_the_bits_of_the_scalar_code(
+            (stored, output, region, seed) in outputs()
+        ) {
+            let view = View::new(stored, output, region, Kernel::Quartic);
+            let map_sides = [stored.0, stored.1].map(|side| side.div_ceil(CELL as u32) + 1);
+            let texture = TextureView::new([stored.0, stored.1], map_sides, &view, |nodes| {
+                // A node in four has texture, and directions have all values.
+                let mut random = fastrand::Rng::with_seed(seed);
+                let count = nodes.pixels() as usize;
+                let sums = (0..4 * count).map(|at| {
+                    let value = random.f32();
+                    if at < 3 * count { (4.0 * value - 3.0) * 0.3 } else { value }
+                });
+                Ok(sums.collect())
+            });
+            if let Some(texture) = texture.expect("the map has no limits") {
+                for top in (view.region.y..view.region.y + view.region.height).step_by(TILE_HEIGHT) {
+                    let bits = |backend| {
+                        let mut row = TextureRow::default();
+                        let tiles = row.prepare(&texture, backend, top)?;
+                        let values = tiles.values.chunks(tiles.stride).take(TILE_HEIGHT);
+                        let width = view.region.width as usize;
+                        let values = values.flat_map(|line| &line[..width.min(line.len())]);
+                        Some(values.map(|value| value.to_bits()).collect::<Vec<_>>())
+                    };
+                    let expected = bits(Backend::Reference);
+                    for (name, level) in simd_levels() {
+                        prop_assert_eq!(bits(Backend::Simd(level)), expected.clone(), "{}", name);
+                    }
+                }
+            }
+        }
+    }
+}
