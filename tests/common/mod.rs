@@ -9,6 +9,9 @@ pub(crate) mod layered;
 pub(crate) mod memory;
 pub(crate) mod oracle;
 pub(crate) mod rans;
+pub(crate) mod scenes;
+pub(crate) mod synthesis;
+pub(crate) mod texture;
 
 use entropy::Code;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};

@@ -2,6 +2,7 @@
 //! in the specification's order, without tiles, footprints or vectors.
 
 use super::exp::exp;
+use super::synthesis::Synthesis;
 use super::{CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File};
 
 /// What to render (section 9.1).
@@ -11,6 +12,7 @@ pub(crate) struct Request {
     /// x, y, width, height.
     pub(crate) region: (u32, u32, u32, u32),
     pub(crate) prefix: usize,
+    pub(crate) texture: bool,
 }
 
 impl Request {
@@ -19,7 +21,16 @@ impl Request {
     }
 
     pub(crate) fn at(width: u32, height: u32) -> Self {
-        Self { size: (width, height), region: (0, 0, width, height), prefix: usize::MAX }
+        Self {
+            size: (width, height),
+            region: (0, 0, width, height),
+            prefix: usize::MAX,
+            texture: true,
+        }
+    }
+
+    pub(crate) fn without_texture(self) -> Self {
+        Self { texture: false, ..self }
     }
 }
 
@@ -102,10 +113,16 @@ pub(crate) fn parts(pixel: u32, grid: u32, output: u32) -> Vec<(u32, f32)> {
 
 /// Sections 9.1 to 9.5: one plane per channel.
 pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
-    let stored = (file.header.width, file.header.height);
+    let header = &file.header;
+    let stored = (header.width, header.height);
     let size = (grid(stored.0, request.size.0), grid(stored.1, request.size.1));
+    let texture = Synthesis::new(file, request.size).filter(|_| request.texture);
+    let sums = |region| {
+        let texture = texture.as_ref().map(|texture| texture.render(header.sides(), size, region));
+        sums(file, &Request { size, region, ..*request }, texture.as_deref())
+    };
     if size == request.size {
-        return sums(file, request);
+        return sums(request.region);
     }
     let (left, top, width, height) = request.region;
     let columns: Vec<_> = (left..left + width).map(|x| parts(x, size.0, request.size.0)).collect();
@@ -115,7 +132,7 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
         parts.last().and_then(|parts| parts.last()).expect("a pixel").0 + 1 - first(parts)
     };
     let region = (first(&columns), first(&rows), count(&columns), count(&rows));
-    let mut planes = sums(file, &Request { size, region, prefix: request.prefix });
+    let mut planes = sums(region);
     for sum in planes.iter_mut().flatten() {
         *sum = sum.clamp(0.0, 1.0);
     }
@@ -154,8 +171,8 @@ pub(crate) fn render(file: &File, request: &Request) -> Vec<Vec<f32>> {
     means
 }
 
-/// Sections 9.2 to 9.4, where the size of the request is that of the grid.
-fn sums(file: &File, request: &Request) -> Vec<Vec<f32>> {
+/// Sections 9.2 to 9.4, where the size of the request is that of the grid, with this texture.
+pub(crate) fn sums(file: &File, request: &Request, texture: Option<&[f32]>) -> Vec<Vec<f32>> {
     let header = &file.header;
     let scale =
         [request.size.0 as f32 / header.width as f32, request.size.1 as f32 / header.height as f32];
@@ -165,6 +182,13 @@ fn sums(file: &File, request: &Request) -> Vec<Vec<f32>> {
     let mut planes: Vec<Vec<f32>> = (0..header.channels())
         .map(|c| vec![f32::from(header.base[c]) / 65535.0; width as usize * height as usize])
         .collect();
+    let colors = header.channels() - usize::from(header.channels().is_multiple_of(2));
+    for plane in &mut planes[..colors] {
+        plane
+            .iter_mut()
+            .zip(texture.unwrap_or_default())
+            .for_each(|(sum, texture)| *sum += texture);
+    }
     for values in file.components().into_iter().take(request.prefix) {
         let center = [values[0], values[1]];
         let stored = cholesky(header.parameterization, [values[2], values[3], values[4]]);

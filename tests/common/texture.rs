@@ -1,0 +1,70 @@
+//! The chunk `tXTR` (section 5.7), written from `spec/gip.md` alone.
+
+use super::entropy::{self, Code, Grid};
+use super::rans::{self, Flaw};
+
+/// The Gaussians of a map.
+#[derive(Clone, Debug)]
+pub(crate) struct Texture {
+    /// Of the four colour axes.
+    pub(crate) step: f32,
+    pub(crate) codes: Vec<Code>,
+}
+
+/// The sides of the map of a picture with these sides.
+pub(crate) fn map_sides(sides: [u32; 2]) -> [u32; 2] {
+    sides.map(|side| side.div_ceil(8) + 1)
+}
+
+/// All steps of the layer in `tXTR`.
+pub(crate) fn steps(step: f32) -> [f32; 8] {
+    let [position, size, ratio, slant] = [1.2_f64, 0.6, 0.75, 3.0].map(|x| x.sqrt() as f32);
+    [position, size, ratio, slant, step, step, step, step]
+}
+
+impl Texture {
+    /// A map with these octaves and this direction at every node: one Gaussian so wide that it is flat.
+    pub(crate) fn constant(sides: [u32; 2], sums: [f32; 4]) -> Self {
+        let step = 64.0;
+        let sides = map_sides(sides);
+        let middle = Grid::new(sides).units(sides.map(|side| side as f32 / 2.0));
+        let mut code =
+            Code { exponent: 2, axes: vec![0; 4], size: 60, center: middle, ..Code::default() };
+        // What a step of an axis is worth depends on the size of the cell in which the Gaussian ends up.
+        let layer = |code: &Code| {
+            let ops = entropy::write(sides, &steps(step), &mut vec![code.clone()]);
+            let payload = [&1_u32.to_le_bytes()[..], &rans::encode(&ops)].concat();
+            entropy::read(sides, &steps(step), &payload).expect("what was just written")
+        };
+        code.axes[3] = 1 << 12;
+        let unit = layer(&code).values[0][8] / code.axes[3] as f32;
+        let [a, b, c, d] = [0.577_350_26, 0.707_106_77, 0.408_248_3, -0.816_496_6_f32];
+        let [m0, m1, m2, m3] = sums;
+        // The columns of the matrix of section 7.5 are orthonormal.
+        let axes = [a * (m0 + m1 + m2), b * (m0 - m2), c * (m0 + m2) + d * m1, m3 - 0.5];
+        code.axes = axes.map(|axis| (axis / unit).round() as i32).to_vec();
+        Self { step, codes: vec![code] }
+    }
+
+    /// The payload of `tXTR` in a picture with these sides.
+    pub(crate) fn payload(&self, sides: [u32; 2]) -> Vec<u8> {
+        let ops = entropy::write(map_sides(sides), &steps(self.step), &mut self.codes.clone());
+        let count = (self.codes.len() as u32).to_le_bytes();
+        [&self.step.to_le_bytes()[..], &count, &rans::encode(&ops)].concat()
+    }
+}
+
+/// The components of the map's Gaussians.
+pub(crate) fn read(sides: [u32; 2], payload: &[u8]) -> Result<Vec<Vec<f32>>, Flaw> {
+    let (step, layer) = payload.split_first_chunk().ok_or("no step")?;
+    let step = f32::from_le_bytes(*step);
+    if !(2_f32.powi(-20)..=2_f32.powi(10)).contains(&step) {
+        return Err("a step out of range");
+    }
+    let sides = map_sides(sides);
+    let values = entropy::read(sides, &steps(step), layer)?.values;
+    if values.len() as u64 > u64::from(sides[0]) * u64::from(sides[1]) {
+        return Err("more Gaussians than nodes");
+    }
+    Ok(values)
+}

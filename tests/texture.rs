@@ -1,0 +1,336 @@
+//! Texture against an oracle that was written from the specification, bit for bit, and that it looks like
+//! what it is for: noise of the strength that the map says, without a pattern that repeats.
+
+mod common;
+
+use common::entropy::{Code, Grid};
+use common::oracle::Request;
+use common::scenes::{SMOOTH, assert_matches_oracle, planes, random_rows, scene};
+use common::texture::{Texture, map_sides};
+use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random};
+use image_gip::Threads;
+
+/// Random Gaussians with small codes over a map.
+fn random_map(random: &mut Random, sides: [u32; 2], step: f32, count: usize) -> Texture {
+    let map = map_sides(sides);
+    let grid = Grid::new(map);
+    let code = |_| {
+        let exponent = (random.next() % 6) as u32;
+        let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
+        let shape = 1 << exponent.saturating_sub(1);
+        let axes = [6, 6, 6, 2].map(&mut within).to_vec();
+        let [size, ratio, slant] = [within(shape), within(shape), within(shape)];
+        let center = grid.units(map.map(|side| random.range(0.0, side as f32)));
+        Code { exponent, axes, size, ratio, slant, center }
+    };
+    Texture { step, codes: (0..count).map(code).collect() }
+}
+
+/// A picture of a few Gaussians with this texture.
+fn textured(color: u8, size: (u32, u32), texture: &Texture) -> File {
+    let rows = random_rows(&mut Random(8), 6, (color, CHOLESKY), size);
+    let file = scene(color, CHOLESKY, SMOOTH, size, &rows);
+    let payload = texture.payload(file.header.sides());
+    file.with(b"tXTR", &payload)
+}
+
+/// Sizes of the output: as stored, enlarged along one or both axes, and reduced down to where texture is
+/// gone.
+fn outputs((width, height): (u32, u32)) -> Vec<(u32, u32)> {
+    let scaled = |(x, y): (f64, f64)| {
+        let side = |side: u32, factor: f64| ((f64::from(side) * factor).round() as u32).max(1);
+        (side(width, x), side(height, y))
+    };
+    let factors = [
+        (1.0, 1.0),
+        (1.37, 1.0),
+        (1.0, 2.6),
+        (1.9, 1.3),
+        (3.0, 0.5),
+        (0.7, 1.6),
+        (0.9, 0.9),
+        (0.5, 0.5),
+        (0.25, 0.25),
+        (0.2, 0.2),
+        (0.126, 0.126),
+        (0.1, 0.1),
+        (0.1, 1.2),
+    ];
+    factors.map(scaled).to_vec()
+}
+
+#[test]
+fn random_maps_match_the_oracle_bit_for_bit() {
+    let mut random = Random(11);
+    let colors = [GRAY, GRAY_ALPHA, RGB, RGBA];
+    let sizes = [(1, 1), (8, 8), (1, 40), (9, 7), (33, 17), (64, 3), (47, 80), (200, 150)];
+    for (size, color) in sizes.into_iter().zip(colors.into_iter().cycle()) {
+        let sides = [size.0, size.1];
+        let nodes = map_sides(sides).map(|side| side as usize);
+        // Strong, and just above what is cut off.
+        for step in [1.0, 0.02] {
+            let count = (nodes[0] * nodes[1]).min(14);
+            let file = textured(color, size, &random_map(&mut random, sides, step, count));
+            for (width, height) in outputs(size) {
+                assert_matches_oracle(&file, &Request::at(width, height));
+            }
+        }
+    }
+}
+
+#[test]
+fn every_octave_and_direction_matches_the_oracle() {
+    for octave in 0..3 {
+        for direction in [0.5, 0.95, 0.05, 0.6, 0.4] {
+            let mut sums = [0.0, 0.0, 0.0, direction];
+            sums[octave] = 0.7;
+            let size = (37, 45);
+            let file = textured(GRAY, size, &Texture::constant([size.0, size.1], sums));
+            for (width, height) in [size, (50, 20), (74, 135)] {
+                assert_matches_oracle(&file, &Request::at(width, height));
+            }
+        }
+    }
+}
+
+#[test]
+fn regions_and_prefixes_match_the_oracle() {
+    let mut random = Random(12);
+    let size = (131, 77);
+    let file = textured(RGBA, size, &random_map(&mut random, [131, 77], 1.0, 30));
+    for (width, height) in outputs(size).into_iter().chain([(4000, 3001), (1 << 23, 1 << 23)]) {
+        for _ in 0..4 {
+            let mut part = |side: u32| {
+                let start = random.next() as u32 % side;
+                (start, 1 + random.next() as u32 % (side - start).min(40))
+            };
+            let ((x, columns), (y, rows)) = (part(width), part(height));
+            let prefix = random.next() as usize % 8;
+            let region = (x, y, columns, rows);
+            assert_matches_oracle(&file, &Request { region, prefix, ..Request::at(width, height) });
+        }
+    }
+}
+
+#[test]
+fn without_texture_the_samples_are_those_of_the_file_without_the_chunk() {
+    let mut random = Random(13);
+    let size = (60, 44);
+    for color in [GRAY, GRAY_ALPHA, RGB, RGBA] {
+        let file = textured(color, size, &random_map(&mut random, [60, 44], 1.0, 12));
+        let bare = File { extra: Vec::new(), ..file.clone() };
+        for (width, height) in outputs(size) {
+            let request = Request::at(width, height);
+            assert_matches_oracle(&file, &request.without_texture());
+            for reference in [false, true] {
+                let [with, without, expected] =
+                    [(&file, request), (&file, request.without_texture()), (&bare, request)]
+                        .map(|(file, request)| planes(file, &request, reference, Threads::One));
+                assert_eq!(without, expected, "{width}x{height}");
+                let shows = 8.0 * (width as f32 / 60.0).min(height as f32 / 44.0) > 1.0;
+                assert_eq!(with != expected, shows, "{width}x{height}");
+                // Alpha has none.
+                if color % 2 == 1 {
+                    let alpha = expected.len() / (usize::from(color) + 1) * usize::from(color);
+                    let opaque = with[alpha..] == expected[alpha..];
+                    assert!(opaque, "{width}x{height}: texture in alpha");
+                }
+            }
+        }
+    }
+}
+
+/// Maps that an encoder would not write.
+fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
+    let map = map_sides(sides);
+    let grid = Grid::new(map);
+    let at = |x: f32, y: f32, axes: [i32; 4]| Code {
+        exponent: 2,
+        axes: axes.to_vec(),
+        center: grid.units([x, y]),
+        ..Code::default()
+    };
+    let nodes = || (0..map[1]).flat_map(|y| (0..map[0]).map(move |x| (x, y)));
+    let sign = |x: u32, y: u32| if (x + y).is_multiple_of(2) { 1 } else { -1 };
+    let on_nodes = |axes: &dyn Fn(u32, u32) -> [i32; 4]| -> Vec<Code> {
+        nodes().map(|(x, y)| at(x as f32 + 0.5, y as f32 + 0.5, axes(x, y))).collect()
+    };
+    let last = map[0] as f32 - 0.1;
+    vec![
+        ("as many Gaussians as nodes", {
+            let codes = on_nodes(&|x, y| [9 * sign(x, y), 5, -3 * sign(x, y), 6 * sign(y, 0)]);
+            Texture { step: 0.3, codes }
+        }),
+        ("as many at one point", {
+            Texture { step: 0.01, codes: nodes().map(|_| at(2.2, 2.9, [5, 1, -2, 1])).collect() }
+        }),
+        ("colours at the bound", {
+            let codes = on_nodes(&|x, y| [60 * sign(x, y), 20, -20, 60 * sign(x, 0)]);
+            Texture { step: 900.0, codes }
+        }),
+        (
+            "the largest step",
+            Texture {
+                step: 1024.0,
+                codes: vec![at(1.0, 1.0, [1, 0, -1, 1]), at(last, 2.0, [60_000, -3, 2, -60_000])],
+            },
+        ),
+        (
+            "the least step",
+            Texture {
+                step: 1.0 / 1_048_576.0,
+                codes: vec![
+                    at(1.0, 1.0, [1, 0, -1, 1]),
+                    at(last, 2.0, [65_000, 60_000, -50_000, 65_000]),
+                ],
+            },
+        ),
+        ("all negative", Texture { step: 1.0, codes: on_nodes(&|_, _| [-9, 0, 0, 3]) }),
+        (
+            "around the map",
+            Texture {
+                step: 1.0,
+                codes: [[-7.5, -7.5], [map[0] as f32 + 7.0, 1.0], [1.0, map[1] as f32 + 7.0]]
+                    .map(|[x, y]| Code { size: 9, ..at(x, y, [40, 9, 9, 20]) })
+                    .to_vec(),
+            },
+        ),
+        (
+            "none that is drawn",
+            Texture {
+                step: 1.0,
+                codes: vec![
+                    Code { size: 400, ..at(1.0, 1.0, [9, 0, 0, 0]) },
+                    Code { size: -400, ..at(2.0, 1.0, [9, 0, 0, 0]) },
+                ],
+            },
+        ),
+        (
+            "needles",
+            Texture {
+                step: 1.0,
+                codes: (-6..=6)
+                    .map(|slant| Code {
+                        size: 5,
+                        ratio: 3,
+                        slant: 9 * slant,
+                        ..at(4.0, 3.0, [30, 8, 9, 4])
+                    })
+                    .collect(),
+            },
+        ),
+    ]
+}
+
+#[test]
+fn extreme_maps_match_the_oracle() {
+    let size = (58, 41);
+    for (name, texture) in extreme_maps([58, 41]) {
+        println!("{name}");
+        for color in [GRAY, RGBA] {
+            let file = textured(color, size, &texture);
+            for (width, height) in [size, (80, 41), (58, 60), (30, 21), (13, 9), (6, 4)] {
+                assert_matches_oracle(&file, &Request::at(width, height));
+            }
+            let close_up =
+                Request { region: (31_000, 32_000, 40, 30), ..Request::at(1 << 16, 1 << 16) };
+            assert_matches_oracle(&file, &close_up);
+        }
+    }
+}
+
+/// The texture of a part of a picture of 24 megapixels that has the same of it everywhere, in rows of `SIDE`.
+fn constant(octaves: [f32; 3], direction: f32) -> Vec<f64> {
+    const PICTURE: (u32, u32) = (6000, 4000);
+    let sums = octaves.map(|deviation| 2.0 * deviation + 1.0 / 128.0);
+    let [m0, m1, m2] = sums;
+    let texture = Texture::constant(PICTURE.into(), [m0, m1, m2, direction]);
+    let header =
+        Ghdr { width: PICTURE.0, height: PICTURE.1, base: [32768, 0, 0, 0], ..Ghdr::default() };
+    let payload = texture.payload(header.sides());
+    let file = File::of_floats(header, &[]).with(b"tXTR", &payload);
+    let side = SIDE as u32;
+    let region = (4321, 2345, side, side);
+    let request = Request { region, ..Request::whole(&file) };
+    let base = f64::from(32768.0_f32 / 65535.0);
+    let planes = planes(&file, &request, false, Threads::Pool);
+    planes.into_iter().map(|bits| f64::from(f32::from_bits(bits)) - base).collect()
+}
+
+const SIDE: usize = 1024;
+const ISOTROPIC: f32 = 0.5;
+const HORIZONTAL: f32 = 0.9;
+const VERTICAL: f32 = 0.1;
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+/// The correlation of what is so far apart.
+fn correlation(texture: &[f64], (x, y): (usize, usize)) -> f64 {
+    let variance = mean(texture.iter().map(|value| value * value));
+    let row = |row: usize| &texture[row * SIDE..][..SIDE];
+    // A third of the rows tells enough.
+    let products = (0..(SIDE - y) / 3).map(|at| {
+        let pairs = row(3 * at).iter().zip(&row(3 * at + y)[x..]);
+        pairs.map(|(a, b)| a * b).sum::<f64>() / (SIDE - x) as f64
+    });
+    mean(products) / variance
+}
+
+#[test]
+fn an_octave_has_the_deviation_that_the_map_says() {
+    for octave in 0..3 {
+        for direction in [ISOTROPIC, HORIZONTAL, VERTICAL, 0.6, 0.4] {
+            let wanted = 0.125;
+            let mut octaves = [0.0; 3];
+            octaves[octave] = wanted as f32;
+            let texture = constant(octaves, direction);
+            let average = mean(texture.iter().copied());
+            let deviation = mean(texture.iter().map(|value| value * value)).sqrt();
+            println!("octave {octave}, {direction}: {average:e}, {deviation}");
+            assert!(average.abs() < wanted / 200.0, "octave {octave}, {direction}: mean {average}");
+            let error = (deviation / wanted - 1.0).abs();
+            assert!(error < 0.04, "octave {octave}, {direction}: deviation {deviation}");
+        }
+    }
+}
+
+#[test]
+fn streaks_are_long_in_their_direction() {
+    for octave in 0..3 {
+        let mut octaves = [0.0; 3];
+        octaves[octave] = 0.1;
+        let lag = 2 << octave;
+        for (direction, along, across) in
+            [(HORIZONTAL, (lag, 0), (0, lag)), (VERTICAL, (0, lag), (lag, 0))]
+        {
+            let texture = constant(octaves, direction);
+            let [along, across] = [along, across].map(|lag| correlation(&texture, lag));
+            println!("octave {octave}, {direction}: {along}, {across}");
+            assert!(along > 0.4 && across < 0.1, "octave {octave}: {along} along, {across} across");
+        }
+        let texture = constant(octaves, ISOTROPIC);
+        let both = [(lag, 0), (0, lag)].map(|lag| correlation(&texture, lag));
+        println!("octave {octave}: {both:?}");
+        assert!((both[0] - both[1]).abs() < 0.02, "octave {octave}: {both:?}");
+    }
+}
+
+#[test]
+fn texture_does_not_repeat() {
+    for direction in [ISOTROPIC, HORIZONTAL, VERTICAL] {
+        for octave in 0..3 {
+            let mut octaves = [0.0; 3];
+            octaves[octave] = 0.1;
+            let texture = constant(octaves, direction);
+            // Streaks are four points long, and change to the next.
+            let lags = (8 << octave..=512).flat_map(|lag| [(lag, 0), (0, lag), (lag, lag)]);
+            let found = lags.map(|lag| (correlation(&texture, lag).abs(), lag));
+            let worst = found.max_by(|a, b| a.0.total_cmp(&b.0)).expect("a lag");
+            println!("octave {octave}, {direction}: {worst:?}");
+            assert!(worst.0 < 0.06, "octave {octave}, {direction}: {worst:?}");
+        }
+    }
+}
