@@ -10,6 +10,8 @@ mod common;
 mod entropy;
 #[path = "vectors/sound.rs"]
 mod sound;
+#[path = "vectors/texture.rs"]
+mod texture;
 
 use core::fmt::Write as _;
 use std::fs;
@@ -43,6 +45,8 @@ enum Rendering {
     SizeAndRegion((u32, u32), (u32, u32, u32, u32)),
     Prefix(u32),
     Color(ColorModel),
+    /// Without texture.
+    Plain,
 }
 
 impl Rendering {
@@ -56,6 +60,7 @@ impl Rendering {
             }
             Self::Prefix(count) => format!("first {count}"),
             Self::Color(color) => format!("as {color:?}"),
+            Self::Plain => "without texture".into(),
         }
     }
 
@@ -69,6 +74,7 @@ impl Rendering {
             Self::SizeAndRegion((w, h), part) => options.with_size(w, h).with_region(region(part)),
             Self::Prefix(count) => options.with_prefix(count),
             Self::Color(color) => options.with_color(color),
+            Self::Plain => options.with_texture(false),
         }
     }
 
@@ -83,6 +89,7 @@ impl Rendering {
                 (request.size, request.region) = (size, region);
             }
             Self::Prefix(count) => request.prefix = count as usize,
+            Self::Plain => request.texture = false,
             Self::Color(_) => return None,
         }
         Some(request)
@@ -189,7 +196,14 @@ fn lines(vector: &Vector) -> String {
 #[test]
 fn the_folder_holds_what_the_specification_describes() {
     let folder = Path::new(FOLDER);
-    let vectors = [sound::valid(), entropy::valid(), broken::invalid(), entropy::invalid()];
+    let vectors = [
+        sound::valid(),
+        entropy::valid(),
+        texture::valid(),
+        broken::invalid(),
+        entropy::invalid(),
+        texture::invalid(),
+    ];
     let vectors = vectors.into_iter().flatten().collect::<Vec<Vector>>();
     let mut index = String::from("file\trendering\tresult\tshows\n");
     for vector in &vectors {

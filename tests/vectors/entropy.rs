@@ -42,7 +42,7 @@ fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
     (0..count).map(one).collect()
 }
 
-fn scattered(seed: u64, header: Ghdr, count: usize) -> File {
+pub(super) fn scattered(seed: u64, header: Ghdr, count: usize) -> File {
     let codes = scatter(seed, &header, count);
     File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
 }

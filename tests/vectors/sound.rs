@@ -14,7 +14,7 @@ fn gray() -> Ghdr {
 
 /// The paper's bit depths over a picture of this size: 12 for positions, 10 for shapes, 6 for
 /// colours; standard deviations from 0.3 to 6 pixels in their logarithm.
-fn packed(color: u8, size: (u32, u32)) -> Vec<Entry> {
+pub(super) fn packed(color: u8, size: (u32, u32)) -> Vec<Entry> {
     let mut entries = vec![
         Entry::linear(12, size.0 as f32 / 4096.0, 0.0),
         Entry::linear(12, size.1 as f32 / 4096.0, 0.0),
@@ -34,7 +34,7 @@ fn codes(seed: u64, entries: &[Entry], count: usize) -> Vec<u32> {
 }
 
 /// A packed file of random Gaussians.
-fn random_file(seed: u64, header: Ghdr, count: usize) -> File {
+pub(super) fn random_file(seed: u64, header: Ghdr, count: usize) -> File {
     let entries = packed(header.color, (header.width, header.height));
     let codes = codes(seed, &entries, count);
     File::new(header, entries, vec![codes])

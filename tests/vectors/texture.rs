@@ -1,0 +1,259 @@
+//! The test vectors of texture.
+
+use super::common::entropy::{Code, Grid};
+use super::common::texture::{self, Texture, map_sides};
+use super::common::{File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks};
+use super::entropy::scattered;
+use super::sound::random_file;
+use super::{Rendering, Vector, header};
+
+/// A Gaussian of step exponent 2 at a point of a map, as large as its cell lets expect, not slanted.
+fn at(header: &Ghdr, point: [f32; 2], axes: [i32; 4]) -> Code {
+    let center = Grid::new(map_sides(header.sides())).units(point);
+    Code { exponent: 2, axes: axes.to_vec(), center, ..Code::default() }
+}
+
+/// Random Gaussians with small codes in the map.
+fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
+    let mut random = Random(seed);
+    let sides = map_sides(header.sides()).map(|side| side as f32);
+    let one = |_| {
+        let point = sides.map(|side| random.range(0.0, side));
+        let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
+        let axes = [6, 4, 4, 3].map(&mut within);
+        let [size, ratio, slant] = [2, 2, 2].map(within);
+        Code { size, ratio, slant, ..at(header, point, axes) }
+    };
+    (0..count).map(one).collect()
+}
+
+fn with(file: File, texture: &Texture) -> File {
+    let payload = texture.payload(file.header.sides());
+    file.with(b"tXTR", &payload)
+}
+
+/// A file with random texture.
+fn textured(seed: u64, file: File, count: usize) -> File {
+    let codes = scatter(seed, &file.header, count);
+    with(file, &Texture { step: 0.4, codes })
+}
+
+/// A gray picture without Gaussians.
+fn empty(width: u32, height: u32) -> File {
+    File::new(header(GRAY, width, height), super::sound::packed(GRAY, (width, height)), vec![])
+}
+
+pub(super) fn valid() -> Vec<Vector> {
+    let nodes = |header: &Ghdr| {
+        let [columns, rows] = map_sides(header.sides());
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| [column, row]))
+    };
+    let most = {
+        let file = empty(33, 20);
+        let code = |[column, row]: [u32; 2]| {
+            let sign = if (column + row).is_multiple_of(2) { 1 } else { -1 };
+            let point = [column, row].map(|node| node as f32 + 0.5);
+            at(&file.header, point, [9, 5 * sign, -3, 5 * sign])
+        };
+        let codes = nodes(&file.header).map(code).collect();
+        with(file.clone(), &Texture { step: 0.3, codes })
+    };
+    let beyond = {
+        let file = random_file(201, header(RGB, 40, 24), 8);
+        let codes = vec![
+            at(&file.header, [1.0, 1.0], [900, 200, -300, 900]),
+            at(&file.header, [4.5, 3.0], [900, -200, 300, -900]),
+            at(&file.header, [3.0, 1.0], [-500, 0, 0, 0]),
+        ];
+        with(file, &Texture { step: 1.0, codes })
+    };
+    let steps = |step: f32, axes: [i32; 4]| {
+        let file = empty(24, 16);
+        let codes = vec![at(&file.header, [1.5, 1.5], axes)];
+        with(file, &Texture { step, codes })
+    };
+    let not_drawn = {
+        let file = empty(24, 16);
+        let sound = at(&file.header, [1.5, 1.5], [9, 0, 0, 0]);
+        let codes =
+            vec![Code { size: 400, ..sound.clone() }, sound.clone(), Code { size: -400, ..sound }];
+        with(file, &Texture { step: 0.3, codes })
+    };
+    let constant = |name, shows, direction| {
+        let file = empty(40, 24);
+        let texture = Texture::constant(file.header.sides(), [0.2, 0.3, 0.4, direction]);
+        Vector::valid(name, shows, with(file, &texture)).also(&[
+            Rendering::Size(57, 24),
+            Rendering::Size(40, 31),
+            Rendering::SizeAndRegion((4000, 2400), (1999, 1001, 31, 17)),
+            Rendering::Size(16, 10),
+        ])
+    };
+    let late = {
+        let file = textured(202, random_file(202, header(GRAY, 24, 16), 12), 4);
+        let mut chunks = file.chunks();
+        chunks.insert(4, chunk(b"tXTR", b"?"));
+        Vector::valid_chunks(
+            "texture-late",
+            "a second tXTR, after a layer, which is skipped",
+            file,
+            &chunks,
+        )
+    };
+    let bounded = {
+        let file = scattered(203, header(RGBA, 70, 45), 20);
+        let bounds = file.bounds();
+        textured(203, file.with(b"bNDS", &bounds), 20)
+    };
+    vec![
+        Vector::valid(
+            "texture-gray8",
+            "texture with all patterns on a picture of the packed coding; other sizes, regions and colour models",
+            textured(200, random_file(200, header(GRAY, 61, 43), 12), 16),
+        )
+        .also(&[
+            Rendering::Plain,
+            Rendering::Size(88, 43),
+            Rendering::Size(61, 100),
+            Rendering::Size(150, 97),
+            Rendering::Size(122, 20),
+            Rendering::Size(55, 39),
+            Rendering::Size(30, 21),
+            Rendering::Size(15, 10),
+            Rendering::Size(12, 9),
+            Rendering::Size(8, 6),
+            Rendering::Size(7, 5),
+            Rendering::Region(3, 5, 17, 9),
+            Rendering::SizeAndRegion((30, 21), (7, 3, 9, 5)),
+            Rendering::SizeAndRegion((610, 430), (301, 207, 33, 21)),
+            Rendering::SizeAndRegion((8_388_608, 8_388_608), (4_000_000, 4_000_001, 9, 5)),
+            Rendering::Prefix(3),
+            Rendering::Color(image_gip::ColorModel::Rgba),
+        ]),
+        Vector::valid(
+            "texture-gray-alpha8",
+            "texture of a picture with alpha, which has none",
+            textured(204, random_file(204, header(GRAY_ALPHA, 29, 33), 10), 9),
+        )
+        .also(&[Rendering::Size(11, 12), Rendering::Size(41, 33)]),
+        Vector::valid(
+            "texture-rgb16",
+            "texture of a picture of the entropy coding with 16 bits",
+            textured(205, scattered(205, Ghdr { depth: 16, ..header(RGB, 50, 31) }, 15), 12),
+        )
+        .also(&[Rendering::Plain, Rendering::Size(75, 60), Rendering::Size(13, 8)]),
+        Vector::valid(
+            "texture-rgba8",
+            "texture beside bNDS in a picture of the entropy coding",
+            bounded,
+        )
+        .also(&[
+            Rendering::Region(1, 2, 3, 4),
+            Rendering::Region(60, 37, 10, 8),
+            Rendering::SizeAndRegion((400, 20), (120, 7, 9, 5)),
+        ]),
+        constant("texture-isotropic", "isotropic texture, as strong everywhere, of no Gaussian", 0.5),
+        constant("texture-horizontal", "horizontal streaks, as strong everywhere", 0.9),
+        constant("texture-vertical", "vertical streaks, as strong everywhere", 0.1),
+        Vector::valid(
+            "texture-one-pixel",
+            "texture of a picture of one pixel, whose map has four nodes",
+            with(empty(1, 1), &Texture::constant([1, 1], [0.3, 0.2, 0.1, 0.6])),
+        )
+        .also(&[Rendering::Size(16, 16)]),
+        Vector::valid("texture-many", "a map of as many Gaussians as nodes, the most that is allowed", most)
+            .also(&[Rendering::Size(45, 31)]),
+        Vector::valid("texture-clamped", "strengths and directions beyond their ranges", beyond)
+            .also(&[Rendering::Size(9, 6)]),
+        Vector::valid(
+            "texture-step-least",
+            "the least step of a map, 2^-20",
+            steps(1.0 / 1_048_576.0, [65_000, 9_000, -60_000, 65_000]),
+        ),
+        Vector::valid("texture-step-most", "the largest step of a map, 2^10", steps(1024.0, [1, 0, 0, -1])),
+        Vector::valid("texture-not-drawn", "a map of one Gaussian that is drawn and two that are not", not_drawn),
+        late,
+    ]
+}
+
+pub(super) fn invalid() -> Vec<Vector> {
+    // GHDR, QNTZ, tXTR, a layer and GEND.
+    let sides = [16, 16];
+    let file = random_file(206, header(GRAY, 16, 16), 4);
+    let header = file.header;
+    let map = |count| Texture { step: 0.4, codes: scatter(206, &header, count) };
+    let sound = map(9).payload(sides);
+    let file = file.with(b"tXTR", &sound);
+    let replaced = |payload: &[u8]| {
+        let mut chunks = file.chunks();
+        chunks[2] = chunk(b"tXTR", payload);
+        of_chunks(&chunks)
+    };
+    // The oracle refuses it as well, and says why.
+    let refused = |name, shows, payload: &[u8], flaw: &str| {
+        let found = texture::read(sides, payload);
+        assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
+        Vector::invalid(name, shows, replaced(payload))
+    };
+    let with_step = |name, shows, step: f32| {
+        let payload = [&step.to_le_bytes()[..], &sound[4..]].concat();
+        refused(name, shows, &payload, "a step out of range")
+    };
+    let changed = |change: &dyn Fn(&mut Vec<u8>)| {
+        let mut payload = sound.clone();
+        change(&mut payload);
+        payload
+    };
+    let start = of_chunks(&file.chunks()[..2]).len();
+    let [least, most] = [1.0 / 1_048_576.0, 1024.0_f32];
+    vec![
+        refused("xtexture-short", "tXTR too short for the step", &sound[..3], "no step"),
+        refused("xtexture-no-layer", "tXTR without a layer", &sound[..4], "no count"),
+        with_step("xtexture-step-nan", "tXTR with a step of NaN", f32::from_bits(0x7FC0_0000)),
+        with_step("xtexture-step-zero", "tXTR with a step of zero", 0.0),
+        with_step("xtexture-step-negative", "tXTR with a negative step", -0.4),
+        with_step("xtexture-step-under", "tXTR with a step just under 2^-20", least.next_down()),
+        with_step("xtexture-step-over", "tXTR with a step just over 2^10", most.next_up()),
+        refused(
+            "xtexture-many",
+            "tXTR with ten Gaussians for nine nodes",
+            &map(10).payload(sides),
+            "more Gaussians than nodes",
+        ),
+        refused(
+            "xtexture-empty",
+            "tXTR whose layer has no Gaussians",
+            &changed(&|payload| payload[4] = 0),
+            "no Gaussians",
+        ),
+        refused(
+            "xtexture-state",
+            "tXTR whose layer has an initial state below 2^16",
+            &changed(&|payload| payload[10..12].fill(0)),
+            "the state begins below 2^16",
+        ),
+        refused(
+            "xtexture-words-fewer",
+            "tXTR whose layer has one word too few",
+            &changed(&|payload| payload.truncate(payload.len() - 2)),
+            "no word left",
+        ),
+        refused(
+            "xtexture-words-more",
+            "tXTR whose layer has one word too many",
+            &changed(&|payload| payload.extend([0, 0])),
+            "words left",
+        ),
+        Vector::invalid("xtexture-twice", "two tXTR", file.clone().with(b"tXTR", &sound).bytes()),
+        Vector::invalid("xtexture-crc", "a flipped bit in tXTR", {
+            let mut bytes = file.bytes();
+            bytes[start + 20] ^= 4;
+            bytes
+        }),
+        Vector::invalid(
+            "xtexture-truncated",
+            "ends within tXTR",
+            file.bytes()[..start + 20].to_vec(),
+        ),
+    ]
+}
