@@ -58,6 +58,8 @@ def options(rendering: str) -> dict[str, Any]:
         found["mode"] = MODES[model[1]]
     if first := re.fullmatch(r"first (\d+)", rendering):
         found["prefix"] = int(first[1])
+    if rendering == "without texture":
+        found["texture"] = False
     assert found or rendering == "whole", rendering
     return found
 

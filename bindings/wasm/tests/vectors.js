@@ -51,6 +51,8 @@ function optionsOf(rendering) {
       options.gaussians = Number(match[1]);
     } else if ((match = part.match(/^as (\w+)$/))) {
       options.color = models[match[1]];
+    } else if (part === 'without texture') {
+      options.texture = false;
     } else {
       throw new Error(`unknown rendering: ${rendering}`);
     }
