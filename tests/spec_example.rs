@@ -3,8 +3,10 @@
 
 mod common;
 
+use common::oracle::{self, Request};
 use common::rans::Op;
-use common::{decode_valid, entropy};
+use common::synthesis::{Block, Node, Synthesis, map_sums, noise};
+use common::{File, Ghdr, decode_valid, entropy, texture};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
 const SPECIFICATION: &str = include_str!("../spec/gip.md");
@@ -13,15 +15,25 @@ const SPECIFICATION: &str = include_str!("../spec/gip.md");
 #[derive(Clone, Copy)]
 struct Example(&'static str);
 
+fn section(number: &str) -> Example {
+    let heading = format!("\n### {number} ");
+    let (_, text) = SPECIFICATION.split_once(&heading[..]).expect("the section");
+    Example(text.split("\n### ").next().unwrap_or_default())
+}
+
 /// Of the packed coding.
 fn packed() -> Example {
-    let (_, text) = SPECIFICATION.split_once("\n### 14.1 ").expect("section 14.1");
-    Example(text.split_once("\n### ").expect("another section").0)
+    section("14.1")
 }
 
 /// Of the entropy coding.
 fn entropy_coded() -> Example {
-    Example(SPECIFICATION.split_once("\n### 14.2 ").expect("section 14.2").1)
+    section("14.2")
+}
+
+/// Of texture.
+fn textured() -> Example {
+    section("14.3")
 }
 
 impl Example {
@@ -73,7 +85,7 @@ fn pixels(block: &str) -> Vec<u8> {
 }
 
 fn render(picture: &Picture<'_>, options: &RenderOptions) -> Vec<u8> {
-    let mut out = vec![0; 6 * 4 * 3];
+    let mut out = vec![0; picture.output_len(options).expect("it fits")];
     picture.render_u8(options, &mut out).expect("a sound request");
     out
 }
@@ -173,4 +185,101 @@ fn the_symbols_of_the_entropy_coding_are_those_in_the_bytes() {
     assert_eq!((second.exponent, &second.axes[..], second.ratio), (4, &[-11, 3, 5][..], -3));
     assert_eq!((first.slant, second.slant), (0, 41));
     assert_eq!((first.size, second.size), (0, 31 - 33));
+}
+
+/// The sides of the picture with texture.
+const SIDES: [u32; 2] = [6, 4];
+
+/// The payload of `tXTR`.
+fn payload() -> Vec<u8> {
+    let file = textured().file();
+    let start = 8 + 48 + 8;
+    file[start..start + 16].to_vec()
+}
+
+/// The file for the oracle.
+fn textured_file() -> File {
+    let [width, height] = SIDES;
+    let header = Ghdr { width, height, base: [0x8080, 0, 0, 0], ..Ghdr::default() };
+    File::of_floats(header, &[]).with(b"tXTR", &payload())
+}
+
+/// Checks the rows of a table against what they should be.
+#[track_caller]
+fn check_rows(heading: &str, expected: impl IntoIterator<Item = Vec<String>>) {
+    let printed = textured().table(heading);
+    let expected: Vec<_> = expected.into_iter().collect();
+    assert_eq!(printed, expected);
+}
+
+fn texts(numbers: &[f32]) -> Vec<String> {
+    numbers.iter().map(f32::to_string).collect()
+}
+
+#[test]
+fn the_hex_of_the_texture_decodes_to_what_is_printed() {
+    let decoder = decode_valid(&textured().file());
+    let picture = decoder.picture().expect("a complete file");
+    let printed = pixels(textured().blocks("pixels")[0]);
+    assert_eq!(render(&picture, &RenderOptions::new()), printed);
+    assert_eq!(render(&picture, &RenderOptions::new().with_texture(false)), [128; 24]);
+    let file = textured_file();
+    let planes = oracle::render(&file, &Request::whole(&file));
+    assert!(oracle::samples(&planes, 8).into_iter().eq(printed.iter().map(|&s| s.into())));
+    let pixel = planes[0][6 + 3];
+    assert!(textured().0.contains(&format!("the pixel is {pixel}, and the sample {}", printed[9])));
+}
+
+#[test]
+fn the_map_of_the_texture_is_what_is_printed() {
+    let step: [u8; 4] = payload()[..4].try_into().expect("four bytes");
+    let step = f32::from_le_bytes(step);
+    let steps = texture::steps(step);
+    let layer = entropy::read(texture::map_sides(SIDES), &steps, &payload()[4..]);
+    let layer = layer.expect("a sound layer");
+    let code = &layer.codes[0];
+    assert_eq!((code.exponent, &code.axes[..], code.size), (2, &[4, 4, 0, 4][..], 0));
+    assert_eq!((code.ratio, code.slant), (0, 1));
+    assert!(textured().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
+    assert!(textured().0.contains(&format!("0.19 \\* 6) / ({} ", steps[1])));
+    check_rows("| x | y |", [texts(&layer.values[0])]);
+
+    let sums = map_sums(SIDES, &payload());
+    let row = |node: usize| {
+        let sums = [0, 1, 2, 3].map(|m| sums[m][node]);
+        let found = Node::new(sums, 1.0);
+        assert_eq!((found.amplitudes[2], found.vertical), (0.0, 0.0));
+        let [a0, a1, _] = found.amplitudes;
+        let numbers = [&sums[..], &[a0, a1, found.horizontal, found.isotropic]].concat();
+        [vec![format!("{}, {}", node % 2, node / 2)], texts(&numbers)].concat()
+    };
+    check_rows("| node |", (0..4).map(row));
+}
+
+#[test]
+fn the_trace_of_the_texture_is_what_is_printed() {
+    let block = |(octave, pattern, x): (usize, usize, i64)| {
+        let Block { k, s, r, numbers: [a, b, c] } = Block::new(octave, pattern, x, 0);
+        let cells = [format!("{x}, 0"), k.to_string(), format!("`{s:08X}`"), format!("`{r:08X}`")];
+        let start = [octave, pattern].map(|n| n.to_string());
+        [&start[..], &cells, &[a, b, c].map(|n| n.to_string())].concat()
+    };
+    let of_octave_1 = [(1, 0, 0), (1, 0, 1), (1, 1, 0), (1, 1, 1)];
+    let of_octave_0 = [(0, 0, 1), (0, 1, 0), (0, 1, 1)];
+    check_rows("| octave | p |", of_octave_1.into_iter().chain(of_octave_0).map(block));
+
+    let synthesis = Synthesis::new(&textured_file(), SIDES.into()).expect("texture");
+    let [fine, coarse] = [0, 1].map(|octave| synthesis.lattice(octave, -2..8, -2..6));
+    let point = |(octave, x, y): (usize, i64, i64)| {
+        let (start, sum) = match octave {
+            0 => (coarse.enlarged(x, y), fine.at(x, y)),
+            _ => (0.0, coarse.at(x, y)),
+        };
+        let gain = |pattern| synthesis.map.gain(x, y, octave, pattern);
+        let [isotropic, streaks] = [0, 1].map(|pattern| noise(octave, pattern, x, y));
+        let numbers = texts(&[start, gain(0), isotropic, gain(1), streaks, sum]);
+        [vec![octave.to_string(), format!("{x}, {y}")], numbers].concat()
+    };
+    let points = [(1, 1, 0), (1, 2, 0), (1, 1, 1), (1, 2, 1), (0, 3, 1)];
+    check_rows("| octave | point |", points.map(point));
 }

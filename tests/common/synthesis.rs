@@ -8,11 +8,11 @@ use super::{File, Ghdr, RGBA};
 
 /// The texture of a file at the size of a request.
 pub(crate) struct Synthesis {
-    map: Map,
+    pub(crate) map: Map,
 }
 
 /// The nine gains of each node, by octave and pattern.
-struct Map {
+pub(crate) struct Map {
     sides: [u32; 2],
     gains: Vec<[[f32; 3]; 3]>,
 }
@@ -21,19 +21,12 @@ impl Map {
     /// Of the payload of a `tXTR`, at an output size.
     fn new(stored: [u32; 2], payload: &[u8], output: (u32, u32)) -> Self {
         let sides = map_sides(stored);
-        let header = Ghdr {
-            color: RGBA,
-            width: sides[0],
-            height: sides[1],
-            base: [0, 0, 0, 32768],
-            ..Ghdr::default()
-        };
-        let file = File::of_floats(header, &read(stored, payload).expect("a sound texture"));
-        let sums = sums(&file, &Request::whole(&file), None);
+        let sums = map_sums(stored, payload);
         let scale = (output.0 as f32 / stored[0] as f32).min(output.1 as f32 / stored[1] as f32);
         let fade = (8.0 * scale - 1.0).clamp(0.0, 1.0);
         let nodes = sides[0] as usize * sides[1] as usize;
-        let gains = (0..nodes).map(|node| gains([0, 1, 2, 3].map(|m| sums[m][node]), fade));
+        let gains =
+            (0..nodes).map(|node| Node::new([0, 1, 2, 3].map(|m| sums[m][node]), fade).gains());
         Self { sides, gains: gains.collect() }
     }
 
@@ -45,7 +38,7 @@ impl Map {
     }
 
     /// What a point of a lattice has.
-    fn gain(&self, x: i64, y: i64, octave: usize, pattern: usize) -> f32 {
+    pub(crate) fn gain(&self, x: i64, y: i64, octave: usize, pattern: usize) -> f32 {
         let n = 8 >> octave;
         let (column, row) = (x.div_euclid(n), y.div_euclid(n));
         let part = |at: i64| (at.rem_euclid(n) as f32 + 0.5) / n as f32;
@@ -58,54 +51,98 @@ impl Map {
     }
 }
 
-/// Of a node with these sums.
-fn gains(sums: [f32; 4], fade: f32) -> [[f32; 3]; 3] {
-    let unit = |x: f32| x.max(0.0).min(1.0);
-    let d = sums[3] * 4.0 - 2.0;
-    let (h, v) = (unit(d - 0.125), unit(-0.125 - d));
-    let i = (1.0 - (h + v) * (h + v)).sqrt();
-    let scale = 1.0 / 1024.0;
-    let octave = |o: usize| {
-        let a = unit((sums[o] - 1.0 / 128.0) * 0.5) * fade;
-        let s = [1.0, 1.82, 2.1][o];
-        let t = [1.23, 1.72, 1.86][o];
-        [(a * i) * (s * scale), (a * h) * (t * scale), (a * v) * (t * scale)]
-    };
-    [octave(0), octave(1), octave(2)]
+/// m0 to m3, of all nodes.
+pub(crate) fn map_sums(stored: [u32; 2], payload: &[u8]) -> Vec<Vec<f32>> {
+    let [width, height] = map_sides(stored);
+    let base = [0, 0, 0, 32768];
+    let header = Ghdr { color: RGBA, width, height, base, ..Ghdr::default() };
+    let file = File::of_floats(header, &read(stored, payload).expect("a sound texture"));
+    sums(&file, &Request::whole(&file), None)
 }
 
-/// V0 to V3 of a block.
-fn block(octave: usize, pattern: usize, x: i64, y: i64) -> [f32; 4] {
-    let k = 4 * pattern as u32 + octave as u32;
-    let mut s = (16 * y) as u32;
-    s = s.wrapping_add(k);
-    s = (s ^ (s >> 16)).wrapping_mul(0x21F0_AAAD);
-    s = (s ^ (s >> 15)).wrapping_mul(0x735A_2D97);
-    s ^= s >> 15;
-    let mut r = (x as u32).wrapping_mul(0x9E37_79B1).wrapping_add(s);
-    r = (r ^ (r >> 15)).wrapping_mul(0x2C1B_3C6D);
-    let number = |bits: u32| 2 * (bits % 1024) as i32 - 1023;
-    let [a, b, c] = [number(r >> 2), number(r >> 12), number(r >> 22)];
-    [a + b + c, a - b - c, -a + b - c, -a - b + c].map(|v| v as f32)
+/// What the sums of a node say.
+pub(crate) struct Node {
+    /// The deviation of each octave.
+    pub(crate) amplitudes: [f32; 3],
+    pub(crate) horizontal: f32,
+    pub(crate) vertical: f32,
+    pub(crate) isotropic: f32,
+}
+
+impl Node {
+    pub(crate) fn new(sums: [f32; 4], fade: f32) -> Self {
+        let unit = |x: f32| x.clamp(0.0, 1.0);
+        let amplitude = |o: usize| unit((sums[o] - 1.0 / 128.0) * 0.5) * fade;
+        let d = sums[3] * 4.0 - 2.0;
+        let (h, v) = (unit(d - 0.125), unit(-0.125 - d));
+        let isotropic = (1.0 - (h + v) * (h + v)).sqrt();
+        Self { amplitudes: [0, 1, 2].map(amplitude), horizontal: h, vertical: v, isotropic }
+    }
+
+    /// By octave and pattern.
+    pub(crate) fn gains(&self) -> [[f32; 3]; 3] {
+        let scale = 1.0 / 1024.0;
+        [0, 1, 2].map(|o| {
+            let a = self.amplitudes[o];
+            let s = [1.0, 1.82, 2.1][o];
+            let t = [1.23, 1.72, 1.86][o];
+            [
+                (a * self.isotropic) * (s * scale),
+                (a * self.horizontal) * (t * scale),
+                (a * self.vertical) * (t * scale),
+            ]
+        })
+    }
+}
+
+/// From what the values of a block are made.
+pub(crate) struct Block {
+    pub(crate) k: u32,
+    /// S and R after their last steps.
+    pub(crate) s: u32,
+    pub(crate) r: u32,
+    /// A, B and C.
+    pub(crate) numbers: [i32; 3],
+}
+
+impl Block {
+    pub(crate) fn new(octave: usize, pattern: usize, x: i64, y: i64) -> Self {
+        let k = 4 * pattern as u32 + octave as u32;
+        let mut s = ((16 * y) as u32).wrapping_add(k);
+        s = (s ^ (s >> 16)).wrapping_mul(0x21F0_AAAD);
+        s = (s ^ (s >> 15)).wrapping_mul(0x735A_2D97);
+        s ^= s >> 15;
+        let mut r = (x as u32).wrapping_mul(0x9E37_79B1).wrapping_add(s);
+        r = (r ^ (r >> 15)).wrapping_mul(0x2C1B_3C6D);
+        let number = |bits: u32| 2 * (bits % 1024) as i32 - 1023;
+        Self { k, s, r, numbers: [number(r >> 2), number(r >> 12), number(r >> 22)] }
+    }
+
+    /// V0 to V3.
+    fn values(&self) -> [f32; 4] {
+        let [a, b, c] = self.numbers;
+        [a + b + c, a - b - c, -a + b - c, -a - b + c].map(|v| v as f32)
+    }
 }
 
 /// N at a point of a lattice.
 pub(crate) fn noise(octave: usize, pattern: usize, x: i64, y: i64) -> f32 {
     if pattern == 0 {
         let (right, below) = (x.rem_euclid(2), y.rem_euclid(2));
-        return block(octave, 0, x.div_euclid(2), y.div_euclid(2))[(2 * below + right) as usize];
+        let block = Block::new(octave, 0, x.div_euclid(2), y.div_euclid(2));
+        return block.values()[(2 * below + right) as usize];
     }
     let (column, row) = (x.div_euclid(4), y.div_euclid(4));
     let (r, q) = (x.rem_euclid(4), y.rem_euclid(4));
     let (along, across, next) =
         if pattern == 1 { (r, q, [column + 1, row]) } else { (q, r, [column, row + 1]) };
-    let [this, next] =
-        [[column, row], next].map(|[x, y]| block(octave, pattern, x, y)[across as usize]);
+    let [this, next] = [[column, row], next]
+        .map(|[x, y]| Block::new(octave, pattern, x, y).values()[across as usize]);
     this + (next - this) * (along as f32 + 0.5) / 4.0
 }
 
 /// A part of a lattice.
-struct Lattice {
+pub(crate) struct Lattice {
     columns: Range<i64>,
     rows: Range<i64>,
     values: Vec<f32>,
@@ -118,14 +155,14 @@ impl Lattice {
         Self { columns, rows, values }
     }
 
-    fn at(&self, x: i64, y: i64) -> f32 {
+    pub(crate) fn at(&self, x: i64, y: i64) -> f32 {
         assert!(self.columns.contains(&x) && self.rows.contains(&y));
         let width = self.columns.end - self.columns.start;
         self.values[((y - self.rows.start) * width + x - self.columns.start) as usize]
     }
 
     /// E, at a point of the finer lattice.
-    fn enlarged(&self, x: i64, y: i64) -> f32 {
+    pub(crate) fn enlarged(&self, x: i64, y: i64) -> f32 {
         let beside = |at: i64| at.div_euclid(2) + if at.rem_euclid(2) == 0 { -1 } else { 1 };
         let of_column = |x: i64| 0.75 * self.at(x, y.div_euclid(2)) + 0.25 * self.at(x, beside(y));
         0.75 * of_column(x.div_euclid(2)) + 0.25 * of_column(beside(x))
@@ -140,7 +177,7 @@ impl Synthesis {
     }
 
     /// T of an octave.
-    fn lattice(&self, octave: usize, columns: Range<i64>, rows: Range<i64>) -> Lattice {
+    pub(crate) fn lattice(&self, octave: usize, columns: Range<i64>, rows: Range<i64>) -> Lattice {
         let halved =
             |range: &Range<i64>| (range.start - 1).div_euclid(2)..range.end.div_euclid(2) + 1;
         let coarser =
