@@ -3,8 +3,9 @@
 mod common;
 
 use cap::Cap;
-use common::entropy::Code;
+use common::entropy::{Code, Grid};
 use common::memory::peak;
+use common::texture::{Texture, map_sides};
 use common::{
     CHOLESKY, Entry, File, Ghdr, RGB, RGBA, SIGNATURE, chunk, decode_pieces, decode_valid,
 };
@@ -124,6 +125,66 @@ fn an_entropy_coded_layer_takes_memory_as_it_arrives() {
     assert_eq!(refusal_within(HELD, &bytes, Limits::default()).0, LimitKind::Memory);
 }
 
+/// Gaussians over a map, all as large as this code says.
+fn map(sides: [u32; 2], count: u32, size: i32) -> Texture {
+    let map = map_sides(sides);
+    let grid = Grid::new(map);
+    let code = |n: u32| {
+        let center = grid.units([(n % map[0]) as f32 + 0.5, (n / map[0] % map[1]) as f32 + 0.5]);
+        Code { exponent: 2, axes: vec![3, 1, 0, 1], size, center, ..Code::default() }
+    };
+    Texture { step: 0.5, codes: (0..count).map(code).collect() }
+}
+
+#[test]
+fn texture_takes_memory_as_it_arrives() {
+    let _alone = alone();
+    let start = header(|h| (h.width, h.height) = (1 << 14, 1 << 14));
+    let most = (1_u32 << 31) - 1;
+    let texture = [&most.to_le_bytes()[..], b"tXTR", &1_f32.to_le_bytes(), &[7; 5000]].concat();
+    let bytes = [start.as_slice(), &texture].concat();
+    let ((_, result), peak) = peak(&MEMORY, || decode_pieces([bytes.as_slice()], Limits::none()));
+    assert!(result.expect_err("incomplete").is_unexpected_end());
+    assert!(peak < 12_000, "{peak} bytes held");
+    assert_eq!(refusal(&bytes, Limits::default()).0, LimitKind::Memory);
+    // As many Gaussians as the bytes may stand for.
+    let count = 4 * 300_000_u32;
+    let payload = [&1_f32.to_le_bytes()[..], &count.to_le_bytes(), &vec![7; 300_000]].concat();
+    let bytes = [start, chunk(b"tXTR", &payload)].concat();
+    let little = limits(|l| l.max_memory = 8 << 20);
+    assert_eq!(refusal_within(1 << 20, &bytes, little).0, LimitKind::Memory);
+    let few = limits(|l| l.max_gaussians = count - 1);
+    let (kind, wanted, _) = refusal_within(1 << 20, &bytes, few);
+    assert_eq!((kind, wanted), (LimitKind::Gaussians, count.into()));
+}
+
+#[test]
+fn a_map_of_large_gaussians_is_refused_by_its_work() {
+    let _alone = alone();
+    let header = Ghdr { width: 2048, height: 2048, ..Ghdr::default() };
+    let texture = map([2048, 2048], 4000, 40).payload([2048, 2048]);
+    let bytes = File::of_floats(header, &[]).with(b"tXTR", &texture).bytes();
+    let allowed = limits(|l| l.max_work = 1 << 24);
+    let (decoder, result) = decode_pieces([bytes.as_slice()], allowed);
+    result.expect("a sound file");
+    let picture = decoder.picture().expect("a complete file");
+    let mut out = vec![7; 2048 * 2048];
+    for threads in [Threads::One, Threads::Pool] {
+        let options = RenderOptions::new().with_threads(threads);
+        let error = picture.render_u8(&options, &mut out).expect_err("too much work");
+        assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Work, .. }), "{error}");
+        assert!(out.iter().all(|&sample| sample == 7), "the buffer was touched");
+    }
+    // Without texture, and where none shows, the map is not rendered.
+    let options = RenderOptions::new().with_size(256, 256);
+    picture.render_u8(&options, &mut out[..1 << 16]).expect("no texture");
+    picture.render_u8(&RenderOptions::new().with_texture(false), &mut out).expect("no texture");
+    // Of a region, only the nodes around it count.
+    let region = Region { x: 1000, y: 1000, width: 64, height: 64 };
+    let options = RenderOptions::new().with_region(region);
+    picture.render_u8(&options, &mut out[..1 << 12]).expect("a few nodes");
+}
+
 #[test]
 fn a_small_file_of_large_gaussians_is_refused_by_its_work() {
     let _alone = alone();
@@ -199,7 +260,9 @@ fn the_memory_limit_holds() {
         .collect();
     let base = [0; 4];
     let header = Ghdr { color: RGBA, width: 450, height: 450, base, ..Ghdr::default() };
+    let texture = map([450, 450], 1500, 0).payload([450, 450]);
     let mut file = File::of_floats(header, &rows).with(b"iCCP", &vec![1; 75_000]);
+    file = file.with(b"tXTR", &texture);
     for _ in 0..750 {
         file = file.with(b"tEXt", b"a\0b");
     }
@@ -292,7 +355,7 @@ fn hostile_set() -> Vec<Hostile> {
     let mut zeros = vec![0; SIZE - 200];
     // The least state.
     zeros[2] = 1;
-    for (name, bytes) in [("zeros", zeros), ("noise", noise)] {
+    for (name, bytes) in [("zeros", &zeros), ("noise", &noise)] {
         for (per_byte, length, expected) in [
             (1, SIZE - 200, ["malformed GAUS", "", ""]),
             (4, 28_000, ["malformed GAUS", "", ""]),
@@ -314,6 +377,23 @@ fn hostile_set() -> Vec<Hostile> {
     let layers = (0..1700).map(|n| vec![code(n)]).collect();
     let layers = File::of_entropy_coded(wide, vec![1.0, 1.0, 1.0, 1.0, 0.1], layers);
     add("layers", layers.bytes(), ["", "", ""]);
+    // The same in a map; a small output has no texture.
+    let picture = File::of_floats(wide, &[]);
+    let large = map([1 << 11; 2], 20_000, 40).payload([1 << 11; 2]);
+    let work = "kernel evaluations";
+    add("a map", picture.clone().with(b"tXTR", &large).bytes(), ["", work, ""]);
+    for (name, bytes) in [("zeros", &zeros), ("noise", &noise)] {
+        for (count, expected) in [
+            (60_000, ["malformed tXTR", "", ""]),
+            (66_049, ["malformed tXTR", "", ""]),
+            (66_050, ["malformed tXTR", "", ""]),
+        ] {
+            let count = u32::to_le_bytes(count);
+            let payload = [&1_f32.to_le_bytes()[..], &count, bytes].concat();
+            let bytes = picture.clone().with(b"tXTR", &payload).bytes();
+            add(&format!("a map of {name}"), bytes, expected);
+        }
+    }
     let mut texts = File::of_floats(wide, &[]);
     for _ in 0..SIZE / 15 - 100 {
         texts = texts.with(b"tEXt", b"a\0b");

@@ -8,6 +8,7 @@ use std::io::Read;
 use common::layered::{
     BEFORE, IN_A_LAYER, LAYERS, SIZE, chunks, damaged, decoded, regions, showing,
 };
+use common::texture::Texture;
 use common::{Random, bits, chunk, decode, decode_valid, of_chunks};
 use image_gip::{DecodeError, Decoder, Region, RenderOptions};
 
@@ -20,8 +21,25 @@ fn rendered(file: &[u8], options: &RenderOptions) -> Result<Vec<u8>, DecodeError
 
 #[test]
 fn a_region_is_that_part_of_the_picture() {
-    let bytes = of_chunks(&chunks());
-    let whole = decode_valid(&bytes);
+    a_region_of(&of_chunks(&chunks()));
+}
+
+#[test]
+fn a_region_has_the_texture_of_that_part() {
+    let mut chunks = chunks();
+    let texture = Texture::constant(SIZE.into(), [0.2, 0.1, 0.3, 0.6]).payload(SIZE.into());
+    chunks.insert(BEFORE, chunk(b"tXTR", &texture));
+    let bytes = of_chunks(&chunks);
+    a_region_of(&bytes);
+    let part = RenderOptions::new().with_region(Region { x: 1, y: 2, width: 20, height: 20 });
+    let textured = rendered(&bytes, &part).expect("it decodes");
+    assert_ne!(rendered(&bytes, &part.with_texture(false)).expect("it decodes"), textured);
+}
+
+/// Compares regions that are decoded by themselves with renderings of the whole file.
+#[track_caller]
+fn a_region_of(bytes: &[u8]) {
+    let whole = decode_valid(bytes);
     let picture = whole.picture().expect("it is whole");
     let mut random = Random(6);
     for (width, height) in [SIZE, (75, 50), (20, 200), (301, 7), (1500, 1000)] {
@@ -35,7 +53,7 @@ fn a_region_is_that_part_of_the_picture() {
             let options = RenderOptions::new().with_size(width, height).with_region(region);
             let mut expected = vec![0; picture.output_len(&options).expect("it fits")];
             picture.render_u8(&options, &mut expected).expect("it renders");
-            let found = rendered(&bytes, &options).expect("it decodes");
+            let found = rendered(bytes, &options).expect("it decodes");
             assert_eq!(found, expected, "{width}x{height}, {region:?}");
         }
     }

@@ -4,11 +4,11 @@
 mod common;
 
 use common::entropy::{Code, Grid};
-use common::oracle::Request;
+use common::oracle::{self, Request};
 use common::scenes::{SMOOTH, assert_matches_oracle, planes, random_rows, scene};
 use common::texture::{Texture, map_sides};
-use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random};
-use image_gip::Threads;
+use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, decode, of_chunks};
+use image_gip::{RenderOptions, Threads};
 
 /// Random Gaussians with small codes over a map.
 fn random_map(random: &mut Random, sides: [u32; 2], step: f32, count: usize) -> Texture {
@@ -239,8 +239,61 @@ fn extreme_maps_match_the_oracle() {
     }
 }
 
+#[test]
+fn islands_of_texture_match_the_oracle() {
+    let mut random = Random(14);
+    let size = (730, 66);
+    let mut islands = random_map(&mut random, [730, 66], 0.5, 16);
+    islands.codes.iter_mut().for_each(|code| code.size = -4 << code.exponent.saturating_sub(1));
+    let file = textured(GRAY, size, &islands);
+    for (width, height) in [size, (1000, 66), (730, 80), (400, 30)] {
+        assert_matches_oracle(&file, &Request::at(width, height));
+        let region = (width / 3 + 1, 5, width / 2, height / 2);
+        assert_matches_oracle(&file, &Request { region, ..Request::at(width, height) });
+    }
+}
+
+#[test]
+fn texture_that_has_arrived_is_shown() {
+    let mut random = Random(15);
+    let sides = [40, 30];
+    let file = textured(RGB, (40, 30), &random_map(&mut random, sides, 1.0, 9));
+    let none = File { layers: Vec::new(), ..file.clone() };
+    let nothing = File { extra: Vec::new(), ..none.clone() };
+    let [textured, plain] = [&none, &nothing].map(|file| {
+        let planes = oracle::render(file, &Request::whole(file));
+        oracle::samples(&planes, 8)
+    });
+    assert_ne!(textured, plain);
+    let (bytes, chunks) = (file.bytes(), file.chunks());
+    let start = of_chunks(&chunks[..2]).len();
+    let end = start + chunks[2].len();
+    let shown = |bytes: &[u8]| {
+        let (decoder, result) = decode(bytes);
+        let picture = decoder.picture().expect("a header");
+        let mut samples = vec![0; textured.len()];
+        picture.render_u8(&RenderOptions::new(), &mut samples).expect("a sound request");
+        let samples: Vec<u16> = samples.into_iter().map(u16::from).collect();
+        (samples, result.expect_err("it is not whole"))
+    };
+    // Within and behind tXTR, and within the layer, of which no Gaussian is complete.
+    for length in start..end + 20 {
+        let (samples, error) = shown(&bytes[..length]);
+        assert!(error.is_unexpected_end(), "{length}: {error}");
+        let expected = if length < end { &plain } else { &textured };
+        assert!(samples == *expected, "{length}");
+    }
+    // An error behind it takes nothing away.
+    for wrong in [chunk(b"tXTR", b"?"), chunk(b"ABCD", b""), chunk(b"GAUS", &[0; 4])] {
+        let mut chunks = chunks.clone();
+        chunks[3] = wrong;
+        let (samples, error) = shown(&of_chunks(&chunks));
+        assert!(samples == textured, "{error}");
+    }
+}
+
 /// The texture of a part of a picture of 24 megapixels that has the same of it everywhere, in rows of `SIDE`.
-fn constant(octaves: [f32; 3], direction: f32) -> Vec<f64> {
+fn constant(octaves: [f32; 3], direction: f32) -> Vec<f32> {
     const PICTURE: (u32, u32) = (6000, 4000);
     let sums = octaves.map(|deviation| 2.0 * deviation + 1.0 / 128.0);
     let [m0, m1, m2] = sums;
@@ -252,9 +305,9 @@ fn constant(octaves: [f32; 3], direction: f32) -> Vec<f64> {
     let side = SIDE as u32;
     let region = (4321, 2345, side, side);
     let request = Request { region, ..Request::whole(&file) };
-    let base = f64::from(32768.0_f32 / 65535.0);
+    let base = 32768.0 / 65535.0;
     let planes = planes(&file, &request, false, Threads::Pool);
-    planes.into_iter().map(|bits| f64::from(f32::from_bits(bits)) - base).collect()
+    planes.into_iter().map(|bits| f32::from_bits(bits) - base).collect()
 }
 
 const SIDE: usize = 1024;
@@ -267,16 +320,27 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// The correlation of what is so far apart.
-fn correlation(texture: &[f64], (x, y): (usize, usize)) -> f64 {
-    let variance = mean(texture.iter().map(|value| value * value));
+/// The covariance of what is so far apart.
+fn covariance(texture: &[f32], (x, y): (usize, usize)) -> f64 {
     let row = |row: usize| &texture[row * SIDE..][..SIDE];
     // A third of the rows tells enough.
-    let products = (0..(SIDE - y) / 3).map(|at| {
-        let pairs = row(3 * at).iter().zip(&row(3 * at + y)[x..]);
-        pairs.map(|(a, b)| a * b).sum::<f64>() / (SIDE - x) as f64
-    });
-    mean(products) / variance
+    mean((0..(SIDE - y) / 3).map(|at| product(row(3 * at), &row(3 * at + y)[x..])))
+}
+
+fn correlation(texture: &[f32], lag: (usize, usize)) -> f64 {
+    covariance(texture, lag) / covariance(texture, (0, 0))
+}
+
+/// The mean product of values side by side, up to eight of which are left out at the end.
+fn product(a: &[f32], b: &[f32]) -> f64 {
+    let (a, b) = (a.as_chunks::<8>().0, b.as_chunks::<8>().0);
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    f64::from(sums.iter().sum::<f32>()) / (8 * a.len().min(b.len())) as f64
 }
 
 #[test]
@@ -287,8 +351,9 @@ fn an_octave_has_the_deviation_that_the_map_says() {
             let mut octaves = [0.0; 3];
             octaves[octave] = wanted as f32;
             let texture = constant(octaves, direction);
-            let average = mean(texture.iter().copied());
-            let deviation = mean(texture.iter().map(|value| value * value)).sqrt();
+            let average = mean(texture.iter().map(|&value| value.into()));
+            let squares = texture.iter().map(|&value| f64::from(value).powi(2));
+            let deviation = mean(squares).sqrt();
             println!("octave {octave}, {direction}: {average:e}, {deviation}");
             assert!(average.abs() < wanted / 200.0, "octave {octave}, {direction}: mean {average}");
             let error = (deviation / wanted - 1.0).abs();
@@ -326,8 +391,10 @@ fn texture_does_not_repeat() {
             octaves[octave] = 0.1;
             let texture = constant(octaves, direction);
             // Streaks are four points long, and change to the next.
-            let lags = (8 << octave..=512).flat_map(|lag| [(lag, 0), (0, lag), (lag, lag)]);
-            let found = lags.map(|lag| (correlation(&texture, lag).abs(), lag));
+            let lags = (8 << octave..=512).step_by(1 << octave);
+            let lags = lags.flat_map(|lag| [(lag, 0), (0, lag), (lag, lag)]);
+            let variance = covariance(&texture, (0, 0));
+            let found = lags.map(|lag| (covariance(&texture, lag).abs() / variance, lag));
             let worst = found.max_by(|a, b| a.0.total_cmp(&b.0)).expect("a lag");
             println!("octave {octave}, {direction}: {worst:?}");
             assert!(worst.0 < 0.06, "octave {octave}, {direction}: {worst:?}");
