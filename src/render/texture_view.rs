@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 #[cfg(feature = "std")]
-use fearless_simd::{dispatch, f32x8, prelude::*};
+use fearless_simd::dispatch;
 
 use super::tile::TileTexture;
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT, TILE_WIDTH};
@@ -13,7 +13,9 @@ use super::view::View;
 use crate::error::DecodeError;
 use crate::region::Region;
 use crate::simd::Backend;
-use crate::texture::{CELL, NodeMap, make_cells, ramp};
+#[cfg(feature = "std")]
+use crate::texture::Vectors;
+use crate::texture::{Arithmetic, CELL, NodeMap, Plain, make_cells};
 
 /// Points of a cubic interpolation.
 const TAPS: usize = 4;
@@ -190,18 +192,11 @@ impl TextureRow {
         top: u32,
     ) -> Option<TileTexture<'a>> {
         match backend {
-            Backend::Reference => self.prepare_with(view, top, ramp),
+            Backend::Reference => self.prepare_with(view, top, Plain),
             #[cfg(feature = "std")]
-            Backend::Simd(level) => dispatch!(level, simd => {
-                let steps = f32x8::load_array(simd, ramp(0.0, 1.0));
-                self.prepare_with(
-                    view,
-                    top,
-                    // Of the plain code, compilers make scattered stores.
-                    #[inline(always)]
-                    |left, change| (f32x8::splat(simd, left) + steps * change).to_array(),
-                )
-            }),
+            Backend::Simd(level) => {
+                dispatch!(level, simd => self.prepare_with(view, top, Vectors(simd)))
+            }
         }
     }
 
@@ -210,7 +205,7 @@ impl TextureRow {
         &'a mut self,
         view: &TextureView,
         top: u32,
-        ramp: impl Fn(f32, f32) -> [f32; CELL] + Copy,
+        arithmetic: impl Arithmetic,
     ) -> Option<TileTexture<'a>> {
         let grid = top..top + TILE_HEIGHT as u32;
         let width = view.width();
@@ -224,7 +219,7 @@ impl TextureRow {
                 cells.values.resize(width * CELL, 0.0);
                 let columns = view.cells.clone();
                 let values = &mut cells.values;
-                cells.shows = make_cells(&view.map, row, columns, values, width, ramp);
+                cells.shows = make_cells(&view.map, row, columns, values, width, arithmetic);
             }
             shows |= cells.shows;
         }

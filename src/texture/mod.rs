@@ -2,13 +2,17 @@
 //! map gives (spec, sections 5.7 and 9.7).
 //!
 //! [`chunk`] reads and writes the Gaussians of the map, [`map`] says what the map's values mean,
-//! [`noise`] makes the patterns, and [`synthesis`] adds them up.
+//! [`noise`] makes the patterns, and [`synthesis`] adds them up, with the [`arithmetic`] of the backend.
 
+mod arithmetic;
 mod chunk;
 mod map;
 mod noise;
 mod synthesis;
 
+#[cfg(feature = "std")]
+pub(crate) use arithmetic::Vectors;
+pub(crate) use arithmetic::{Arithmetic, Plain};
 pub(crate) use chunk::Texture;
 pub(crate) use map::{CELL, NodeMap};
-pub(crate) use synthesis::{make_cells, ramp};
+pub(crate) use synthesis::make_cells;

@@ -3,6 +3,7 @@
 
 use core::ops::Range;
 
+use super::arithmetic::{Arithmetic, ramp, step};
 use super::map::{CELL, Gains, NodeMap, OCTAVES, PATTERNS};
 use super::noise::{Lattice, Pattern};
 
@@ -21,7 +22,6 @@ const QUARTER: usize = FULL / 4;
 
 /// Sets the texture of cells in row `row`, which are given by their columns: [`CELL`] rows of `stride`
 /// values, of which the first is that of the first cell. Returns whether any of them can be other than 0.
-/// `ramp` is [`ramp`], or the same with SIMD.
 #[inline(always)]
 pub(crate) fn make_cells(
     map: &NodeMap,
@@ -29,7 +29,7 @@ pub(crate) fn make_cells(
     cells: Range<i32>,
     out: &mut [f32],
     stride: usize,
-    ramp: impl Fn(f32, f32) -> [f32; CELL] + Copy,
+    arithmetic: impl Arithmetic,
 ) -> bool {
     out.fill(0.0);
     let mut shows = false;
@@ -41,7 +41,7 @@ pub(crate) fn make_cells(
         |part| {
             shows = true;
             let x = (part.start - cells.start) as usize * CELL;
-            make_part(map, row, part, &mut out[x..], stride, ramp);
+            make_part(map, row, part, &mut out[x..], stride, arithmetic);
         },
     );
     shows
@@ -55,7 +55,7 @@ fn make_part(
     cells: Range<i32>,
     out: &mut [f32],
     stride: usize,
-    finest_ramp: impl Fn(f32, f32) -> [f32; CELL],
+    arithmetic: impl Arithmetic,
 ) {
     // It is even, so that the blocks of all lattices begin there.
     let first = (cells.start - 1) & !1;
@@ -69,18 +69,27 @@ fn make_part(
     let mut half = [[0.0; HALF]; 6];
     for (index, line) in half.iter_mut().enumerate() {
         // The row above the cells is the lower half of a coarser row.
-        enlarge(&quarter, index + 1, line);
+        let [near, far] = around(index + 1).map(|row| &quarter[row]);
+        arithmetic.enlarge(near, far, line);
     }
     part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
     let mut full = [[0.0; FULL]; CELL];
     for (index, line) in full.iter_mut().enumerate() {
-        enlarge(&half, index + 2, line);
+        let [near, far] = around(index + 2).map(|row| &half[row]);
+        arithmetic.enlarge(near, far, line);
     }
-    part.add_octave(0, CELL as i32 * row, &mut full, finest_ramp);
+    part.add_octave(0, CELL as i32 * row, &mut full, |left, change| arithmetic.ramp(left, change));
     let (x, width) = ((cells.start - first) as usize * CELL, cells.len() * CELL);
     for (line, full) in out.chunks_mut(stride).zip(&full) {
         line[..width].copy_from_slice(&full[x..x + width]);
     }
+}
+
+/// The rows of a lattice that row `index` of the lattice enlarged by two is made of: the nearest one, and the one
+/// on its other side.
+fn around(index: usize) -> [usize; 2] {
+    let near = index / 2;
+    [near, if index.is_multiple_of(2) { near - 1 } else { near + 1 }]
 }
 
 /// Cells in a row, and the gains of their nodes.
@@ -139,41 +148,5 @@ impl Part {
                 }
             }
         }
-    }
-}
-
-/// How far a point in a cell is on the way from one node to the next.
-#[inline(always)]
-pub(crate) const fn step<const POINTS: usize>(at: usize) -> f32 {
-    (at as f32 + 0.5) / POINTS as f32
-}
-
-/// The values at the points of a cell between two nodes, from that at the first of them and its change.
-#[inline(always)]
-pub(crate) fn ramp<const POINTS: usize>(left: f32, change: f32) -> [f32; POINTS] {
-    core::array::from_fn(|at| left + change * step::<POINTS>(at))
-}
-
-/// Enlarges a lattice by two along both axes, and sets row `index` of the result: its values are three quarters
-/// of the nearest point and one quarter of the next one, first along y, then along x. Row 0 would be the upper
-/// half of the first row of the lattice. The first and the last value are not right.
-#[inline(always)]
-fn enlarge<const WIDTH: usize, const TWICE: usize>(
-    lattice: &[[f32; WIDTH]],
-    index: usize,
-    out: &mut [f32; TWICE],
-) {
-    let near = &lattice[index / 2];
-    let next = if index.is_multiple_of(2) { index / 2 - 1 } else { index / 2 + 1 };
-    let far = &lattice[next];
-    // With one more value at each end.
-    let mut mixed = [0.0; HALF + 2];
-    for column in 0..WIDTH {
-        mixed[column + 1] = near[column] * 0.75 + far[column] * 0.25;
-    }
-    for column in 0..WIDTH {
-        let near = mixed[column + 1] * 0.75;
-        out[2 * column] = near + mixed[column] * 0.25;
-        out[2 * column + 1] = near + mixed[column + 2] * 0.25;
     }
 }
