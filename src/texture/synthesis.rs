@@ -63,20 +63,26 @@ fn make_part(
     for (row, gains) in (row - 1..).zip(&mut gains) {
         map.gains(row, first, gains);
     }
-    let part = Part { gains, row, first };
-    let mut quarter = [[0.0; QUARTER]; 4];
-    part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
-    let mut half = [[0.0; HALF]; 6];
-    for (index, line) in half.iter_mut().enumerate() {
-        // The row above the cells is the lower half of a coarser row.
-        let [near, far] = around(index + 1).map(|row| &quarter[row]);
-        arithmetic.enlarge(near, far, line);
-    }
-    part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
+    let shows = core::array::from_fn(|octave| gains.each_ref().map(|gains| shows(&gains[octave])));
+    let part = Part { gains, shows, row, first };
     let mut full = [[0.0; FULL]; CELL];
-    for (index, line) in full.iter_mut().enumerate() {
-        let [near, far] = around(index + 2).map(|row| &half[row]);
-        arithmetic.enlarge(near, far, line);
+    // Fine texture without any coarser one is frequent, and most of the work is the other octaves.
+    if part.has(1) || part.has(2) {
+        let mut half = [[0.0; HALF]; 6];
+        if part.has(2) {
+            let mut quarter = [[0.0; QUARTER]; 4];
+            part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
+            for (index, line) in half.iter_mut().enumerate() {
+                // The row above the cells is the lower half of a coarser row.
+                let [near, far] = around(index + 1).map(|row| &quarter[row]);
+                arithmetic.enlarge(near, far, line);
+            }
+        }
+        part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
+        for (index, line) in full.iter_mut().enumerate() {
+            let [near, far] = around(index + 2).map(|row| &half[row]);
+            arithmetic.enlarge(near, far, line);
+        }
     }
     part.add_octave(0, CELL as i32 * row, &mut full, |left, change| arithmetic.ramp(left, change));
     let (x, width) = ((cells.start - first) as usize * CELL, cells.len() * CELL);
@@ -96,12 +102,26 @@ fn around(index: usize) -> [usize; 2] {
 struct Part {
     /// Row by row of nodes, from the row above the cells on.
     gains: [[Gains<NODES>; OCTAVES]; NODE_ROWS],
+    /// Whether a pattern of an octave has a gain in a row of nodes.
+    shows: [[[bool; PATTERNS]; NODE_ROWS]; OCTAVES],
     row: i32,
     /// The first column of cells, and of nodes.
     first: i32,
 }
 
+/// Whether each pattern has a gain other than 0.
+#[inline(always)]
+fn shows(gains: &Gains<NODES>) -> [bool; PATTERNS] {
+    // As none is negative, a gain of 0 has no bit set.
+    gains.each_ref().map(|gains| gains.iter().fold(0, |bits, gain| bits | gain.to_bits()) != 0)
+}
+
 impl Part {
+    /// Whether there is any texture of an octave.
+    fn has(&self, octave: usize) -> bool {
+        self.shows[octave].iter().flatten().any(|&shows| shows)
+    }
+
     /// Adds the patterns of an octave to rows of its lattice, from row `row` on. `POINTS` are those of a cell
     /// along each axis; `ramp` has the values at these points, from the one at the node before them and its
     /// change up to the next node.
@@ -118,17 +138,10 @@ impl Part {
         let above = |row: i32| (row.div_euclid(points) - (self.row - 1)) as usize;
         let rows = above(row)..above(row + lines.len() as i32 - 1) + 2;
         for kind in 0..PATTERNS {
-            let gains = &self.gains[rows.clone()];
-            // As none is negative, a gain of 0 has no bit set.
-            let mut bits = 0;
-            for gains in gains {
-                for gain in gains[octave][kind] {
-                    bits |= gain.to_bits();
-                }
-            }
-            if bits == 0 {
+            if !self.shows[octave][rows.clone()].iter().any(|shows| shows[kind]) {
                 continue;
             }
+            let gains = &self.gains[rows.clone()];
             // The gains at the points between the nodes of each row.
             let mut between = [[0.0; WIDTH]; NODE_ROWS];
             for (gains, between) in gains.iter().zip(&mut between[rows.clone()]) {
