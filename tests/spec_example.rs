@@ -275,7 +275,7 @@ fn the_trace_of_the_texture_is_what_is_printed() {
             0 => (coarse.enlarged(x, y), fine.at(x, y)),
             _ => (0.0, coarse.at(x, y)),
         };
-        let gain = |pattern| synthesis.map.gain(x, y, octave, pattern);
+        let gain = |pattern| synthesis.gain(x, y, octave, pattern);
         let [isotropic, streaks] = [0, 1].map(|pattern| noise(octave, pattern, x, y));
         let numbers = texts(&[start, gain(0), isotropic, gain(1), streaks, sum]);
         [vec![octave.to_string(), format!("{x}, {y}")], numbers].concat()

@@ -6,6 +6,7 @@ mod common;
 use common::entropy::{Code, Grid};
 use common::oracle::{self, Request};
 use common::scenes::{SMOOTH, assert_matches_oracle, planes, random_rows, scene};
+use common::synthesis::{map_sums, noise};
 use common::texture::{Texture, map_sides};
 use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, decode, of_chunks};
 use image_gip::{RenderOptions, Threads};
@@ -237,6 +238,66 @@ fn extreme_maps_match_the_oracle() {
             assert_matches_oracle(&file, &close_up);
         }
     }
+}
+
+/// T of an octave in f64, from the sums of the map.
+fn exact(sums: &[Vec<f32>], sides: [u32; 2], octave: usize, [x, y]: [i64; 2]) -> f64 {
+    let mut texture = 0.0;
+    if octave < 2 {
+        let parents =
+            |at: i64| [(at.div_euclid(2), 0.75), ((at - 1).div_euclid(2) + at.rem_euclid(2), 0.25)];
+        for (column, of_column) in parents(x) {
+            for (row, of_row) in parents(y) {
+                texture += of_column * of_row * exact(sums, sides, octave + 1, [column, row]);
+            }
+        }
+    }
+    let gain = |pattern: usize, [column, row]: [i64; 2]| {
+        let [width, height] = sides.map(i64::from);
+        let node = (row.clamp(0, height - 1) * width + column.clamp(0, width - 1)) as usize;
+        let [amplitude, direction] = [octave, 3].map(|m| f64::from(sums[m][node]));
+        let d = 4.0 * direction - 2.0;
+        let streaks = (d.abs() - 0.125).clamp(0.0, 1.0);
+        let part = match pattern {
+            0 => (1.0 - streaks * streaks).sqrt() * [1.0, 1.82, 2.1][octave],
+            _ if (d > 0.0) == (pattern == 1) => streaks * [1.23, 1.72, 1.86][octave],
+            _ => 0.0,
+        };
+        ((amplitude - 1.0 / 128.0) / 2.0).clamp(0.0, 1.0) * part / 1024.0
+    };
+    let n = 8 >> octave;
+    let [column, row] = [x, y].map(|at| at.div_euclid(n));
+    let [right, below] = [x, y].map(|at| (at.rem_euclid(n) as f64 + 0.5) / n as f64);
+    for pattern in 0..3 {
+        let mut mean = 0.0;
+        for (column, of_column) in [(column, 1.0 - right), (column + 1, right)] {
+            for (row, of_row) in [(row, 1.0 - below), (row + 1, below)] {
+                mean += of_column * of_row * gain(pattern, [column, row]);
+            }
+        }
+        texture += mean * f64::from(noise(octave, pattern, x, y));
+    }
+    texture
+}
+
+#[test]
+fn single_precision_stays_close_to_the_exact_texture() {
+    let size = (61, 47);
+    let sides = [61, 47];
+    let map = random_map(&mut Random(16), sides, 1.0, 20);
+    let header = Ghdr { width: size.0, height: size.1, ..Ghdr::default() };
+    let file = File::of_floats(header, &[]).with(b"tXTR", &map.payload(sides));
+    let sums = map_sums(sides, &map.payload(sides));
+    let found = planes(&file, &Request::whole(&file), false, Threads::Pool);
+    let mut largest: f64 = 0.0;
+    for (pixel, found) in (0..).zip(found) {
+        let place = [pixel % i64::from(size.0), pixel / i64::from(size.0)];
+        let exact = exact(&sums, map_sides(sides), 0, place);
+        largest = largest.max(exact.abs());
+        let error = (f64::from(f32::from_bits(found)) - exact).abs();
+        assert!(error < 2e-6, "{place:?}: an error of {error:e}");
+    }
+    assert!(largest > 1.0, "hardly any texture: {largest}");
 }
 
 #[test]

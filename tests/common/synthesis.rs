@@ -8,26 +8,23 @@ use super::{File, Ghdr, RGBA};
 
 /// The texture of a file at the size of a request.
 pub(crate) struct Synthesis {
-    pub(crate) map: Map,
-}
-
-/// The nine gains of each node, by octave and pattern.
-pub(crate) struct Map {
+    /// Of the map.
     sides: [u32; 2],
+    /// The nine gains of each node, by octave and pattern.
     gains: Vec<[[f32; 3]; 3]>,
 }
 
-impl Map {
-    /// Of the payload of a `tXTR`, at an output size.
-    fn new(stored: [u32; 2], payload: &[u8], output: (u32, u32)) -> Self {
-        let sides = map_sides(stored);
+impl Synthesis {
+    /// Of a file that has texture; `output` is the size of the whole output.
+    pub(crate) fn new(file: &File, output: (u32, u32)) -> Option<Self> {
+        let (_, payload) = file.extra.iter().find(|(kind, _)| kind == b"tXTR")?;
+        let stored = file.header.sides();
         let sums = map_sums(stored, payload);
         let scale = (output.0 as f32 / stored[0] as f32).min(output.1 as f32 / stored[1] as f32);
         let fade = (8.0 * scale - 1.0).clamp(0.0, 1.0);
-        let nodes = sides[0] as usize * sides[1] as usize;
-        let gains =
-            (0..nodes).map(|node| Node::new([0, 1, 2, 3].map(|m| sums[m][node]), fade).gains());
-        Self { sides, gains: gains.collect() }
+        let gains = |node| Node::new([0, 1, 2, 3].map(|m| sums[m][node]), fade).gains();
+        let gains = (0..sums[0].len()).map(gains).collect();
+        Some(Self { sides: map_sides(stored), gains })
     }
 
     /// What a node has, or the nearest that there is.
@@ -170,12 +167,6 @@ impl Lattice {
 }
 
 impl Synthesis {
-    /// Of a file that has texture; `output` is the size of the whole output.
-    pub(crate) fn new(file: &File, output: (u32, u32)) -> Option<Self> {
-        let (_, payload) = file.extra.iter().find(|(kind, _)| kind == b"tXTR")?;
-        Some(Self { map: Map::new(file.header.sides(), payload, output) })
-    }
-
     /// T of an octave.
     pub(crate) fn lattice(&self, octave: usize, columns: Range<i64>, rows: Range<i64>) -> Lattice {
         let halved =
@@ -185,7 +176,7 @@ impl Synthesis {
         Lattice::new(columns, rows, |x, y| {
             let start = coarser.as_ref().map_or(0.0, |coarser| coarser.enlarged(x, y));
             (0..3).fold(start, |sum, pattern| {
-                sum + self.map.gain(x, y, octave, pattern) * noise(octave, pattern, x, y)
+                sum + self.gain(x, y, octave, pattern) * noise(octave, pattern, x, y)
             })
         })
     }

@@ -25,25 +25,20 @@ pub(crate) fn steps(step: f32) -> [f32; 8] {
 impl Texture {
     /// A map with these octaves and this direction at every node: one Gaussian so wide that it is flat.
     pub(crate) fn constant(sides: [u32; 2], sums: [f32; 4]) -> Self {
-        let step = 64.0;
-        let sides = map_sides(sides);
-        let middle = Grid::new(sides).units(sides.map(|side| side as f32 / 2.0));
-        let mut code =
-            Code { exponent: 2, axes: vec![0; 4], size: 60, center: middle, ..Code::default() };
+        let map = map_sides(sides);
+        let center = Grid::new(map).units(map.map(|side| side as f32 / 2.0));
+        let code = Code { exponent: 2, axes: vec![0; 4], size: 60, center, ..Code::default() };
+        let mut texture = Self { step: 64.0, codes: vec![code] };
         // What a step of an axis is worth depends on the size of the cell in which the Gaussian ends up.
-        let layer = |code: &Code| {
-            let ops = entropy::write(sides, &steps(step), &mut vec![code.clone()]);
-            let payload = [&1_u32.to_le_bytes()[..], &rans::encode(&ops)].concat();
-            entropy::read(sides, &steps(step), &payload).expect("what was just written")
-        };
-        code.axes[3] = 1 << 12;
-        let unit = layer(&code).values[0][8] / code.axes[3] as f32;
+        texture.codes[0].axes[3] = 1 << 12;
+        let values = read(sides, &texture.payload(sides)).expect("what was just written");
+        let unit = values[0][8] / (1 << 12) as f32;
+        // The columns of the matrix of section 7.5 are orthonormal.
         let [a, b, c, d] = [0.577_350_26, 0.707_106_77, 0.408_248_3, -0.816_496_6_f32];
         let [m0, m1, m2, m3] = sums;
-        // The columns of the matrix of section 7.5 are orthonormal.
         let axes = [a * (m0 + m1 + m2), b * (m0 - m2), c * (m0 + m2) + d * m1, m3 - 0.5];
-        code.axes = axes.map(|axis| (axis / unit).round() as i32).to_vec();
-        Self { step, codes: vec![code] }
+        texture.codes[0].axes = axes.map(|axis| (axis / unit).round() as i32).to_vec();
+        texture
     }
 
     /// The payload of `tXTR` in a picture with these sides.
