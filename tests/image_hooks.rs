@@ -178,6 +178,22 @@ fn metadata_is_carried() {
 }
 
 #[test]
+fn texture_can_be_left_out() {
+    let file = include_bytes!("../spec/vectors/texture-gray8.gip");
+    let mut plain = GipDecoder::new(&file[..]).unwrap();
+    plain.set_texture(false);
+    let plain = read_all(plain);
+    let textured = read_all(GipDecoder::new(&file[..]).unwrap());
+    assert_eq!(textured, reference(file));
+    assert_ne!(textured, plain);
+    let mut decoder = Decoder::new(&file[..]).unwrap();
+    decoder.set_options(RenderOptions::new().with_texture(false));
+    let mut expected = vec![0; plain.len()];
+    decoder.decode_into(&mut expected).unwrap();
+    assert_eq!(plain, expected);
+}
+
+#[test]
 fn a_rectangle_is_a_crop_of_the_whole() {
     for color in [ColorType::Rgb8, ColorType::La16] {
         let file = encode(color);

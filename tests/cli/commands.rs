@@ -5,7 +5,7 @@ use std::path::Path;
 
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
-use image_gip::Region;
+use image_gip::{Region, RenderOptions};
 use serde_json::Value;
 
 use super::common::layered;
@@ -340,6 +340,23 @@ fn sizes_and_regions() {
     let output = room.run(&["decode", "a.gip", "c.png", "--region", "-1,0,5,5"]);
     let error = text(&output.stderr);
     assert!(error.contains("not four whole numbers") && !error.contains("tip:"), "{error}");
+}
+
+#[test]
+fn texture_can_be_left_out() {
+    let room = Room::new();
+    let file = include_bytes!("../../spec/vectors/texture-gray8.gip");
+    fs::write(room.path("a.gip"), file).expect("writable");
+    let decoder = super::common::decode_valid(file);
+    let picture = decoder.picture().expect("a complete file");
+    room.ok(&["decode", "a.gip", "with.png"]);
+    room.ok(&["decode", "a.gip", "without.png", "--no-texture"]);
+    for (name, texture) in [("with.png", true), ("without.png", false)] {
+        let options = RenderOptions::new().with_texture(texture);
+        let mut expected = vec![0; picture.output_len(&options).expect("it fits")];
+        picture.render_u8(&options, &mut expected).expect("a sound request");
+        assert_eq!(open(&room.path(name)).as_bytes(), expected, "{name}");
+    }
 }
 
 #[test]
