@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 #[cfg(feature = "rayon")]
+use core::cmp::Reverse;
+#[cfg(feature = "rayon")]
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 /// The threads that work is shared among. The result does not depend on them.
@@ -42,6 +44,27 @@ pub(crate) fn for_each<M: Default, T: Send>(
     let _ = threads;
     let mut memory = M::default();
     items.into_iter().for_each(|item| work(&mut memory, item));
+}
+
+/// The same, with the items of the highest cost first, so that at the end no thread waits for one of them.
+pub(crate) fn for_each_by_cost<M: Default, T: Send>(
+    threads: Threads,
+    items: Vec<T>,
+    cost: impl Fn(&T) -> usize,
+    work: impl Fn(&mut M, T) + Send + Sync,
+) {
+    // One thread needs no order, and no code for it.
+    #[cfg(feature = "rayon")]
+    let items = {
+        let mut items = items;
+        if threads == Threads::Pool {
+            items.sort_by_cached_key(|item| Reverse(cost(item)));
+        }
+        items
+    };
+    #[cfg(not(feature = "rayon"))]
+    let _ = cost;
+    for_each(threads, items, work);
 }
 
 /// The results of `work` for every item, in the order of the items.

@@ -3,7 +3,6 @@
 //! be skipped (spec, sections 5.6 and 7.3).
 
 use alloc::vec::Vec;
-use core::cmp::Reverse;
 
 use crate::coding::entropy::{AttributeBits, LAYER_PREFIX, LayerCoder, Quantization};
 use crate::color::ColorModel;
@@ -134,9 +133,8 @@ impl SelectedLayers<'_> {
                 *result = layer.decode(&coder, header.color, Some(statistics), out);
             }
         } else {
-            // The largest first, so that at the end no thread waits for a large one.
-            work.sort_by_key(|(layer, ..)| Reverse(layer.count));
-            threads::for_each(threads, work, |(): &mut (), (layer, out, result)| {
+            let cost = |(layer, ..): &(&PendingLayer, _, _)| layer.count;
+            threads::for_each_by_cost(threads, work, cost, |(): &mut (), (layer, out, result)| {
                 *result = layer.decode(&coder, header.color, None, out);
             });
         }

@@ -2,7 +2,6 @@
 //! picture, the rows that some bands are averaged to.
 
 use alloc::vec::Vec;
-use core::cmp::Reverse;
 use core::ops::Range;
 
 use super::area_average::{AreaAverage, Averaging};
@@ -95,9 +94,9 @@ impl<'a> PreparedRender<'a> {
     /// Renders all strips to interleaved samples.
     pub(super) fn interleaved<T: Sample>(&self, threads: Threads, out: &mut [T]) {
         let stride = self.input.view.output.width as usize * self.sources.len();
-        let mut strips: Vec<_> = out.chunks_mut(stride * self.strip_height()).enumerate().collect();
-        self.sort(&mut strips);
-        threads::for_each(threads, strips, |memory: &mut Memory, (strip, out)| {
+        let strips = out.chunks_mut(stride * self.strip_height()).enumerate().collect();
+        let cost = |&(strip, _): &(usize, _)| self.gaussians_in(strip);
+        threads::for_each_by_cost(threads, strips, cost, |memory: &mut Memory, (strip, out)| {
             match &self.averaging {
                 None => self.band(&mut memory.rows, strip, &mut |planes, x, y| {
                     let mut destination = Destination { x, rows: &mut out[y * stride..], stride };
@@ -125,8 +124,9 @@ impl<'a> PreparedRender<'a> {
             });
             parts.push((strip, part.collect::<Vec<_>>()));
         }
-        self.sort(&mut parts);
-        threads::for_each(threads, parts, |memory: &mut Memory, (strip, mut part)| {
+        let cost = |&(strip, _): &(usize, _)| self.gaussians_in(strip);
+        threads::for_each_by_cost(threads, parts, cost, |memory: &mut Memory, (strip, part)| {
+            let mut part = part;
             match &self.averaging {
                 None => self.band(&mut memory.rows, strip, &mut |planes, x, y| {
                     output::write_planes(planes, (x, y), self.sources, &mut part, width);
@@ -138,12 +138,9 @@ impl<'a> PreparedRender<'a> {
         });
     }
 
-    /// Puts the bands with the most Gaussians first, so that at the end no thread waits for one of
-    /// them.
-    fn sort<T>(&self, strips: &mut [(usize, T)]) {
-        if self.averaging.is_none() {
-            strips.sort_by_cached_key(|&(band, _)| Reverse(self.bands.gaussians_in(band)));
-        }
+    /// The number of Gaussians in a strip that is a band; 0 in others.
+    fn gaussians_in(&self, strip: usize) -> usize {
+        if self.averaging.is_none() { self.bands.gaussians_in(strip) } else { 0 }
     }
 
     /// Renders one strip of a smaller output. Calls `write` with each of its rows and the means of
