@@ -204,7 +204,7 @@ impl Band {
         backend: Backend,
     ) {
         match backend {
-            Backend::Reference => self.prepare_with(bands, band, input, truncate),
+            Backend::Reference(_) => self.prepare_with(bands, band, input, truncate),
             #[cfg(feature = "std")]
             Backend::Simd(level) => dispatch!(level, simd => self.prepare_with(
                 bands,

@@ -158,7 +158,7 @@ fn write_channels<T: Sample, const CHANNELS: usize>(
     destination: &mut Destination<'_, T>,
 ) {
     match backend {
-        Backend::Reference => write_rows(destination, |row| pixels(planes, sources, row)),
+        Backend::Reference(_) => write_rows(destination, |row| pixels(planes, sources, row)),
         #[cfg(feature = "std")]
         Backend::Simd(level) => dispatch!(level, simd => write_rows(
             destination,

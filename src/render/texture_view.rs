@@ -192,7 +192,7 @@ impl TextureRow {
         top: u32,
     ) -> Option<TileTexture<'a>> {
         match backend {
-            Backend::Reference => self.prepare_with(view, top, Plain),
+            Backend::Reference(_) => self.prepare_with(view, top, Plain),
             #[cfg(feature = "std")]
             Backend::Simd(level) => {
                 dispatch!(level, simd => self.prepare_with(view, top, Vectors(simd)))
@@ -318,7 +318,7 @@ mod tests {
                         let values = values.flat_map(|line| &line[..width.min(line.len())]);
                         Some(values.map(|value| value.to_bits()).collect::<Vec<_>>())
                     };
-                    let expected = bits(Backend::Reference);
+                    let expected = bits(Backend::reference());
                     for (name, level) in simd_levels() {
                         prop_assert_eq!(bits(Backend::Simd(level)), expected.clone(), "{}", name);
                     }

@@ -64,7 +64,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
     pub(crate) fn render(&self, backend: Backend, half: usize, planes: &mut [PairPlane; CHANNELS]) {
         let left = half * TILE_WIDTH;
         match (backend, self.kernel) {
-            (Backend::Reference, _) => self.render_scalar(left, planes),
+            (Backend::Reference(_), _) => self.render_scalar(left, planes),
             #[cfg(feature = "std")]
             (Backend::Simd(level), Kernel::Exponential { cutoff }) => {
                 let kernel = Exponential { cutoff };
@@ -258,7 +258,7 @@ mod tests {
         origin: (u32, u32),
         kernel: Kernel,
     ) -> Result<(), TestCaseError> {
-        let [expected, found] = [Backend::Reference, Backend::Simd(level)]
+        let [expected, found] = [Backend::reference(), Backend::Simd(level)]
             .map(|backend| rendered::<CHANNELS>(backend, splats, origin, kernel));
         prop_assert_eq!(expected.len(), 2 * CHANNELS * TILE_PIXELS);
         prop_assert_eq!(found, expected, "{}, {:?}", name, kernel);

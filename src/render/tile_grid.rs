@@ -117,7 +117,7 @@ impl<const WIDTH: usize> TileGrid<WIDTH> {
         cutoff: f32,
     ) -> [Extent; LANES] {
         match backend {
-            Backend::Reference => self.extents_with(gaussians, view, cutoff, truncate),
+            Backend::Reference(_) => self.extents_with(gaussians, view, cutoff, truncate),
             #[cfg(feature = "std")]
             Backend::Simd(level) => dispatch!(level, simd => self.extents_with(
                 gaussians,

@@ -72,7 +72,7 @@ impl TileLists {
     /// touch. The memory of an earlier row is used again.
     pub(crate) fn fill(&mut self, backend: Backend, columns: usize, blocks: &[Columns]) {
         match backend {
-            Backend::Reference => self.fill_with(columns, blocks, span, touching),
+            Backend::Reference(_) => self.fill_with(columns, blocks, span, touching),
             #[cfg(feature = "std")]
             Backend::Simd(level) => dispatch!(level, simd => self.fill_with(
                 columns,

@@ -98,7 +98,7 @@ impl RenderOptions {
     }
 
     /// Whether the scalar reference code renders in place of SIMD code. Default `false`. The
-    /// samples are the same bit for bit, which this is there to check.
+    /// samples are the same bit for bit, which this is there to check. WebAssembly with vectors has SIMD code alone.
     ///
     /// This is for study, and may change in any release.
     pub fn with_reference(mut self, reference: bool) -> Self {
