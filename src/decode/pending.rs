@@ -42,12 +42,7 @@ impl PendingLayer {
         statistics: Option<&mut AttributeBits>,
         out: &mut [Gaussian],
     ) -> Result<(), DecodeError> {
-        let mut out = out.iter_mut();
-        coder.read(self.count, &self.payload[LAYER_PREFIX..], statistics, |code, shape| {
-            if let Some(gaussian) = out.next() {
-                *gaussian = coder.quantization.gaussian(&code, shape, &coder.grid, model);
-            }
-        })
+        coder.read_gaussians(&self.payload[LAYER_PREFIX..], statistics, model, out)
     }
 }
 

@@ -57,11 +57,8 @@ impl Texture {
         let coder = LayerCoder::new(&quantization, &header);
         let (count, bytes) =
             LayerCoder::read_count(&payload[STEP_BYTES..], u32::MAX).map_err(named)?;
-        let mut gaussians = Vec::with_capacity(count);
-        let mut receive = |code, shape: &_| {
-            gaussians.push(quantization.gaussian(&code, shape, &coder.grid, header.color));
-        };
-        coder.read(count, bytes, None, &mut receive).map_err(named)?;
+        let mut gaussians = vec![Gaussian::NOTHING; count];
+        coder.read_gaussians(bytes, None, header.color, &mut gaussians).map_err(named)?;
         Ok(Self { header, gaussians })
     }
 

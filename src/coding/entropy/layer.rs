@@ -25,8 +25,10 @@ use super::symbol::SymbolSearch;
 use super::tables;
 use super::tree_walk::{self, TreeGaussians};
 use crate::chunk::ChunkType;
+use crate::color::ColorModel;
 use crate::container::Header;
 use crate::error::DecodeError;
+use crate::gaussian::Gaussian;
 
 /// Bytes of payload before the coded Gaussians: their number.
 pub(crate) const LAYER_PREFIX: usize = 4;
@@ -80,11 +82,30 @@ impl<'a> LayerCoder<'a> {
         Ok((count as usize, bytes))
     }
 
+    /// Reads as many Gaussians as `out` has elements, of a picture with this colour model. They are to be dropped if
+    /// the result is an error: see [`LayerCoder::read`], of which this is the one use in a decoder, so that there
+    /// is no second copy of its code.
+    pub(crate) fn read_gaussians(
+        &self,
+        bytes: &[u8],
+        statistics: Option<&mut AttributeBits>,
+        model: ColorModel,
+        out: &mut [Gaussian],
+    ) -> Result<(), DecodeError> {
+        let count = out.len();
+        let mut out = out.iter_mut();
+        self.read(count, bytes, statistics, |code, shape| {
+            if let Some(gaussian) = out.next() {
+                *gaussian = self.quantization.gaussian(&code, shape, &self.grid, model);
+            }
+        })
+    }
+
     /// Reads `count` Gaussians and passes the code and shape of each on, in the order of the file.
     /// They are to be dropped if the result is an error: that the bytes are malformed is known at
     /// the end only. Adds to `statistics` if they are given.
     #[cfg_attr(not(feature = "std"), expect(clippy::needless_pass_by_value))]
-    pub(crate) fn read(
+    fn read(
         &self,
         count: usize,
         bytes: &[u8],
