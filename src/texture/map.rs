@@ -139,7 +139,8 @@ impl NodeMap {
 
     /// The gains of all octaves at nodes in row `row` from column `first` on. Beyond the edge of the map, they
     /// are those of the nearest node.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn gains<const NODES: usize>(
         &self,
         row: i32,

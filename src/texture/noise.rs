@@ -39,8 +39,10 @@ impl<const WIDTH: usize> Lattice<WIDTH> {
         Self { pattern, first, row: None, numbers: [[0.0; WIDTH]; 3] }
     }
 
-    /// The values in row `row`.
-    #[inline(always)]
+    /// The values in row `row`. In WebAssembly, which needs no copy of it for each SIMD level, it is called: the
+    /// module is smaller by a tenth.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn row(&mut self, row: i32, values: &mut [f32; WIDTH]) {
         match self.pattern.kind {
             0 => self.isotropic(row, values),
@@ -111,7 +113,8 @@ impl<const WIDTH: usize> Lattice<WIDTH> {
 
 impl Pattern {
     /// The values of a row of blocks, from block `first` on, each in a row across the streaks.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn across<const WIDTH: usize>(self, row: i32, first: i32, values: &mut [f32; WIDTH]) {
         let seed = self.seed(row);
         for block in 0..WIDTH / 4 {
