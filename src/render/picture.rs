@@ -67,6 +67,16 @@ impl<'a> Picture<'a> {
         self.gaussians
     }
 
+    /// The map of the texture as a picture of its own; `None` without texture. Its pixels are the map's nodes,
+    /// and the planes that it renders are their sums: the strengths of three octaves, and the direction (spec,
+    /// section 9.7). This is for programs that make the texture themselves, for instance on a GPU.
+    #[must_use]
+    pub fn texture_map(&self) -> Option<Self> {
+        let texture = self.texture?;
+        let (header, gaussians) = (texture.header(), texture.gaussians());
+        Some(Self::new(header, gaussians, self.limits, self.decoder_memory))
+    }
+
     /// The number of samples of the output with these options: width x height x channels of the
     /// region that is rendered. It is checked against the [`Limits`], so that it is safe to
     /// allocate.
