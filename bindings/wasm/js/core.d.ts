@@ -1,7 +1,7 @@
 /** The decoder on the calling thread: nothing is asynchronous but loading it. For workers. */
 
 import type { Gaussian9, GaussianOptions, Header, Limits, Metadata, Orientation } from './types.js';
-import type { Progress, RenderOptions, SampleOptions, Samples, Statistics } from './types.js';
+import type { Progress, RenderOptions, SampleOptions, Samples, Statistics, TextureMap } from './types.js';
 
 export type * from './types.js';
 
@@ -45,6 +45,8 @@ export class Decoder {
   gaussiansIn(bytes: number): number;
   /** The Gaussians that have arrived, or some of them, by default as stored. */
   gaussians(options?: GaussianOptions): Gaussian9;
+  /** The map of the texture that has arrived, always as stored; `null` without texture. */
+  textureMap(): TextureMap | null;
   /** Chunks, layers, bits per attribute. */
   statistics(): Statistics;
 

@@ -135,6 +135,11 @@ export class Decoder extends Upright {
     return turned && this.orientation > 1 ? turnGaussians(numbers, this.header, this.orientation) : numbers;
   }
 
+  /** The planes of the texture's map; see the declarations. `null` without texture. */
+  textureMap() {
+    return this.#open.textureMap() ?? null;
+  }
+
   /** Chunks, layers, bits per attribute. */
   statistics() {
     return this.#open.statistics();
@@ -172,7 +177,10 @@ export class Decoder extends Upright {
   }
 
   /** The numbers for a rendering, with the orientation that it has by default. */
-  #request(byDefault, { width, height, region, gaussians = all, color, orientation = byDefault }) {
+  #request(
+    byDefault,
+    { width, height, region, gaussians = all, color, orientation = byDefault, texture = true },
+  ) {
     if (color !== undefined && !Object.hasOwn(channelsOf, color)) {
       throw new RangeError(`color is ${color}; it must be one of ${Object.keys(channelsOf)}`);
     }
@@ -189,6 +197,7 @@ export class Decoder extends Upright {
       integer(gaussians, 'gaussians', 0),
       channelsOf[color] ?? 0,
       Number(turned),
+      Number(Boolean(texture)),
     );
   }
 }

@@ -8,7 +8,8 @@ export * from './index.js';
  * A `.gip` picture that lays out like `<img>`, and is loaded as far as its size needs.
  *
  * Attributes: `src`, `alt`, `width`, `height`, `loading` (`eager` or `lazy`), `crossorigin`
- * (`use-credentials` sends cookies to other origins), `referrerpolicy`, `fetchpriority`.
+ * (`use-credentials` sends cookies to other origins), `referrerpolicy`, `fetchpriority`,
+ * `texture` (`on` or `off`: whether the picture's texture is rendered).
  *
  * The picture is upright, as its Exif says, and so are its natural size and the layout that follows from
  * it. With the CSS property `image-orientation: none` it is laid out and shown as stored.
@@ -27,6 +28,7 @@ export class GipImageElement extends HTMLElement {
   crossOrigin: string | null;
   referrerPolicy: string;
   fetchPriority: string;
+  texture: 'on' | 'off';
   /** The width of the content box in CSS pixels; setting it sets the attribute. */
   width: number;
   /** The height of the content box in CSS pixels; setting it sets the attribute. */

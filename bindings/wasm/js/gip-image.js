@@ -23,7 +23,7 @@ const reloads = ['crossorigin', 'referrerpolicy'];
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class GipImageElement extends ImageAttributes {
-  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', ...reloads];
+  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'texture', ...reloads];
 
   /** What a file may cost at most. A page may have set it before this script has come. */
   limits = this.limits;
@@ -305,7 +305,7 @@ export class GipImageElement extends ImageAttributes {
     };
     const box = { css: this.#css, device, natural: this.#size };
     const made = plan({ ...box, fit: objectFit, position: objectPosition });
-    return made && { ...made, orientation: this.#orientation };
+    return made && { ...made, orientation: this.#orientation, texture: this.texture };
   }
 
   /** Puts what has been drawn where it belongs now, until it is rendered anew. */
@@ -353,12 +353,12 @@ export class GipImageElement extends ImageAttributes {
     }
   }
 
-  async #render(loader, { width, height, region, orientation }) {
+  async #render(loader, { width, height, region, orientation, texture }) {
     if (this.#profile === undefined) {
       const { iccProfile } = await loader.metadata();
       if (this.#loader === loader) this.#profile = iccProfile;
     }
-    const options = { width, height, region, orientation };
+    const options = { width, height, region, orientation, texture: texture === 'on' };
     if (!this.#profile) return loader.render(options);
     // The browser knows how to convert colours.
     return createImageBitmap(await loader.png(options));

@@ -1,4 +1,4 @@
-// The attributes of `<img>` as properties.
+// The attributes of `<img>` as properties, and `texture`.
 
 import { contentSize } from './styles.js';
 
@@ -7,6 +7,7 @@ const keywords = {
   loading: ['eager', 'lazy'],
   crossorigin: ['anonymous', 'use-credentials'],
   fetchpriority: ['auto', 'high', 'low'],
+  texture: ['on', 'off'],
   referrerpolicy: [
     '',
     'no-referrer',
@@ -79,6 +80,14 @@ export class ImageAttributes extends Base {
 
   set referrerPolicy(value) {
     this.setAttribute('referrerpolicy', value);
+  }
+
+  get texture() {
+    return keyword('texture', this.getAttribute('texture'));
+  }
+
+  set texture(value) {
+    this.setAttribute('texture', value);
   }
 
   get width() {

@@ -1,7 +1,7 @@
 /** The package `image-gip` for scripts. The work is done in workers, where they can be had. */
 
 import type { Gaussian9, GaussianOptions, Header, Limits, Metadata, Orientation } from './types.js';
-import type { Progress, RenderOptions, SampleOptions, Samples, Statistics } from './types.js';
+import type { Progress, RenderOptions, SampleOptions, Samples, Statistics, TextureMap } from './types.js';
 
 export type * from './types.js';
 export * from './errors.js';
@@ -63,6 +63,8 @@ interface Renderable {
   statistics(): Promise<Statistics>;
   /** The Gaussians that have arrived, or some of them, by default as stored. */
   gaussians(options?: GaussianOptions): Promise<Gaussian9>;
+  /** The map of the texture that has arrived, always as stored; `null` without texture. */
+  textureMap(): Promise<TextureMap | null>;
   /** How many Gaussians are enough for an output of this size in pixels. */
   gaussiansFor(width: number, height: number): Promise<number>;
   /** How many Gaussians a decoder has after the first `bytes` of the file. */

@@ -81,6 +81,10 @@ export class StreamDecoder extends Upright {
     return this.#remote.call('gaussians', { start, end, orientation });
   }
 
+  textureMap() {
+    return this.#remote.call('textureMap');
+  }
+
   gaussiansFor(width, height) {
     return this.#remote.call('gaussiansFor', [width, height]);
   }

@@ -74,6 +74,11 @@ export interface RenderOptions {
   /** Render only the first Gaussians of the file. Default: all that have arrived. */
   gaussians?: number;
   /**
+   * Whether the picture's texture is rendered: noise in place of what the file has no samples of, such as sand
+   * and water. Without it the picture is smoother, and nearer to the source sample by sample. Default: true.
+   */
+  texture?: boolean;
+  /**
    * `from-image`: the output is upright, and so are the sizes and the region above. `none`: all are as
    * stored. Default: `from-image` for pictures, `none` for `samples`.
    */
@@ -119,6 +124,13 @@ export interface Samples {
  *   that the picture lacks.
  */
 export type Gaussian9 = Float32Array;
+
+/**
+ * The map of a texture, for programs that make the texture themselves (spec, section 9.7): four planes of
+ * ceil(height / 8) + 1 rows of ceil(width / 8) + 1 nodes, of the picture's stored size. They are the sums m0 to
+ * m3, of which the strengths of three octaves follow, and the direction.
+ */
+export type TextureMap = Float32Array;
 
 export interface Statistics {
   /** The complete chunks by type. `bytes` includes length, type and CRC. */

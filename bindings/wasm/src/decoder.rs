@@ -1,6 +1,6 @@
 //! The push decoder and its renderings.
 
-use image_gip::{DecodeError, Limits, Orientation, StreamDecoder};
+use image_gip::{DecodeError, Limits, Orientation, RenderOptions, StreamDecoder};
 use js_sys::{Float32Array, Uint8ClampedArray, Uint16Array};
 use wasm_bindgen::prelude::*;
 
@@ -116,6 +116,21 @@ impl Decoder {
         Float32Array::from(numbers.as_slice())
     }
 
+    /// The planes of the texture's map, as stored; `undefined` without texture.
+    #[wasm_bindgen(js_name = textureMap)]
+    pub fn texture_map(&self) -> Result<Option<Float32Array>, JsValue> {
+        let Some(map) = self.stream.picture().and_then(|picture| picture.texture_map()) else {
+            return Ok(None);
+        };
+        let options = RenderOptions::new();
+        let sums = map.output_len(&options).and_then(|length| {
+            let mut sums = vec![0.0; length];
+            map.render_planes(&options, &mut sums).map(|()| sums)
+        });
+        sums.map(|sums| Some(Float32Array::from(sums.as_slice())))
+            .map_err(|error| exception(&error))
+    }
+
     /// Renders interleaved 8-bit samples. See [`Request::new`] for the numbers.
     pub fn render8(&mut self, request: &[u32]) -> Result<Uint8ClampedArray, JsValue> {
         self.render::<u8>(request)
@@ -130,7 +145,7 @@ impl Decoder {
 impl Decoder {
     fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
         let Some(header) = self.stream.header() else { return Err(no_header()) };
-        let numbers = request.try_into().map_err(|_| JsValue::from("nine numbers"))?;
+        let numbers = request.try_into().map_err(|_| JsValue::from("ten numbers"))?;
         let orientation = self.stream.orientation().unwrap_or_default();
         let request = Request::new(numbers, header, orientation);
         // All strips together may take the work that is allowed.

@@ -2,13 +2,14 @@
 
 use image_gip::{ColorModel, DecodeError, Header, Orientation, Region, RenderOptions};
 
-/// The output that is wanted: the size of the whole, the part of it, and how many Gaussians. Size and
-/// region are those after turning.
+/// The output that is wanted: the size of the whole, the part of it, how many Gaussians, and whether the
+/// texture. Size and region are those after turning.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request {
     size: (u32, u32),
     pub(crate) region: Region,
     gaussians: u32,
+    texture: bool,
     pub(crate) color: ColorModel,
     /// How to turn what the decoder renders.
     pub(crate) orientation: Orientation,
@@ -16,11 +17,11 @@ pub(crate) struct Request {
 
 impl Request {
     /// From the numbers that `js/core.js` sends: the sizes, the number of Gaussians, the channels,
-    /// of which 0 are those of the file, and whether the output is turned by the `orientation` of
-    /// the file.
-    pub(crate) fn new(numbers: [u32; 9], header: &Header, orientation: Orientation) -> Self {
-        let [width, height, x, y, region_width, region_height, gaussians, channels, turned] =
-            numbers;
+    /// of which 0 are those of the file, whether the output is turned by the `orientation` of the file,
+    /// and whether it has the texture.
+    pub(crate) fn new(numbers: [u32; 10], header: &Header, orientation: Orientation) -> Self {
+        let [width, height, x, y, region_width, region_height, rest @ ..] = numbers;
+        let [gaussians, channels, turned, texture] = rest;
         let color = match channels {
             0 => header.color,
             1 => ColorModel::Gray,
@@ -30,7 +31,8 @@ impl Request {
         };
         let region = Region { x, y, width: region_width, height: region_height };
         let orientation = if turned == 0 { Orientation::NoTransforms } else { orientation };
-        Self { size: (width, height), region, gaussians, color, orientation }
+        let texture = texture != 0;
+        Self { size: (width, height), region, gaussians, texture, color, orientation }
     }
 
     /// The number of pixels.
@@ -48,6 +50,7 @@ impl Request {
             .with_size(width, height)
             .with_region(region)
             .with_prefix(self.gaussians)
+            .with_texture(self.texture)
             .with_color(self.color))
     }
 

@@ -7,7 +7,7 @@ import { inflateSync } from 'node:zlib';
 
 import { Decoder, load } from '../dist/core.js';
 import { GipError, LimitError, MalformedError } from '../dist/index.js';
-import { makePicture } from './picture.js';
+import { makePicture, texture } from './picture.js';
 import { crc32, parseIndex, resultOf, unlimited } from './vectors.js';
 
 const vectors = new URL('../../../spec/vectors/', import.meta.url);
@@ -100,6 +100,29 @@ test('what a part of a file has, as a decoder of that part tells', () => {
     }
     whole.close();
   }
+});
+
+test('texture is rendered, unless it is left out', () => {
+  const textured = opened(makePicture({ chunks: [['tXTR', texture]] }));
+  const plain = opened(makePicture());
+  for (const options of [{}, { width: 300 }, { width: 30, region: { x: 3, y: 2, width: 20, height: 10 } }]) {
+    const { data } = plain.samples(options);
+    assert.deepEqual(plain.samples({ ...options, texture: true }).data, data);
+    assert.deepEqual(textured.samples({ ...options, texture: false }).data, data);
+    const found = textured.samples(options).data;
+    assert.deepEqual(textured.samples({ ...options, texture: undefined }).data, found);
+    const changed = found.filter((sample, index) => Math.abs(sample - data[index]) > 3);
+    assert.ok(changed.length > 0.2 * data.length, `${changed.length} of ${data.length} samples`);
+  }
+  const map = textured.textureMap();
+  assert.equal(map.length, 4 * 13 * 9);
+  // Strengths are more than nothing somewhere, and streaks have both directions.
+  for (const octave of [0, 1, 2]) {
+    assert.ok(map.slice(octave * 117, octave * 117 + 117).some((sum) => sum > 0.1), `octave ${octave}`);
+  }
+  assert.ok(Math.max(...map.slice(351)) > 0.6 && Math.min(...map.slice(351)) < 0.4);
+  assert.equal(plain.textureMap(), null);
+  assert.equal(new Decoder().textureMap(), null);
 });
 
 test('an output that is rendered in strips is the same', () => {

@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { file, harness, script, settled, slow, until, withPage } from './harness.js';
-import { makePicture } from './picture.js';
+import { makePicture, texture } from './picture.js';
 
 const picture = makePicture({ width: 96, height: 64, layers: [40, 160, 400] });
 /** So large that a small display needs a sixth of it. */
@@ -48,6 +48,32 @@ test('it shows the samples of the decoder', async () => {
     assert.deepEqual([canvas.width, canvas.height], [width, height]);
     assert.equal(difference(canvas, { data }), 0);
     assert.ok(new Set(data).size > 100, 'there is a picture to compare');
+  });
+});
+
+test('texture is shown, and left out and shown again as the attribute says', async () => {
+  harness.routes['/textured.gip'] = file(makePicture({ layers: [40], chunks: [['tXTR', texture]] }));
+  await withPage(element('src="/textured.gip"'), async (page) => {
+    await settled(page);
+    const wanted = await page.evaluate(async () => {
+      const { decode } = await import('/dist/index.js');
+      const images = [{}, { texture: false }].map((options) => decode('/textured.gip', options));
+      return (await Promise.all(images)).map(({ data }) => ({ data: [...data] }));
+    });
+    assert.ok(difference(...wanted) > 1);
+    const shows = (image) => until(async () => difference(await canvasOf(page), image) === 0, 'the picture');
+    const property = (set) =>
+      page.evaluate((set) => {
+        const image = document.querySelector('gip-image');
+        if (set) image.texture = set;
+        return [image.texture, image.getAttribute('texture')];
+      }, set);
+    await shows(wanted[0]);
+    assert.deepEqual(await property(), ['on', null]);
+    assert.deepEqual(await property('off'), ['off', 'off']);
+    await shows(wanted[1]);
+    assert.deepEqual(await property('On'), ['on', 'On']);
+    await shows(wanted[0]);
   });
 });
 

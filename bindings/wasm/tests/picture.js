@@ -19,6 +19,12 @@ export function exif(orientation) {
   return bytes;
 }
 
+/**
+ * A texture for pictures of 96 x 64 pixels, in all octaves and directions, as the chunk `['tXTR', texture]`
+ * (spec, section 5.7).
+ */
+export const texture = Buffer.from('cdcc4c3d0400000058ec9600dd08f627913958c64ebb94947c0030f2117f4aa0abdad283', 'hex');
+
 /** By Exif's values: where a place of a picture of this size, as stored, is in the upright one. */
 export const turns = (width, height) => ({
   1: ([x, y]) => [x, y],

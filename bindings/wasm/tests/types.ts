@@ -11,6 +11,7 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   const picture: Picture = await open(new Response(), { statistics: true });
   const header: Header = picture.header;
   const samples: Samples = await picture.samples({ color: 'rgba', depth: 16 });
+  const map: Float32Array | null = await picture.textureMap();
   const numbers: Float32Array = await picture.gaussians({ start: 0, end: 10, orientation: 'from-image' });
   const turned: boolean = picture.orientation > 4 && picture.naturalWidth === header.height;
   const { layers, attributeBits } = await picture.statistics();
@@ -21,14 +22,15 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   const unknown: boolean = stream.orientation === null;
   await load(new URL('https://example.com/'));
   const decoder = new Decoder({ limits: { memory: 1e6 } });
-  const data: Uint8ClampedArray = decoder.render({ gaussians: 3, orientation: 'none' }).data;
+  const data: Uint8ClampedArray = decoder.render({ gaussians: 3, orientation: 'none', texture: false }).data;
   const element: GipImageElement = document.createElement('gip-image');
   element.loading = 'lazy';
+  element.texture = 'off';
   element.limits = { height: 2 ** 20, work: Infinity };
   await element.decode();
   const png: Blob = await picture.png({ width: 10 });
   const bytes: number = memorySize();
-  void [turned, unknown, png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
+  void [map, turned, unknown, png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
   // @ts-expect-error: not a source
   await decode(12);
   // @ts-expect-error: there is no such orientation
