@@ -1,6 +1,6 @@
 //! Why a picture is not rendered.
 
-use image_gip::RequestError;
+use image_gip::{DecodeError, RequestError};
 use thiserror::Error;
 
 /// Why a picture was not rendered.
@@ -30,6 +30,9 @@ pub enum RenderError {
         /// The limit.
         allowed: u64,
     },
+    /// The map of the picture's texture was not rendered.
+    #[error("the map of the texture: {0}")]
+    Map(#[from] DecodeError),
     /// The picture has a kernel that the shader lacks.
     #[error("the shader lacks the kernel of this picture")]
     Kernel,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use image_gip::{Gaussian, Header, Kernel, Picture};
+use image_gip::{DecodeError, Gaussian, Header, Kernel, Picture, RenderOptions};
 use wgpu::BufferUsages;
 
 use crate::device::{buffer, check, checked};
@@ -15,7 +15,8 @@ const GAUSSIAN_BYTES: u64 = 36;
 const SPLAT_BYTES: u64 = 48;
 
 /// A picture in the memory of the GPU, to be drawn many times: see
-/// [`GpuRenderer::upload`](crate::GpuRenderer::upload). Each Gaussian takes 116 bytes there.
+/// [`GpuRenderer::upload`](crate::GpuRenderer::upload). Each Gaussian takes 116 bytes there, and the texture a
+/// quarter of a byte for each pixel.
 #[derive(Debug)]
 pub struct GpuPicture {
     /// That of the renderer.
@@ -23,9 +24,11 @@ pub struct GpuPicture {
     header: Header,
     /// For the work of a view.
     gaussians: Vec<Gaussian>,
+    has_texture: bool,
     pub(crate) gaussian_buffer: wgpu::Buffer,
     pub(crate) splat_buffer: wgpu::Buffer,
     pub(crate) bin_buffer: wgpu::Buffer,
+    pub(crate) map_buffer: wgpu::Buffer,
 }
 
 impl GpuPicture {
@@ -42,25 +45,30 @@ impl GpuPicture {
         let limits = device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         check("bytes of a buffer for the Gaussians", splat_bytes.max(bin_bytes), most)?;
+        let map = picture.texture_map();
+        let sums = map.map_or_else(|| Ok(Vec::new()), |map| sums(&map))?;
+        check("bytes of a buffer for the texture", size_of_val(&sums[..]) as u64, most)?;
 
-        let mut contents = Vec::with_capacity((count.max(1) * GAUSSIAN_BYTES) as usize);
-        for Gaussian { center, cholesky, color } in gaussians {
-            for value in center.iter().chain(cholesky).chain(color) {
-                contents.extend_from_slice(&value.to_ne_bytes());
-            }
-        }
-        contents.resize(contents.capacity(), 0);
+        let values = gaussians.iter().flat_map(|Gaussian { center, cholesky, color }| {
+            center.iter().chain(cholesky).chain(color)
+        });
+        let contents = bytes(values, count * GAUSSIAN_BYTES);
+        let map_contents = bytes(&sums, size_of_val(&sums[..]) as u64);
         let filled = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         checked(device, || {
             let gaussian_buffer = buffer(device, "gip gaussians", contents.len() as u64, filled);
             queue.write_buffer(&gaussian_buffer, 0, &contents);
+            let map_buffer = buffer(device, "gip texture map", map_contents.len() as u64, filled);
+            queue.write_buffer(&map_buffer, 0, &map_contents);
             Self {
                 identity: Arc::clone(identity),
                 header: picture.header().clone(),
                 gaussians: gaussians.to_vec(),
+                has_texture: map.is_some(),
                 gaussian_buffer,
                 splat_buffer: buffer(device, "gip splats", splat_bytes, BufferUsages::STORAGE),
                 bin_buffer: buffer(device, "gip bins", bin_bytes, filled),
+                map_buffer,
             }
         })
     }
@@ -96,8 +104,8 @@ impl GpuPicture {
     }
 
     /// The contents of the uniform `View` of the shader.
-    pub(crate) fn uniform(&self, frame: &Frame) -> Result<[u8; 96], RenderError> {
-        let Header { kernel, color, base_color, .. } = self.header;
+    pub(crate) fn uniform(&self, frame: &Frame) -> Result<[u8; 112], RenderError> {
+        let Header { width, height, kernel, color, base_color, .. } = self.header;
         let code = match kernel {
             Kernel::Exponential { .. } => 0_u32,
             Kernel::Quartic => 1,
@@ -121,22 +129,43 @@ impl GpuPicture {
             color.channels() as u32,
             code,
             kernel.cutoff().to_bits(),
-            0,
+            (if self.has_texture { frame.fade } else { 0.0 }).to_bits(),
             frame.ratio[0].to_bits(),
             frame.ratio[1].to_bits(),
             frame.offset[0].to_bits(),
             frame.offset[1].to_bits(),
             region.width,
             region.height,
+            width,
+            height,
+            // The picture is as stored.
+            0,
+            0,
             0,
             0,
         ];
-        let mut bytes = [0; 96];
+        let mut bytes = [0; 112];
         for (bytes, word) in bytes.chunks_exact_mut(4).zip(words) {
             bytes.copy_from_slice(&word.to_ne_bytes());
         }
         Ok(bytes)
     }
+}
+
+/// The planes of a texture's map.
+fn sums(map: &Picture<'_>) -> Result<Vec<f32>, DecodeError> {
+    let options = RenderOptions::new();
+    let mut sums = vec![0.0; map.output_len(&options)?];
+    map.render_planes(&options, &mut sums)?;
+    Ok(sums)
+}
+
+/// Numbers as `size` bytes for a buffer, which must not be empty.
+fn bytes<'a>(values: impl IntoIterator<Item = &'a f32>, size: u64) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(size.max(4) as usize);
+    bytes.extend(values.into_iter().flat_map(|value| value.to_ne_bytes()));
+    bytes.resize(bytes.len().max(4), 0);
+    bytes
 }
 
 /// The bytes of a bin for so many Gaussians: a bit for each, in whole words.

@@ -14,7 +14,7 @@ pub(crate) const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 /// Invocations of a workgroup of either entry point.
 const INVOCATIONS: u32 = 256;
 /// Bytes of the memory that a workgroup of `render` shares.
-const SHARED_BYTES: u32 = 11_400;
+const SHARED_BYTES: u32 = 14_000;
 
 /// The entry points of the shader and their bindings.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Pipelines {
         let needed = [
             ("invocations of a workgroup", INVOCATIONS, invocations),
             ("bytes of workgroup memory", SHARED_BYTES, limits.max_compute_workgroup_storage_size),
-            ("storage buffers", 3, limits.max_storage_buffers_per_shader_stage),
+            ("storage buffers", 4, limits.max_storage_buffers_per_shader_stage),
             ("storage textures", 1, limits.max_storage_textures_per_shader_stage),
         ];
         for (what, wanted, allowed) in needed {
@@ -74,6 +74,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             buffer(2, BufferBindingType::Storage { read_only: false }),
             buffer(3, BufferBindingType::Storage { read_only: false }),
             entry(4, output),
+            buffer(5, BufferBindingType::Storage { read_only: true }),
         ],
     })
 }

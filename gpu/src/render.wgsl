@@ -17,8 +17,9 @@
 //   2  splats     storage, 48 N      filled by `prepare`
 //   3  bins       storage, 4 ceil(N / 32) x number of bins; at most 1024 ceil(N / 32)
 //   4  output     storage texture, rgba8unorm, of at least `pixels`
+//   5  map        storage, 16 M      the map of the picture's texture, which has M nodes; see below
 //
-// `prepare` uses 0 to 3, `render` 0, 2, 3 and 4. Both accept a bind group with all five.
+// `prepare` uses 0 to 3, `render` 0 and 2 to 5. Both accept a bind group with all six.
 
 struct View {
     // Pixels of the grid for one stored pixel, along x and y. The grid is what is evaluated: the
@@ -44,15 +45,27 @@ struct View {
     kernel: u32,
     // The cut-off of the kernel, which is 4 for the quartic one. (offset 56)
     cutoff: f32,
+    // What the strength of the picture's texture is multiplied by: clamp(8 s - 1, 0, 1), where s are the
+    // output's pixels for one stored pixel, along the axis along which there are fewer. 0 without
+    // texture; `map` can be any buffer then. (offset 60)
+    fade: f32,
     // Pixels of the grid for one of the output, along x and y: 1 unless the output is smaller than the
     // picture. (offset 64)
     ratio: vec2<f32>,
-    // Where the texture's first pixel begins, in pixels of the grid from `origin`. (offset 72)
+    // Where the output's first pixel begins, in pixels of the grid from `origin`. (offset 72)
     offset: vec2<f32>,
-    // Width and height in pixels of what is drawn; the texture has at least this size. (offset 80;
-    // size 96)
+    // Width and height in pixels of what is drawn; `output` has at least this size. (offset 80)
     pixels: vec2<u32>,
+    // Width and height of the stored picture. (offset 88)
+    stored: vec2<u32>,
+    // How the stored picture was turned to the one that `gaussians` are of, since texture is that of stored
+    // pixels: MIRROR_COLUMNS, then MIRROR_ROWS, then EXCHANGE_AXES; 0 if not at all. (offset 96; size 112)
+    turn: u32,
 }
+
+const MIRROR_COLUMNS: u32 = 1u;
+const MIRROR_ROWS: u32 = 2u;
+const EXCHANGE_AXES: u32 = 4u;
 
 // A Gaussian in pixels of the grid (spec, section 9.2).
 struct Splat {
@@ -73,6 +86,9 @@ struct Splat {
 // For each bin, row by row, a bit for each Gaussian: the lowest bit of the first word is the first.
 @group(0) @binding(3) var<storage, read_write> bins: array<atomic<u32>>;
 @group(0) @binding(4) var output: texture_storage_2d<rgba8unorm, write>;
+// The sums m0 to m3 of the map (spec, section 9.7): four planes of ceil(stored.y / 8) + 1 rows of
+// ceil(stored.x / 8) + 1 nodes.
+@group(0) @binding(5) var<storage, read> map: array<f32>;
 
 // Width and height of a tile in pixels.
 const TILE: u32 = 16u;
@@ -224,9 +240,8 @@ var<workgroup> candidates: array<u32, 256>;
 var<workgroup> touching: array<atomic<u32>, 8>;
 var<workgroup> places: array<vec4<f32>, 256>;
 var<workgroup> i22s: array<f32, 256>;
+// Their amplitudes; later the pixels of a tile of the grid, where the output is their average.
 var<workgroup> colors: array<vec4<f32>, 256>;
-// The pixels of a tile of the grid, where the output is their average.
-var<workgroup> values: array<vec4<f32>, 256>;
 
 // The point (u, v) of the kernel for a distance from the centre (spec, section 9.3).
 fn point(place: vec4<f32>, i22: f32, d: vec2<f32>) -> vec2<f32> {
@@ -288,6 +303,172 @@ fn sum_before(invocation: u32, count: u32) -> u32 {
     return before;
 }
 
+// ---- texture: three lattices for each tile (spec, section 9.7) ----
+
+// The texture of a tile of the grid is interpolated from that of stored pixels, the lattice of octave 0, which is
+// made from those of octaves 1 and 2. Of these there are so many points along each axis, in one array.
+const OCTAVES: i32 = 3;
+const SIDES = array<i32, 3>(20, 13, 9);
+const STARTS = array<i32, 3>(0, 400, 569);
+var<workgroup> lattices: array<f32, 650>;
+
+// What makes the standard deviation of each octave 1: isotropic, and of streaks.
+const GAINS = array<vec3<f32>, 3>(vec3(1.0, 1.23, 1.23), vec3(1.82, 1.72, 1.72), vec3(2.1, 1.86, 1.86));
+// The signs of three numbers in the four values of a block.
+const SIGNS = array<vec3<f32>, 4>(
+    vec3(1.0, 1.0, 1.0),
+    vec3(1.0, -1.0, -1.0),
+    vec3(-1.0, 1.0, -1.0),
+    vec3(-1.0, -1.0, 1.0),
+);
+
+// The gains of the patterns of an octave at a node: isotropic, horizontal and vertical streaks.
+fn gains_of_node(node: vec2<i32>, octave: i32) -> vec3<f32> {
+    let count = vec2<i32>((view.stored + 7u) / 8u) + 1;
+    let at = clamp(node, vec2(0), count - 1);
+    let first = at.y * count.x + at.x;
+    let plane = count.x * count.y;
+    let strength = clamp((map[octave * plane + first] - 0.0078125) * 0.5, 0.0, 1.0) * view.fade;
+    let direction = map[3 * plane + first] * 4.0 - 2.0;
+    let horizontal = clamp(direction - 0.125, 0.0, 1.0);
+    let vertical = clamp(-0.125 - direction, 0.0, 1.0);
+    let streaks = horizontal + vertical;
+    let isotropic = sqrt(max(1.0 - streaks * streaks, 0.0));
+    return strength * vec3(isotropic, horizontal, vertical) * GAINS[octave] / 1024.0;
+}
+
+// The same at a point of the lattice.
+fn gains_at(point: vec2<i32>, octave: i32) -> vec3<f32> {
+    let bits = vec2(3u - u32(octave));
+    let node = point >> bits;
+    let within = vec2<f32>(point - (node << bits)) + 0.5;
+    let part = within / f32(1u << bits.x);
+    let above = mix(gains_of_node(node, octave), gains_of_node(node + vec2(1, 0), octave), part.x);
+    let below =
+        mix(gains_of_node(node + vec2(0, 1), octave), gains_of_node(node + vec2(1, 1), octave), part.x);
+    return mix(above, below, part.y);
+}
+
+// Three odd numbers from -1023 to 1023 for a block of a pattern.
+fn numbers(block: vec2<i32>, pattern: i32, octave: i32) -> vec3<f32> {
+    var seed = 16u * bitcast<u32>(block.y) + u32(4 * pattern + octave);
+    seed = (seed ^ (seed >> 16u)) * 0x21f0aaadu;
+    seed = (seed ^ (seed >> 15u)) * 0x735a2d97u;
+    seed ^= seed >> 15u;
+    var random = bitcast<u32>(block.x) * 0x9e3779b1u + seed;
+    random = (random ^ (random >> 15u)) * 0x2c1b3c6du;
+    let bits = vec3(random >> 2u, random >> 12u, random >> 22u) & vec3(1023u);
+    return vec3<f32>(2 * vec3<i32>(bits) - 1023);
+}
+
+// A pattern at a point of the lattice of an octave.
+fn isotropic(point: vec2<i32>, octave: i32) -> f32 {
+    let value = (point.y & 1) * 2 + (point.x & 1);
+    return dot(SIGNS[value], numbers(point >> vec2(1u), 0, octave));
+}
+
+fn streaks(point: vec2<i32>, pattern: i32, octave: i32) -> f32 {
+    let along = select(vec2(0, 1), vec2(1, 0), pattern == 1);
+    let within = point & vec2(3);
+    let signs = SIGNS[select(within.x, within.y, pattern == 1)];
+    let block = point >> vec2(2u);
+    let near = dot(signs, numbers(block, pattern, octave));
+    let far = dot(signs, numbers(block + along, pattern, octave));
+    let part = (f32(select(within.y, within.x, pattern == 1)) + 0.5) / 4.0;
+    return near + (far - near) * part;
+}
+
+// A point of the lattice of the next coarser octave, of which `first` is the first point there is.
+fn coarser(point: vec2<i32>, first: vec2<i32>, octave: i32) -> f32 {
+    let at = point - first;
+    return lattices[STARTS[octave] + at.y * SIDES[octave] + at.x];
+}
+
+// The lattice of the next coarser octave, enlarged by two, at a point.
+fn enlarged(point: vec2<i32>, first: vec2<i32>, octave: i32) -> f32 {
+    let near = point >> vec2(1u);
+    let far = near + (point & vec2(1)) * 2 - 1;
+    let left = coarser(near, first, octave) * 0.75 + coarser(vec2(near.x, far.y), first, octave) * 0.25;
+    let right = coarser(vec2(far.x, near.y), first, octave) * 0.75 + coarser(far, first, octave) * 0.25;
+    return left * 0.75 + right * 0.25;
+}
+
+// Fills the lattices, of which the finest begins at the stored pixel `first`. All invocations of the workgroup call
+// it together.
+fn make_lattices(first: vec2<i32>, invocation: u32) {
+    let firsts = array(first, (first >> vec2(1u)) - 1, (((first >> vec2(1u)) - 1) >> vec2(1u)) - 1);
+    for (var octave = OCTAVES - 1; octave >= 0; octave--) {
+        let side = SIDES[octave];
+        for (var i = i32(invocation); i < side * side; i += i32(BATCH)) {
+            let point = firsts[octave] + vec2(i % side, i / side);
+            var value = 0.0;
+            if (octave < OCTAVES - 1) {
+                value = enlarged(point, firsts[octave + 1], octave + 1);
+            }
+            let gains = gains_at(point, octave);
+            if (gains.x > 0.0) {
+                value += gains.x * isotropic(point, octave);
+            }
+            if (gains.y > 0.0) {
+                value += gains.y * streaks(point, 1, octave);
+            }
+            if (gains.z > 0.0) {
+                value += gains.z * streaks(point, 2, octave);
+            }
+            lattices[STARTS[octave] + i] = value;
+        }
+        workgroupBarrier();
+    }
+}
+
+// The weights of four pixels in a cubic interpolation, for a part of the way from the second to the third.
+fn cubic(t: f32) -> vec4<f32> {
+    return vec4(
+        ((1.0 - 0.5 * t) * t - 0.5) * t,
+        (1.5 * t - 2.5) * t * t + 1.0,
+        ((2.0 - 1.5 * t) * t + 0.5) * t,
+        (0.5 * t - 0.5) * t * t,
+    );
+}
+
+// The texture of a pixel of a tile of the grid. All invocations of the workgroup call it together.
+fn texture_at(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> f32 {
+    let corner = (view.origin + vec2<f32>(tile * TILE) + 0.5) / view.scale - 0.5;
+    // The first of the pixels that those of the tile are interpolated from, in the turned picture.
+    let first = vec2<i32>(floor(corner)) - 1;
+    let side = SIDES[0];
+    var stored = first;
+    let is_exchanged = (view.turn & EXCHANGE_AXES) != 0u;
+    if (is_exchanged) {
+        stored = stored.yx;
+    }
+    let last = vec2<i32>(view.stored) - side - stored;
+    let is_mirrored = vec2((view.turn & MIRROR_COLUMNS) != 0u, (view.turn & MIRROR_ROWS) != 0u);
+    make_lattices(select(stored, last, is_mirrored), invocation);
+
+    let place = corner + vec2<f32>(within) / view.scale;
+    let before = floor(place);
+    let columns = cubic(place.x - before.x);
+    let rows = cubic(place.y - before.y);
+    let at = clamp(vec2<i32>(before) - 1 - first, vec2(0), vec2(side - 4));
+    var sum = 0.0;
+    for (var x = 0; x < 4; x++) {
+        var column = 0.0;
+        for (var y = 0; y < 4; y++) {
+            var pixel = at + vec2(x, y);
+            if (is_exchanged) {
+                pixel = pixel.yx;
+            }
+            pixel = select(pixel, side - 1 - pixel, is_mirrored);
+            column += rows[y] * lattices[pixel.y * side + pixel.x];
+        }
+        sum += columns[x] * column;
+    }
+    // What follows writes to the same memory.
+    workgroupBarrier();
+    return sum;
+}
+
 // The sum at a pixel of a tile of the grid. All invocations of the workgroup call it together.
 fn sum_at(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> vec4<f32> {
     let corner = view.origin + vec2<f32>(tile * TILE) + 0.5;
@@ -295,6 +476,9 @@ fn sum_at(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> vec4<f32> {
     let bin = (tile.y / view.bin_tiles) * bin_columns() + tile.x / view.bin_tiles;
     let words = bin_words();
     var sum = to_rgba(view.base, 1.0);
+    if (view.fade > 0.0) {
+        sum += vec4(vec3(texture_at(tile, within, invocation)), 0.0);
+    }
     for (var first = 0u; first < words; first += BATCH) {
         // Each invocation has a word of the bin, and puts its splats among the candidates.
         let word = first + invocation;
@@ -367,7 +551,7 @@ fn part_of(tile: vec2<u32>, pixel: vec2<u32>) -> vec4<f32> {
         var row = vec4(0.0);
         for (var x = first.x; x < end.x; x++) {
             let overlap = min(high.x, f32(x + 1u)) - max(low.x, f32(x));
-            row += max(overlap, 0.0) * values[(y - corner.y) * TILE + (x - corner.x)];
+            row += max(overlap, 0.0) * colors[(y - corner.y) * TILE + (x - corner.x)];
         }
         let overlap = min(high.y, f32(y + 1u)) - max(low.y, f32(y));
         sum += max(overlap, 0.0) * row;
@@ -387,7 +571,7 @@ fn average(tile: vec2<u32>, within: vec2<u32>, invocation: u32) -> vec4<f32> {
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
             let value = clamp(sum_at(vec2(x, y), within, invocation), vec4(0.0), vec4(1.0));
-            values[invocation] = vec4(value.rgb * (value.a + LEAST_WEIGHT), value.a);
+            colors[invocation] = vec4(value.rgb * (value.a + LEAST_WEIGHT), value.a);
             workgroupBarrier();
             sum += part_of(vec2(x, y), tile * TILE + within);
             // What follows writes to the same memory.

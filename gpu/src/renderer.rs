@@ -70,7 +70,8 @@ impl GpuRenderer {
     /// # Errors
     /// [`RenderError::DeviceLimit`] when a buffer would be larger than the device allows: with the
     /// default limits of devices, from 2.8 million Gaussians on. [`RenderError::Device`] when it has
-    /// no memory left.
+    /// no memory left, and [`RenderError::Map`] when the decoder's limits forbid to render the map of the
+    /// texture.
     pub fn upload(&self, picture: &Picture<'_>) -> Result<GpuPicture, RenderError> {
         let workgroups = picture.gaussians().len().div_ceil(PREPARE as usize) as u64;
         let most = self.device.limits().max_compute_workgroups_per_dimension;
@@ -172,6 +173,8 @@ impl GpuRenderer {
             binding: 4,
             resource: wgpu::BindingResource::TextureView(&output),
         });
+        entries
+            .push(BindGroupEntry { binding: 5, resource: picture.map_buffer.as_entire_binding() });
         let bindings = self.device.create_bind_group(&BindGroupDescriptor {
             label: Some("gip bindings"),
             layout: &self.pipelines.layout,

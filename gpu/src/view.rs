@@ -3,17 +3,24 @@
 use image_gip::{Header, Region, RenderOptions, RequestError};
 
 /// What to draw of a picture: its scale and a region (spec, section 9.1). The default is the whole
-/// picture at its stored size, with all Gaussians.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// picture at its stored size, with all Gaussians and its texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub struct View {
     size: Option<(u32, u32)>,
     region: Option<Region>,
     prefix: Option<u32>,
+    texture: bool,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { size: None, region: None, prefix: None, texture: true }
+    }
 }
 
 impl View {
-    /// The whole picture at its stored size, with all Gaussians.
+    /// The whole picture at its stored size, with all Gaussians and its texture.
     pub fn new() -> Self {
         Self::default()
     }
@@ -34,6 +41,12 @@ impl View {
     /// Draws only the first `count` Gaussians of the file, or all if there are fewer.
     pub fn with_prefix(mut self, count: u32) -> Self {
         self.prefix = Some(count);
+        self
+    }
+
+    /// Whether the picture's texture is drawn. Default `true`.
+    pub fn with_texture(mut self, texture: bool) -> Self {
+        self.texture = texture;
         self
     }
 
@@ -63,8 +76,16 @@ impl View {
             ratio: [columns.ratio, rows.ratio],
             offset: [columns.offset, rows.offset],
             gaussians,
+            fade: if self.texture { fade(header, (width, height)) } else { 0.0 },
         })
     }
+}
+
+/// What the strength of a picture's texture is multiplied by for a whole output of this size (spec, section 9.7).
+fn fade(header: &Header, (width, height): (u32, u32)) -> f32 {
+    let columns = width as f32 / header.width as f32;
+    let rows = height as f32 / header.height as f32;
+    (8.0 * columns.min(rows) - 1.0).clamp(0.0, 1.0)
 }
 
 /// Most pixels of the grid for one output pixel along an axis.
@@ -122,6 +143,8 @@ pub(crate) struct Frame {
     pub(crate) offset: [f32; 2],
     /// How many Gaussians are drawn.
     pub(crate) gaussians: u32,
+    /// What the strength of the picture's texture is multiplied by.
+    pub(crate) fade: f32,
 }
 
 impl Frame {

@@ -78,7 +78,7 @@ mod tests {
     fn frame(width: u32, height: u32) -> Frame {
         let region = Region { x: 0, y: 0, width, height };
         let [scale, ratio, offset] = [[1.0; 2], [1.0; 2], [0.0; 2]];
-        Frame { scale, grid: region, region, ratio, offset, gaussians: 1 }
+        Frame { scale, grid: region, region, ratio, offset, gaussians: 1, fade: 0.0 }
     }
 
     fn gaussian(center: [f32; 2], cholesky: [f32; 3]) -> Gaussian {

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
 
-use common::scene::Scene;
+use common::scene::{Scene, TEXTURED_SIZE, with_texture};
 use common::{Differences, Request, assert_close, decode, renderer};
 use image_gip::training::Training;
 use image_gip::{ColorModel, Encoder, Kernel, Picture, Precision, Source, Target};
@@ -105,6 +105,43 @@ fn random_scenes_are_close_to_the_decoder() {
             compare(renderer, &file, &format!("{color:?}, cut-off {cutoff:?}"));
         }
     }
+}
+
+#[test]
+fn texture_is_close_to_the_decoder() {
+    let Some(renderer) = renderer() else { return };
+    let (width, height) = TEXTURED_SIZE;
+    let mut all = Differences::default();
+    for (seed, color) in
+        (0..).zip([ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba])
+    {
+        for cutoff in [None, Some(11.082_527)] {
+            let gaussians = Scene::random(seed, 30, TEXTURED_SIZE, (2.0, 30.0));
+            let file = Scene { size: TEXTURED_SIZE, color, cutoff, gaussians }.file();
+            let textured = with_texture(file.clone());
+            all.add(compare(renderer, &textured, &format!("{color:?}, cut-off {cutoff:?}")));
+            let textured = decode(&textured);
+            let textured = textured.picture().expect("a header");
+            // It fades between a quarter and an eighth.
+            for divisor in [3, 6, 7, 8] {
+                let smaller = Request::sized(width / divisor, height / divisor);
+                assert_close(renderer, &textured, &smaller);
+            }
+            let plain = decode(&file);
+            let plain = plain.picture().expect("a header");
+            let samples = |picture, request: Request| {
+                let texture = renderer.render(picture, &request.view()).expect("small");
+                renderer.read(&texture).expect("a texture of the renderer")
+            };
+            for request in [Request::WHOLE, Request::sized(2 * width, 3 * height)] {
+                assert_close(renderer, &textured, &request.without_texture());
+                let expected = samples(&plain, request);
+                assert_eq!(samples(&textured, request.without_texture()), expected, "{request:?}");
+                assert_ne!(samples(&textured, request), expected, "{request:?}");
+            }
+        }
+    }
+    println!("texture: {all:?}");
 }
 
 #[test]

@@ -24,6 +24,7 @@ fn request(rendering: &str) -> Request {
                 let ((width, height), (x, y)) = (pair(size, 'x'), pair(corner, ','));
                 request = request.region(x, y, width, height);
             }
+            ["without", "texture"] => request = request.without_texture(),
             ["first", count] => request.prefix = Some(count.parse().expect("a number")),
             _ => panic!("an unknown rendering: {rendering}"),
         }

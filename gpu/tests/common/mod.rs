@@ -36,15 +36,16 @@ pub(crate) fn decode(file: &[u8]) -> StreamDecoder {
 }
 
 /// What to render, in the words of both renderers.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Request {
     pub(crate) size: Option<(u32, u32)>,
     pub(crate) region: Option<Region>,
     pub(crate) prefix: Option<u32>,
+    pub(crate) texture: bool,
 }
 
 impl Request {
-    pub(crate) const WHOLE: Self = Self { size: None, region: None, prefix: None };
+    pub(crate) const WHOLE: Self = Self { size: None, region: None, prefix: None, texture: true };
 
     pub(crate) fn sized(width: u32, height: u32) -> Self {
         Self { size: Some((width, height)), ..Self::WHOLE }
@@ -54,8 +55,12 @@ impl Request {
         Self { region: Some(Region { x, y, width, height }), ..self }
     }
 
+    pub(crate) fn without_texture(self) -> Self {
+        Self { texture: false, ..self }
+    }
+
     pub(crate) fn view(&self) -> View {
-        let mut view = View::new();
+        let mut view = View::new().with_texture(self.texture);
         if let Some((width, height)) = self.size {
             view = view.with_size(width, height);
         }
@@ -69,7 +74,8 @@ impl Request {
     }
 
     pub(crate) fn options(&self) -> RenderOptions {
-        let mut options = RenderOptions::new().with_color(ColorModel::Rgba);
+        let mut options =
+            RenderOptions::new().with_color(ColorModel::Rgba).with_texture(self.texture);
         if let Some((width, height)) = self.size {
             options = options.with_size(width, height);
         }

@@ -13,6 +13,26 @@ pub(crate) struct Scene {
     pub(crate) gaussians: Vec<[f32; 9]>,
 }
 
+/// Bytes of the signature and of `GHDR`.
+const HEADER_END: usize = 56;
+
+/// A texture for a picture of 96 x 64 pixels, in all octaves and directions (spec, section 5.7).
+#[rustfmt::skip]
+const TEXTURE: [u8; 36] = [
+    0xcd, 0xcc, 0x4c, 0x3d, 0x04, 0x00, 0x00, 0x00, 0x58, 0xec, 0x96, 0x00,
+    0xdd, 0x08, 0xf6, 0x27, 0x91, 0x39, 0x58, 0xc6, 0x4e, 0xbb, 0x94, 0x94,
+    0x7c, 0x00, 0x30, 0xf2, 0x11, 0x7f, 0x4a, 0xa0, 0xab, 0xda, 0xd2, 0x83,
+];
+
+/// The size of the pictures that [`with_texture`] takes.
+pub(crate) const TEXTURED_SIZE: (u32, u32) = (96, 64);
+
+/// A file with a texture as well.
+pub(crate) fn with_texture(mut file: Vec<u8>) -> Vec<u8> {
+    file.splice(HEADER_END..HEADER_END, chunk(b"tXTR", &TEXTURE));
+    file
+}
+
 impl Scene {
     /// The file, on a base of gray with half of the alpha.
     pub(crate) fn file(&self) -> Vec<u8> {
