@@ -50,10 +50,10 @@ export class GpuPainter {
     this.#place = device.createBuffer({ size: 16, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   }
 
-  /** Takes a picture: its header and nine numbers for each Gaussian, both turned. Returns whether it can. */
-  setPicture(header, numbers) {
+  /** Takes a picture, as `GpuRenderer.setPicture` does. Returns whether it can. */
+  setPicture(header, numbers, map) {
     this.#free();
-    return this.#renderer.setPicture(header, numbers);
+    return this.#renderer.setPicture(header, numbers, map);
   }
 
   canPaint({ frame: { window, level } }) {
@@ -63,7 +63,7 @@ export class GpuPainter {
   }
 
   /** Paints a frame to the canvas, or to another texture of its format and the window's size. */
-  paint({ frame, gaussians }, target = null) {
+  paint({ frame, gaussians, texture }, target = null) {
     const { window, level, left, top } = frame;
     if (this.#canvas.width !== window.width || this.#canvas.height !== window.height) {
       Object.assign(this.#canvas, window);
@@ -72,7 +72,7 @@ export class GpuPainter {
     this.#rendered ??= this.#newTexture(window);
     const encoder = this.device.createCommandEncoder();
     const region = visibleRegion(frame);
-    if (region) this.#renderer.record(encoder, { level, region, gaussians }, this.#rendered.toRender);
+    if (region) this.#renderer.record(encoder, { level, region, gaussians, texture }, this.#rendered.toRender);
     const place = region ? [left + region.x, top + region.y, region.width, region.height] : [0, 0, 0, 0];
     this.device.queue.writeBuffer(this.#place, 0, Float32Array.from(place));
     const view = (target ?? this.#context.getCurrentTexture()).createView();

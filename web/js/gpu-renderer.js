@@ -14,6 +14,9 @@ const KERNELS = { exponential: 0, quartic: 1 };
 /** Most pixels of the grid for one of the output along an axis. */
 const MOST_PER_PIXEL = 8;
 
+/** How the shader says what turned a picture, by the value in Exif. From 5 on, its axes are exchanged. */
+const TURNS = { 1: 0, 2: 1, 3: 3, 4: 2, 5: 4, 6: 6, 7: 7, 8: 5 };
+
 /** One axis of the grid that an output is evaluated on, and what of it a part covers (spec, section 9.2). */
 function axis(stored, output, start, length) {
   let divisor = 1;
@@ -38,7 +41,7 @@ export class GpuRenderer {
   #prepare;
   #render;
   #view;
-  /** { header, gaussians, splats, bins, overlap }: the picture and its buffers. */
+  /** { header, hasTexture, gaussians, splats, bins, map, overlap }: the picture and its buffers. */
   #picture = null;
 
   /** Compiles the shader: `code` is that of render.wgsl. */
@@ -51,6 +54,7 @@ export class GpuRenderer {
         binding(2, { buffer: { type: 'storage' } }),
         binding(3, { buffer: { type: 'storage' } }),
         binding(4, { storageTexture: { format: 'rgba8unorm' } }),
+        binding(5, { buffer: { type: 'read-only-storage' } }),
       ],
     });
     const module = device.createShaderModule({ code });
@@ -66,30 +70,39 @@ export class GpuRenderer {
     this.#layout = layout;
     this.#prepare = prepare;
     this.#render = render;
-    this.#view = device.createBuffer({ size: 96, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
+    this.#view = device.createBuffer({ size: 112, usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST });
   }
 
-  /** Takes a picture: its header and nine numbers for each Gaussian, both turned. Returns whether it can. */
-  setPicture(header, numbers) {
+  /**
+   * Takes a picture: its header and nine numbers for each Gaussian, both turned, and the map of its texture as
+   * stored, or `null`. Returns whether it can.
+   */
+  setPicture(header, numbers, map) {
     this.clear();
     const count = Math.max(1, numbers.length / 9);
     const words = Math.ceil(count / 32);
-    const sizes = { gaussians: 36 * count, splats: 48 * count, bins: 4 * words * MOST_BINS ** 2 };
+    const sizes = {
+      gaussians: 36 * count,
+      splats: 48 * count,
+      bins: 4 * words * MOST_BINS ** 2,
+      map: map?.byteLength ?? 4,
+    };
     const { maxStorageBufferBindingSize, maxBufferSize } = this.#device.limits;
     const most = Math.min(maxStorageBufferBindingSize, maxBufferSize);
     if (!(header.kernel in KERNELS) || Math.max(...Object.values(sizes)) > most) return false;
     const usage = GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST;
-    this.#picture = { header, overlap: mostOverlap(numbers, header) };
+    this.#picture = { header, hasTexture: map !== null, overlap: mostOverlap(numbers, header) };
     for (const [name, size] of Object.entries(sizes)) {
       this.#picture[name] = this.#device.createBuffer({ size, usage });
     }
     this.#device.queue.writeBuffer(this.#picture.gaussians, 0, numbers);
+    if (map) this.#device.queue.writeBuffer(this.#picture.map, 0, map);
     return true;
   }
 
   /** Frees the picture. */
   clear() {
-    for (const name of ['gaussians', 'splats', 'bins']) this.#picture?.[name].destroy();
+    for (const name of ['gaussians', 'splats', 'bins', 'map']) this.#picture?.[name].destroy();
     this.#picture = null;
   }
 
@@ -103,22 +116,25 @@ export class GpuRenderer {
 
   /** What `record` needs to render the picture to a texture. */
   bind(texture) {
-    const { gaussians, splats, bins } = this.#picture;
+    const { gaussians, splats, bins, map } = this.#picture;
     const buffers = [this.#view, gaussians, splats, bins].map((buffer) => ({ buffer }));
-    const entries = [...buffers, texture.createView()].map((resource, binding) => ({ binding, resource }));
+    const resources = [...buffers, texture.createView(), { buffer: map }];
+    const entries = resources.map((resource, binding) => ({ binding, resource }));
     return this.#device.createBindGroup({ layout: this.#layout, entries });
   }
 
   /**
-   * Records the commands that render a region of a level (both in pixels) with the first Gaussians,
-   * to the corner of the texture of `bindings`.
+   * Records the commands that render a region of a level (both in pixels) with the first Gaussians, and with the
+   * picture's texture or without, to the corner of the GPU's texture of `bindings`.
    */
-  record(encoder, { level, region, gaussians }, bindings) {
-    const { header } = this.#picture;
+  record(encoder, { level, region, gaussians, texture }, bindings) {
+    const { header, hasTexture } = this.#picture;
     const x = axis(header.width, level.width, region.x, region.width);
     const y = axis(header.height, level.height, region.y, region.height);
     const { binTiles, bins } = divide(x.length, y.length);
-    this.#writeView({ x, y, region, gaussians, binTiles });
+    const fade = 8 * Math.min(level.width / header.width, level.height / header.height) - 1;
+    const strength = texture && hasTexture ? Math.min(Math.max(fade, 0), 1) : 0;
+    this.#writeView({ x, y, region, gaussians, binTiles, fade: strength });
     const used = 4 * Math.ceil(gaussians / 32) * bins;
     if (used > 0) encoder.clearBuffer(this.#picture.bins, 0, used);
     const pass = encoder.beginComputePass();
@@ -131,9 +147,11 @@ export class GpuRenderer {
   }
 
   /** Fills the uniform `View` of the shader. */
-  #writeView({ x, y, region, gaussians, binTiles }) {
+  #writeView({ x, y, region, gaussians, binTiles, fade }) {
     const { header } = this.#picture;
-    const view = new DataView(new ArrayBuffer(96));
+    const { width, height, orientation } = header;
+    const stored = orientation > 4 ? [height, width] : [width, height];
+    const view = new DataView(new ArrayBuffer(112));
     const floats = (offset, values) =>
       values.forEach((value, index) => view.setFloat32(offset + 4 * index, value, true));
     const integers = (offset, values) =>
@@ -142,9 +160,9 @@ export class GpuRenderer {
     integers(16, [x.length, y.length, gaussians, binTiles]);
     floats(32, header.baseColor.map((value) => value / 65535));
     integers(48, [header.channels, KERNELS[header.kernel]]);
-    floats(56, [header.cutoff]);
+    floats(56, [header.cutoff, fade]);
     floats(64, [x.ratio, y.ratio, x.offset, y.offset]);
-    integers(80, [region.width, region.height]);
+    integers(80, [region.width, region.height, ...stored, TURNS[orientation]]);
     this.#device.queue.writeBuffer(this.#view, 0, view.buffer);
   }
 }

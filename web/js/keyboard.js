@@ -12,6 +12,7 @@ export const KEYS = [
   { keys: ['-', '_'], label: '−', does: 'zoom out', action: 'zoomOut' },
   { keys: ['0'], label: '0', does: 'the whole picture', action: 'fit' },
   { keys: ['1'], label: '1', does: 'one pixel of the picture on one of the page', action: 'actualSize' },
+  { keys: ['t'], label: 't', does: 'texture of the picture, if it has one', action: 'texture' },
   { keys: ['o'], label: 'o', does: 'outlines of the Gaussians', action: 'outlines' },
   { keys: ['c'], label: 'c', does: 'compare with the original', action: 'compare' },
   { keys: [' '], label: 'Space', does: 'play the file from its first byte', action: 'play' },

@@ -17,6 +17,7 @@ const SAMPLE = 'sample/sumac.gip';
 const find = (selector) => document.querySelector(selector);
 
 const [stageElement, panel, message] = [find('#stage'), find('#panel'), find('#message')];
+const textureButton = find('[data-action="texture"]');
 const fail = (error) => tell(error.message);
 const pool = new Pool(fail);
 const comparison = new Comparison(stageElement);
@@ -74,6 +75,7 @@ function close() {
   stage.reset();
   scrubber.setFile(null);
   comparison.setOriginal(null);
+  textureButton.hidden = true;
   drawToggles();
   panel.replaceChildren();
   document.body.classList.add('empty');
@@ -112,6 +114,7 @@ async function finish({ name }, { size, picture, gaussians, error }, signal) {
   signal.throwIfAborted();
   showPanel(panel, { name, size, picture, about, arrived: gaussians });
   scrubber.setFile({ size, gaussians, layers: about.statistics.layers });
+  textureButton.hidden = !about.statistics.chunks.some(({ type }) => type === 'tXTR');
   stage.draw();
   announce(`${name} is open.`);
   // The shader knows nothing of colour profiles.
@@ -122,9 +125,9 @@ async function finish({ name }, { size, picture, gaussians, error }, signal) {
 async function useGpu(picture, signal) {
   const painter = await gpu;
   if (!painter) return;
-  const numbers = await pool.ask('gaussians');
+  const [numbers, map] = await Promise.all([pool.ask('gaussians'), pool.ask('textureMap')]);
   signal.throwIfAborted();
-  stage.setGpu(painter.setPicture(picture, numbers) ? painter : null);
+  stage.setGpu(painter.setPicture(picture, numbers, map) ? painter : null);
 }
 
 /** Files that a person gave: a .gip to open, and a picture of another kind to compare with. */
@@ -169,7 +172,12 @@ function setPanel(shown) {
 
 /** The states of the buttons that stay pressed. */
 function drawToggles() {
-  const states = { outlines: stage.outlines, compare: comparison.isOn, panel: !panel.hidden };
+  const states = {
+    texture: stage.texture,
+    outlines: stage.outlines,
+    compare: comparison.isOn,
+    panel: !panel.hidden,
+  };
   for (const [action, isOn] of Object.entries(states)) {
     find(`[data-action="${action}"]`).setAttribute('aria-pressed', isOn);
   }
@@ -187,6 +195,12 @@ const actions = {
   zoomOut: whenOpen(() => stage.glide((view) => view.zoomTo(view.scale / 1.5))),
   fit: whenOpen(() => stage.glide((view) => view.fit(), 220)),
   actualSize: whenOpen(() => stage.glide((view) => view.zoomTo(1), 220)),
+  texture: whenOpen(() => {
+    if (textureButton.hidden) return;
+    stage.texture = !stage.texture;
+    drawToggles();
+    announce(stage.texture ? 'Texture is shown.' : 'Texture is left out.');
+  }),
   outlines: whenOpen(() => {
     stage.outlines = !stage.outlines;
     drawToggles();

@@ -9,6 +9,7 @@ const CHUNKS = {
   GAUS: 'Gaussians',
   GEND: 'end',
   bNDS: 'bounds of the layers',
+  tXTR: 'texture',
   iCCP: 'ICC profile',
   eXIf: 'Exif',
   xMPd: 'XMP',

@@ -27,6 +27,7 @@ export class Stage {
   /** How many Gaussians are shown. */
   #gaussians = 0;
   #outlines = false;
+  #texture = true;
   #isAsked = false;
 
   /** `element` has the canvases; `comparison` is a `Comparison`. */
@@ -38,9 +39,9 @@ export class Stage {
     this.#tiles = new Tiles(pool, { onArrival, onError });
     this.#canvas = element.querySelector('#picture');
     this.#gpuCanvas = element.querySelector('#picture-gpu');
-    this.#painter = new TilePainter(this.#canvas, 'picture');
+    this.#painter = new TilePainter(this.#canvas);
     this.#outlineCanvas = element.querySelector('#outlines');
-    this.#outlinePainter = new TilePainter(this.#outlineCanvas, 'outlines');
+    this.#outlinePainter = new TilePainter(this.#outlineCanvas);
     this.#checkers = element.querySelector('#checkers');
     watchSize(element, (size) => {
       this.view.setWindow(size);
@@ -97,6 +98,15 @@ export class Stage {
     return this.#outlines;
   }
 
+  set texture(shown) {
+    this.#texture = shown;
+    this.draw();
+  }
+
+  get texture() {
+    return this.#texture;
+  }
+
   /** Whether everything that is in the window is sharp and at rest. */
   get #isComplete() {
     return !this.#isAsked && this.#tiles.isComplete && !this.motion.isMoving;
@@ -125,6 +135,7 @@ export class Stage {
       frame,
       picture: this.#picture,
       gaussians: this.#gaussians,
+      texture: this.#texture,
       ratio: this.view.window.ratio,
       kinds: this.#outlines ? ['outlines'] : [],
     };
@@ -133,10 +144,11 @@ export class Stage {
     this.#gpuCanvas.hidden = gpu === null;
     if (gpu) gpu.paint(scene);
     else {
-      scene.kinds.unshift('picture');
-      this.#painter.paint(scene, this.#tiles);
+      const kind = this.#texture ? 'picture' : 'plain';
+      scene.kinds.unshift(kind);
+      this.#painter.paint(scene, kind, this.#tiles);
     }
-    if (this.#outlines) this.#outlinePainter.paint(scene, this.#tiles);
+    if (this.#outlines) this.#outlinePainter.paint(scene, 'outlines', this.#tiles);
     this.#comparison.paint(scene);
     this.#placeCheckers(frame);
     this.#tiles.want(scene);

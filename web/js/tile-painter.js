@@ -24,17 +24,14 @@ function areaInside({ left, top, width, height }, window) {
 export class TilePainter {
   #canvas;
   #context;
-  #kind;
 
-  /** `kind` is that of the tiles. */
-  constructor(canvas, kind) {
+  constructor(canvas) {
     this.#canvas = canvas;
     this.#context = canvas.getContext('2d');
-    this.#kind = kind;
   }
 
-  /** Paints a frame with what there is. */
-  paint({ frame, gaussians }, tiles) {
+  /** Paints a frame with what there is of tiles of a kind. */
+  paint({ frame, gaussians }, kind, tiles) {
     const { window } = frame;
     const context = this.#context;
     if (this.#canvas.width !== window.width || this.#canvas.height !== window.height) {
@@ -43,15 +40,15 @@ export class TilePainter {
     } else {
       context.clearRect(0, 0, window.width, window.height);
     }
-    const found = tiles.at(frame, this.#kind, gaussians);
-    if (found.missing.length > 0) this.#paintStandIns(frame, found.missing, gaussians, tiles);
+    const found = tiles.at(frame, { kind, gaussians });
+    if (found.missing.length > 0) this.#paintStandIns(frame, found.missing, { kind, gaussians }, tiles);
     for (const { bitmap, level, region } of found.tiles) {
       const { left, top } = place(frame, level, region);
       context.drawImage(bitmap, left, top);
     }
   }
 
-  #paintStandIns(frame, missing, gaussians, tiles) {
+  #paintStandIns(frame, missing, wanted, tiles) {
     const context = this.#context;
     context.save();
     context.beginPath();
@@ -60,7 +57,7 @@ export class TilePainter {
       context.rect(left, top, width, height);
     }
     context.clip();
-    this.#standIns(frame, gaussians, tiles).forEach((images, index) => {
+    this.#standIns(frame, wanted, tiles).forEach((images, index) => {
       for (const { bitmap, at } of images) {
         // In place of what is below, not over it: a picture may have transparent parts.
         if (index > 0) context.clearRect(at.left, at.top, at.width, at.height);
@@ -71,20 +68,20 @@ export class TilePainter {
   }
 
   /** Layers of { bitmap, at } from the bottom up, no more than are needed to cover the window. */
-  #standIns(frame, gaussians, tiles) {
-    const isPicture = this.#kind === 'picture';
-    // Until the preview for this part of the file has come, the picture stays what it was.
-    const known = isPicture && tiles.preview ? tiles.preview.gaussians : gaussians;
+  #standIns(frame, wanted, tiles) {
+    const preview = wanted.kind === 'outlines' ? null : tiles.preview;
+    // Until the preview of what is wanted has come, the picture stays what it was.
+    const known = preview ?? wanted;
     const whole = { left: frame.left, top: frame.top, ...frame.level };
     const layers = [];
-    const levels = tiles.ofOtherLevels(frame, this.#kind, known).slice(0, STAND_IN_LEVELS);
+    const levels = tiles.ofOtherLevels(frame, known).slice(0, STAND_IN_LEVELS);
     for (const level of levels) {
       const images = level.map(({ bitmap, level, region }) => ({ bitmap, at: place(frame, level, region) }));
       const areas = images.map(({ at }) => areaInside(at, frame.window));
       layers.unshift(images.filter((_, index) => areas[index] > 0));
       if (areas.reduce((sum, area) => sum + area, 0) >= areaInside(whole, frame.window)) return layers;
     }
-    if (isPicture && tiles.preview) layers.unshift([{ bitmap: tiles.preview.bitmap, at: whole }]);
+    if (preview) layers.unshift([{ bitmap: preview.bitmap, at: whole }]);
     return layers;
   }
 }

@@ -39,7 +39,7 @@ export class Tiles {
   #timer = 0;
   /** Counts files, since answers for an earlier file may still come. */
   #file = 0;
-  /** The whole picture, small, with so many Gaussians: { gaussians, bitmap }. */
+  /** The whole picture, small, of a kind and with so many Gaussians: { kind, gaussians, bitmap }. */
   preview = null;
 
   constructor(pool, { onArrival, onError }) {
@@ -70,13 +70,15 @@ export class Tiles {
 
   /**
    * Says what is shown now: replaces what was asked for before, except what is being rendered.
-   * `kinds` are `picture` and `outlines`; `picture` may be absent where the GPU renders it.
+   * `kinds` are `picture` or `plain`, which is the picture without its texture, and `outlines`. Where the GPU
+   * renders the picture, it is absent.
    */
   want(scene) {
     const { frame, kinds, gaussians } = scene;
     const level = nameOf(frame.level);
-    const hasPreview = !kinds.includes('picture') || this.preview?.gaussians === gaussians;
-    this.#queue = hasPreview ? [] : [this.#previewJob(scene)];
+    const kind = kinds.find((kind) => kind !== 'outlines');
+    const hasPreview = !kind || (this.preview?.kind === kind && this.preview.gaussians === gaussians);
+    this.#queue = hasPreview ? [] : [this.#previewJob(scene, kind)];
     if (level !== this.#level || this.#timer) {
       if (level !== this.#level) {
         // Not for every scale on the way.
@@ -95,14 +97,15 @@ export class Tiles {
     this.#start();
   }
 
-  #previewJob({ frame: { level }, gaussians, picture }) {
+  #previewJob({ frame: { level }, gaussians, picture }, kind) {
     const longest = Math.max(picture.width, picture.height);
     const side = (stored) => Math.max(1, Math.round((stored * PREVIEW) / longest));
     const size = { width: side(picture.width), height: side(picture.height) };
     // A picture that shows small needs no more.
     const whole = level.width < size.width ? level : size;
     const region = { x: 0, y: 0, ...whole };
-    return { kind: 'picture', level: whole, region, gaussians, isPreview: true, key: `preview ${gaussians}` };
+    const key = `preview ${kind} ${gaussians}`;
+    return { kind, level: whole, region, gaussians, isPreview: true, key };
   }
 
   /** The tiles that are not there, from the middle of the window outwards. */
@@ -157,7 +160,7 @@ export class Tiles {
   #keep(job, bitmap) {
     if (job.isPreview) {
       this.preview?.bitmap.close();
-      this.preview = { gaussians: job.gaussians, bitmap };
+      this.preview = { kind: job.kind, gaussians: job.gaussians, bitmap };
     } else {
       this.#kept.set(job.key, { ...job, bitmap });
     }
@@ -176,7 +179,7 @@ export class Tiles {
   }
 
   /** What is there of a frame: its tiles, each with its region, and regions without one. */
-  at(frame, kind, gaussians) {
+  at(frame, { kind, gaussians }) {
     const found = { tiles: [], missing: [] };
     const region = visibleRegion(frame);
     if (!region) return found;
@@ -194,7 +197,7 @@ export class Tiles {
   }
 
   /** Kept tiles of other levels, in groups by level, that of the most similar scale first. */
-  ofOtherLevels(frame, kind, gaussians) {
+  ofOtherLevels(frame, { kind, gaussians }) {
     const levels = new Map();
     for (const tile of this.#kept.values()) {
       if (tile.kind !== kind || tile.gaussians !== gaussians) continue;

@@ -21,16 +21,20 @@ function progress() {
 
 const uprightGaussians = () => decoder.gaussians({ orientation: 'from-image' });
 
+/** The picture, with its texture or without. */
+async function renderPicture({ level, region, gaussians }, texture) {
+  const options = { ...level, region, gaussians, texture };
+  if (decoder.metadata.iccProfile) {
+    // The browser converts the colours of PNG files.
+    return createImageBitmap(new Blob([await decoder.png(options)], { type: 'image/png' }));
+  }
+  const { data, width, height } = decoder.render(options);
+  return createImageBitmap(new ImageData(data, width, height));
+}
+
 const render = {
-  async picture({ level, region, gaussians }) {
-    const options = { ...level, region, gaussians };
-    if (decoder.metadata.iccProfile) {
-      // The browser converts the colours of PNG files.
-      return createImageBitmap(new Blob([await decoder.png(options)], { type: 'image/png' }));
-    }
-    const { data, width, height } = decoder.render(options);
-    return createImageBitmap(new ImageData(data, width, height));
-  },
+  picture: (job) => renderPicture(job, true),
+  plain: (job) => renderPicture(job, false),
   outlines({ level, region, gaussians: count, ratio }) {
     const { picture, gaussians: arrived } = progress();
     if (gaussians?.arrived !== arrived) gaussians = { arrived, numbers: uprightGaussians() };
@@ -57,6 +61,7 @@ const methods = {
   about: () => ({ metadata: decoder.metadata, statistics: decoder.statistics() }),
   gaussiansIn: (bytes) => decoder.gaussiansIn(bytes),
   gaussians: uprightGaussians,
+  textureMap: () => decoder.textureMap(),
   render: (job) => render[job.kind](job),
 };
 

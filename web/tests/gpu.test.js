@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { exif, makePicture } from '../../bindings/wasm/tests/picture.js';
+import { exif, makePicture, texture } from '../../bindings/wasm/tests/picture.js';
 import { missing, openViewer, sampleBytes, settled, start, vectorBytes } from './viewer.js';
 
 const FLAGS = ['--enable-unsafe-webgpu', '--use-webgpu-adapter=swiftshader', '--disable-gpu-watchdog'];
@@ -22,7 +22,9 @@ const SAMPLE_FRAMES = [
 const SMALL_FRAMES = [{ scale: 5, left: 30, top: 20, first: 1 }];
 const TURNED_FRAMES = [
   { scale: 0.5, left: 30, top: 20, first: 1 },
+  { scale: 1, left: -7, top: 30, first: 0.5 },
   { scale: 3, left: -20, top: -30, first: 1 },
+  { scale: 3, left: -20, top: -30, first: 1, texture: false },
 ];
 
 /**
@@ -79,26 +81,27 @@ async function paint({ files, size }) {
     const { device } = painter;
     const format = navigator.gpu.getPreferredCanvasFormat();
     const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
-    const texture = device.createTexture({ size: Object.values(size), format, usage });
+    const target = device.createTexture({ size: Object.values(size), format, usage });
     const results = [];
     for (const { name, bytes, frames } of files) {
       const decoder = new Decoder();
       decoder.feed(Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0)));
       const { header, progress, naturalWidth, naturalHeight } = decoder;
-      const picture = { ...header, width: naturalWidth, height: naturalHeight };
+      const { orientation } = progress;
+      const picture = { ...header, orientation, width: naturalWidth, height: naturalHeight };
       const numbers = decoder.gaussians({ orientation: 'from-image' });
-      if (!painter.setPicture(picture, numbers)) throw new Error(`${name} is refused`);
-      for (const { scale, left, top, first } of frames) {
+      if (!painter.setPicture(picture, numbers, decoder.textureMap())) throw new Error(`${name} is refused`);
+      for (const { scale, left, top, first, texture = true } of frames) {
         const level = { width: Math.ceil(picture.width * scale), height: Math.ceil(picture.height * scale) };
         const frame = { window: size, level, left, top };
         if (!painter.canPaint({ frame })) throw new Error(`${name} is too much work`);
         const gaussians = Math.ceil(progress.gaussians * first);
-        painter.paint({ frame, gaussians }, texture);
-        const found = await read(device, texture);
+        painter.paint({ frame, gaussians, texture }, target);
+        const found = await read(device, target);
         const region = visibleRegion(frame);
-        const { data } = decoder.render({ ...level, region, gaussians });
+        const { data } = decoder.render({ ...level, region, gaussians, texture });
         const order = format === 'bgra8unorm' ? [2, 1, 0, 3] : [0, 1, 2, 3];
-        results.push({ name, scale, ...compare(found, order, frame, region, data) });
+        results.push({ name, scale, texture, ...compare(found, order, frame, region, data) });
       }
     }
     return isLost ? null : results;
@@ -114,9 +117,9 @@ test('WebGPU paints what the decoder renders', { skip: missing, timeout: 180_000
     { name: 'sample', bytes: await encoded(sampleBytes()), frames: SAMPLE_FRAMES },
     { name: 'alpha', bytes: await encoded(vectorBytes('rgba8.gip')), frames: SMALL_FRAMES },
     { name: 'gray', bytes: await encoded(vectorBytes('gray8.gip')), frames: SMALL_FRAMES },
-    ...[2, 4, 6, 7].map((orientation) => ({
+    ...[1, 2, 4, 6, 7].map((orientation) => ({
       name: `orientation ${orientation}`,
-      bytes: makePicture({ layers: [200], chunks: [['eXIf', exif(orientation)]] }).toString('base64'),
+      bytes: makePicture({ layers: [200], chunks: [['eXIf', exif(orientation)], ['tXTR', texture]] }).toString('base64'),
       frames: TURNED_FRAMES,
     })),
   ];
@@ -134,9 +137,9 @@ test('WebGPU paints what the decoder renders', { skip: missing, timeout: 180_000
     context.skip('Chromium has no WebGPU here');
     return;
   }
-  assert.equal(results.length, 12);
-  for (const { name, scale, worst, beside, samples } of results) {
-    assert.ok(worst <= 2, `${name}, ${scale}: ${worst} steps`);
+  assert.equal(results.length, 24);
+  for (const { name, scale, texture, worst, beside, samples } of results) {
+    assert.ok(worst <= 2, `${name}, ${scale}, ${texture}: ${worst} steps`);
     assert.equal(beside, 0, `${name}, ${scale}`);
     assert.ok(samples > 8, `${name}, ${scale}: ${samples} samples`);
   }

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { makePicture } from '../../bindings/wasm/tests/picture.js';
+import { makePicture, texture } from '../../bindings/wasm/tests/picture.js';
 import { swappedProfile } from '../../bindings/wasm/tests/profile.js';
 import { assertShows, difference, drop, missing, openViewer, sampleBytes } from './viewer.js';
 import { screenshot, settled, start, vectorBytes, viewOf } from './viewer.js';
@@ -117,6 +117,30 @@ onPage('an ICC profile is applied', { path: '/' }, async (page) => {
   const asStored = await difference(page, shot, view, bytes);
   const exchanged = await difference(page, shot, view, bytes, { order: [1, 0, 2] });
   assert.ok(asStored.mean > 3 && exchanged.mean < 1.5, `${asStored.mean}, ${exchanged.mean}`);
+});
+
+onPage('texture is shown, and left out by its button', { path: '/' }, async (page) => {
+  const bytes = makePicture({ chunks: [['tXTR', texture]] });
+  await drop(page, { name: 'textured.gip', bytes });
+  await settled(page);
+  const view = await viewOf(page, { width: 96, height: 64 });
+  const plain = makePicture();
+  const button = page.locator('[data-action="texture"]');
+  await assertShows(page, view, bytes);
+  await button.click();
+  await settled(page);
+  assert.equal(await button.getAttribute('aria-pressed'), 'false');
+  await assertShows(page, view, plain);
+  await page.keyboard.press('t');
+  await settled(page);
+  await assertShows(page, view, bytes);
+  assert.ok((await difference(page, await screenshot(page), view, plain)).mean > 2);
+  assert.ok((await page.locator('#panel').innerText()).includes('tXTR'));
+  // It is there for pictures with texture alone.
+  await drop(page, { name: 'plain.gip', bytes: plain });
+  await page.waitForFunction(() => document.title.startsWith('plain.gip'));
+  await settled(page);
+  assert.ok(await button.isHidden());
 });
 
 onPage('outlines are where the Gaussians are', { path: '/' }, async (page) => {
