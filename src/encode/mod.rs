@@ -22,6 +22,7 @@ mod progress;
 mod quality;
 mod rate_model;
 mod rdo;
+mod rows;
 mod sample_tile;
 mod shortfall;
 mod source;

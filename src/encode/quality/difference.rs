@@ -6,7 +6,7 @@ use core::ops::Range;
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::rows::{Lanes, Rows};
+use crate::encode::rows::{Lanes, Rows};
 
 /// The Gaussian window of standard deviation 1.5, from its middle.
 const WINDOW: [f32; RADIUS + 1] = [0.266_56, 0.213_44, 0.109_59, 0.036_075, 0.007_615];
@@ -133,7 +133,7 @@ mod tests {
     use fearless_simd::dispatch;
 
     use super::*;
-    use crate::encode::quality::rows::Border;
+    use crate::encode::rows::Border;
     use crate::testing::simd_levels;
 
     /// The sums over all rows in f64, directly from the definition.

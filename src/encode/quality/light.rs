@@ -4,8 +4,8 @@
 
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
-use super::rows::Lanes;
 use crate::color::{ColorModel, SampleDepth};
+use crate::encode::rows::Lanes;
 use crate::encode::source::{SPAN, Source};
 use crate::region::Region;
 

@@ -17,7 +17,6 @@ mod judge;
 mod light;
 mod norms;
 mod pyramid;
-mod rows;
 mod scales;
 mod smooth;
 

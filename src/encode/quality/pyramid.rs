@@ -4,7 +4,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 
 use super::light::{BlockRow, COLUMNS, Channel, Samples, linear_row, responses};
 use super::norms::{Measured, SCALES};
-use super::rows::Group;
+use crate::encode::rows::Group;
 
 /// Rows that make one row on the coarsest scale.
 pub(super) const ROWS: usize = 1 << (SCALES - 1);
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::quality::light::plain_linear;
-    use crate::encode::quality::rows::{Border, Rows};
+    use crate::encode::rows::{Border, Rows};
     use crate::encode::testing::source;
     use crate::testing::simd_levels;
 

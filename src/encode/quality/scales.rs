@@ -7,7 +7,7 @@ use super::difference::{RADIUS, Sums, add, differences};
 use super::light::Samples;
 use super::norms::Measured;
 use super::pyramid::{self, ROWS, Shown};
-use super::rows::{Border, Group, Rows};
+use crate::encode::rows::{Border, Group, Rows};
 
 /// What SSIMULACRA2 multiplies the sum of its norms by.
 const SCALE: f64 = 0.956_238_26;

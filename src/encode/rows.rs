@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 
 /// Sixteen neighbours in a row.
-pub(super) type Lanes = [f32; 16];
+pub(crate) type Lanes = [f32; 16];
 
 /// Columns before a row that are no part of it; there are at least as many after it.
 const MARGIN: usize = 16;
 
 /// What is taken to be around a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Border {
+pub(crate) enum Border {
     /// Nothing: zeros, as SSIMULACRA2 has it.
     Zeros,
     /// The picture's mirror images.
@@ -19,7 +19,7 @@ pub(super) enum Border {
 
 /// Some rows of the source and of a rendering.
 #[derive(Clone, Debug)]
-pub(super) struct Group {
+pub(crate) struct Group {
     /// Vectors of a row with its margins.
     stride: usize,
     /// The row of the source, then the row of the rendering, row by row.
@@ -33,7 +33,7 @@ impl Group {
     }
 
     /// The part of a row from column x on; `which` is 0 for the source and 1 for the rendering.
-    pub(super) fn part(&mut self, which: usize, row: usize, x: usize) -> &mut [f32] {
+    pub(crate) fn part(&mut self, which: usize, row: usize, x: usize) -> &mut [f32] {
         let row = &mut self.values[(2 * row + which) * self.stride..][..self.stride];
         &mut row.as_flattened_mut()[MARGIN + x..]
     }
@@ -58,9 +58,9 @@ impl Group {
 
 /// The latest rows of both pictures.
 #[derive(Debug)]
-pub(super) struct Rows {
-    pub(super) width: usize,
-    pub(super) height: usize,
+pub(crate) struct Rows {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     border: Border,
     /// Rows of a group.
     by_group: usize,
@@ -75,19 +75,19 @@ pub(super) struct Rows {
 
 impl Rows {
     /// No rows yet of pictures of a size.
-    pub(super) fn new([width, height]: [usize; 2], border: Border, by_group: usize) -> Self {
+    pub(crate) fn new([width, height]: [usize; 2], border: Border, by_group: usize) -> Self {
         let zeros = vec![[0.0; 16]; stride(width)];
         let (groups, spare) = (VecDeque::new(), Vec::new());
         Self { width, height, border, by_group, first: 0, groups, spare, zeros }
     }
 
     /// A group to be filled.
-    pub(super) fn blank(&mut self) -> Group {
+    pub(crate) fn blank(&mut self) -> Group {
         self.spare.pop().unwrap_or_else(|| Group::new(self.width, self.by_group))
     }
 
     /// Appends the next rows.
-    pub(super) fn push(&mut self, mut group: Group) {
+    pub(crate) fn push(&mut self, mut group: Group) {
         if self.border == Border::Mirrored {
             group.mirror(self.width);
         }
@@ -95,12 +95,12 @@ impl Rows {
     }
 
     /// The number of rows that are known, from the top.
-    pub(super) fn known(&self) -> usize {
+    pub(crate) fn known(&self) -> usize {
         self.height.min((self.first + self.groups.len()) * self.by_group)
     }
 
     /// Forgets rows before this one.
-    pub(super) fn forget(&mut self, before: usize) {
+    pub(crate) fn forget(&mut self, before: usize) {
         while (self.first + 1) * self.by_group <= before {
             let Some(group) = self.groups.pop_front() else { return };
             self.spare.push(group);
@@ -109,14 +109,14 @@ impl Rows {
     }
 
     /// Size in bytes of some groups, and of those with the rows before them.
-    pub(super) fn memory(&self, groups: usize, before: usize) -> usize {
+    pub(crate) fn memory(&self, groups: usize, before: usize) -> usize {
         let group = 2 * self.by_group * stride(self.width) * size_of::<Lanes>();
         (groups + before.div_ceil(self.by_group)) * group
     }
 
     /// The row at y of both, with margins. Up to so many rows outside the picture can be asked for as
     /// rows inside it are known.
-    pub(super) fn row(&self, y: isize) -> [&[Lanes]; 2] {
+    pub(crate) fn row(&self, y: isize) -> [&[Lanes]; 2] {
         let is_inside = (0..self.height as isize).contains(&y);
         if !is_inside && self.border == Border::Zeros {
             return [&self.zeros; 2];
