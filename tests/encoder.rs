@@ -87,9 +87,10 @@ fn decode(bytes: &[u8]) -> StreamDecoder {
     stream
 }
 
+/// The picture without its texture, as the encoder judges it.
 fn pixels_u8(stream: &StreamDecoder) -> Vec<u8> {
     let picture = stream.picture().expect("the header was read");
-    let options = RenderOptions::new();
+    let options = RenderOptions::new().with_texture(false);
     let mut out = vec![0; picture.output_len(&options).expect("small")];
     picture.render_u8(&options, &mut out).expect("within limits");
     out

@@ -1,7 +1,9 @@
 //! What an encoding aims at: its target, resolved for the picture.
 
 use super::error::OptionError;
+use super::loss::Distortion;
 use super::options::{MAX_GAUSSIANS, Target};
+use super::rate_model;
 
 /// By how much a PSNR may exceed its target, in dB.
 pub(crate) const PSNR_TOLERANCE: f64 = 0.05;
@@ -85,6 +87,14 @@ impl Aim {
             Target::Auto => FileAim::Quality(AUTO_QUALITY),
         };
         Ok(Self::File(aim))
+    }
+
+    /// The base-2 logarithm of the colour step, about, of a file of so many Gaussians whose fit has this distortion.
+    pub(crate) fn step(self, distortion: Distortion, count: usize) -> f64 {
+        match self {
+            Self::Lambda(lambda) => rate_model::step_for_lambda(lambda),
+            Self::Count(_) | Self::File(_) => rate_model::step_for(distortion, count),
+        }
     }
 
     /// What is asked of the file, if anything.

@@ -12,6 +12,7 @@ use super::pipeline;
 use super::progress::{Observer, Progress};
 use super::shortfall::Shortfall;
 use super::source::Source;
+use super::texture::USUAL_STRENGTH;
 use crate::color::ColorModel;
 use crate::container::Metadata;
 use crate::kernel::Kernel;
@@ -26,6 +27,9 @@ const EFFORTS: [(u32, u32); 7] =
 /// Fewest iterations for a target that sets the error instead of the number of Gaussians: a fit
 /// of fewer iterations needs far too many Gaussians to reach the error.
 const MIN_ITERATIONS_BY_ERROR: u32 = 180;
+
+/// The strongest texture.
+const MOST_STRENGTH: u8 = 100;
 
 /// Pictures of at most so many pixels are encoded with the lower efforts as well.
 const SMALL: usize = 1 << 15;
@@ -78,6 +82,7 @@ pub struct Encoder {
     tune: Tune,
     effort: u8,
     precision: Precision,
+    texture: u8,
     seed: u64,
     threads: Threads,
     limits: Limits,
@@ -101,6 +106,7 @@ impl Encoder {
             tune: Tune::default(),
             effort: 4,
             precision: Precision::Entropy,
+            texture: USUAL_STRENGTH,
             seed: 0,
             threads: Threads::Pool,
             limits: Limits::default(),
@@ -134,6 +140,15 @@ impl Encoder {
     /// How the attributes of the Gaussians are stored. Default [`Precision::Entropy`].
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
+        self
+    }
+
+    /// How strong the texture is, from 0 (none) to 100. Default 50, with which pictures look most like their
+    /// sources. It takes the place of fine irregular detail that the file has no bits for, such as sand, water
+    /// and leaves, and takes 1 to 3 % of the file. Only files of [`Precision::Entropy`] with [`Tune::Visual`] have
+    /// one, and only where the source has such detail.
+    pub fn with_texture(mut self, strength: u8) -> Self {
+        self.texture = strength;
         self
     }
 
@@ -218,6 +233,7 @@ impl Encoder {
                 aim,
                 tune: self.tune,
                 precision: self.precision,
+                texture: self.texture,
                 seed: self.seed,
                 metadata: &self.metadata,
                 training,
@@ -239,6 +255,8 @@ impl Encoder {
                 psnr: outcome.psnr.rounded,
                 psnr_float: outcome.psnr.exact,
                 quality: outcome.quality,
+                texture_gaussians: outcome.texture.gaussians,
+                texture_bytes: outcome.texture.bytes,
                 iterations: outcome.work.iterations,
                 evaluations: outcome.work.evaluations,
                 seconds: start.elapsed().as_secs_f64(),
@@ -253,6 +271,9 @@ impl Encoder {
     fn check(&self, pixels: usize) -> Result<(Aim, Vec<(Training, u32)>), EncodeError> {
         let efforts = EFFORTS.get(..usize::from(self.effort)).filter(|efforts| !efforts.is_empty());
         let efforts = efforts.ok_or(OptionError::Effort(self.effort))?;
+        if self.texture > MOST_STRENGTH {
+            return Err(OptionError::Texture(self.texture).into());
+        }
         let aim = Aim::new(self.target, pixels)?;
         let fewest = if aim.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };
         self.metadata.check().map_err(OptionError::Metadata)?;
@@ -301,20 +322,25 @@ pub struct Encoded {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Report {
-    /// Number of Gaussians in the file.
+    /// Number of Gaussians in the file, without those of the texture.
     pub gaussians: u32,
-    /// PSNR in dB of the decoded file against the source, over all samples at the source's depth;
-    /// infinite for an exact copy. Colours count as they show, times their alpha, unless those under
+    /// PSNR in dB of the decoded file without its texture against the source, over all samples at the source's
+    /// depth; infinite for an exact copy. Colours count as they show, times their alpha, unless those under
     /// alpha 0 are kept ([`Encoder::with_keep_invisible`]).
     pub psnr: f64,
-    /// PSNR in dB of the decoded file against the source, where the decoded samples are floats,
-    /// clamped but not rounded. This is the PSNR that papers report.
+    /// PSNR in dB of the decoded file without its texture against the source, where the decoded samples are
+    /// floats, clamped but not rounded. This is the PSNR that papers report.
     pub psnr_float: f64,
-    /// An estimate of the visual quality of the decoded file, from 0 to 100: the score that the metric
-    /// SSIMULACRA2 would give, within about 2. Of a picture with alpha it is the lower one of those over
+    /// An estimate of the visual quality of the decoded file without its texture, from 0 to 100: the score that
+    /// the metric SSIMULACRA2 would give, within about 2. The metric compares pixel by pixel, so it takes texture
+    /// for an error, whatever it looks like. Of a picture with alpha it is the lower one of those over
     /// black and over white; of a picture below 8 x 8 pixels, which the metric does not take, that among
     /// its mirror images.
     pub quality: f64,
+    /// Number of Gaussians of the texture's map; 0 if the file has no texture.
+    pub texture_gaussians: u32,
+    /// Size in bytes of the texture in the file.
+    pub texture_bytes: u64,
     /// Iterations of training.
     pub iterations: u32,
     /// Evaluations of the kernel and its gradient during training, one for each pair of a Gaussian

@@ -11,9 +11,11 @@ use super::job::Job;
 use super::loss::{Distortion, SquaredError};
 use super::progress::Observer;
 use super::quality::Judge;
-use super::rate_model;
 use super::rdo::{SearchWork, TargetSearch};
 use super::tiled_source::TiledSource;
+use super::workload::TEXTURE;
+use super::{rate_model, texture};
+use crate::chunk::FRAMING;
 use crate::coding::entropy::QuantizedCodes;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
@@ -37,6 +39,9 @@ const POWERS: (f64, f64) = (0.4, 2.0);
 /// From this log ratio from a quality on (see `aim.rs`; a point or two), the codes of a second
 /// fit are tried.
 const MISSED: f64 = 0.1;
+
+/// The most of a size that a texture may take.
+const MOST_OF_SIZE: f64 = 0.1;
 
 /// A fit before it was changed.
 struct Fitted {
@@ -78,6 +83,19 @@ pub(crate) fn finish(
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
+    let texture = if job.has_texture() {
+        let work = job.workload(gaussians.len()).of(TEXTURE);
+        observer.expect(work + search_work.whole());
+        let limits = Limits::none();
+        let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
+        let step = job.aim.step(distortion, gaussians.len());
+        let payload = texture::payload(job, &picture, step, observer)?;
+        observer.advance(work)?;
+        payload.filter(|payload| has_room(job.aim, payload))
+    } else {
+        None
+    };
+    let layout = &layout.with_texture(texture.as_deref());
     let mut search = TargetSearch::new(judge, tiled, layout, search_work, observer)?;
     let (mut coded, log_ratio) = search.run(&gaussians, distortion, job.aim, observer)?;
     if let Some(fitted) = too_good.filter(|_| log_ratio > MISSED) {
@@ -89,6 +107,12 @@ pub(crate) fn finish(
         }
     }
     Ok((layout.write_entropy(&coded, observer)?, work))
+}
+
+/// Whether a file has room for a texture with this payload: a small one needs its bytes for Gaussians.
+fn has_room(aim: Aim, payload: &[u8]) -> bool {
+    let Aim::File(FileAim::Size(bytes)) = aim else { return true };
+    (payload.len() + FRAMING) as f64 <= MOST_OF_SIZE * bytes as f64
 }
 
 /// Extends a fit until its squared error is at most `error`, or nothing helps.

@@ -74,6 +74,9 @@ pub enum OptionError {
     /// The effort is not 1 to 7.
     #[error("effort {0}; it must be 1 to 7")]
     Effort(u8),
+    /// The strength of the texture is more than 100.
+    #[error("texture {0}; it must be 0 to 100")]
+    Texture(u8),
     /// The number in a [`Target`](crate::Target) is out of range.
     #[error("{name} {value}; it must be {least} to {most}")]
     Target {

@@ -15,6 +15,8 @@ pub(crate) struct Job<'a> {
     pub(crate) aim: Aim,
     pub(crate) tune: Tune,
     pub(crate) precision: Precision,
+    /// The strength of the texture, 0 to 100.
+    pub(crate) texture: u8,
     pub(crate) seed: u64,
     pub(crate) metadata: &'a Metadata,
     pub(crate) training: &'a Training,
@@ -28,6 +30,11 @@ impl Job<'_> {
     /// Number of pixels.
     pub(crate) fn pixels(&self) -> usize {
         self.source.pixels()
+    }
+
+    /// Whether its file may have a texture.
+    pub(crate) fn has_texture(&self) -> bool {
+        self.texture > 0 && self.tune == Tune::Visual
     }
 
     /// The work if the picture gets so many Gaussians.

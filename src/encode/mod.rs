@@ -29,6 +29,7 @@ mod source;
 mod strips;
 #[cfg(test)]
 mod testing;
+mod texture;
 mod tiled_source;
 mod verify;
 mod workload;

@@ -17,14 +17,14 @@ pub enum Target {
     /// A file of at most this many bits per pixel, from 10^-6 to 10^6, and of at least 99 % of
     /// them. The whole file counts; see also [`Target::Bytes`].
     BitsPerPixel(f64),
-    /// A PSNR of the decoded file in dB, at the source's depth, from 1 to 120: at least this much,
+    /// A PSNR of the decoded file without its texture in dB, at the source's depth, from 1 to 120: at least this much,
     /// and at most 0.05 dB more. A PSNR that is out of reach ends with what the effort reaches, after
     /// at most one Gaussian per pixel and three times the effort's iterations, and
     /// [`Report::shortfall`](crate::Report) says so.
     Psnr(f64),
     /// A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 30 is low, 50
-    /// medium, 70 high, and from 90 on people see no difference. The encoder aims at its estimate of
-    /// the metric, [`Report::quality`](crate::Report), and no higher than 97. It aims at more in two cases:
+    /// medium, 70 high, and from 90 on people see no difference. It is that of the picture without its texture,
+    /// which the metric takes for an error. The encoder aims at its estimate of the metric, [`Report::quality`](crate::Report), and no higher than 97. It aims at more in two cases:
     /// where the picture is smooth, as in a gradient, so that there are no blotches; and where a side has
     /// less than 113 pixels. Of such a picture the metric says little, so a larger one, made of the
     /// picture and its mirror images, must have the quality as well.

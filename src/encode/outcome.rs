@@ -4,7 +4,7 @@ use super::aim::{Aim, FileAim};
 use super::fit::Work;
 use super::options::Tune;
 use super::shortfall::Shortfall;
-use super::verify::FilePsnr;
+use super::verify::{FilePsnr, TextureCost};
 
 // Constants: docs/tuning.md, "Search for a target".
 /// What twice the size must bring, in dB or in points of quality.
@@ -22,6 +22,7 @@ pub(crate) struct Outcome {
     pub(crate) psnr: FilePsnr,
     /// The visual quality, from 0 to 100.
     pub(crate) quality: f64,
+    pub(crate) texture: TextureCost,
     pub(crate) shortfall: Option<Shortfall>,
     /// Whether most of the error is that of codes of fixed depths.
     pub(crate) is_lost_to_rounding: bool,

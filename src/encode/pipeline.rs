@@ -173,7 +173,7 @@ fn encode_for_target(
     // The decoder needs memory, too.
     drop(tiled);
     let verified = Verified::within(&file, source, job.limits, observer)?;
-    let gaussians = verified.gaussians();
+    let (gaussians, texture) = (verified.gaussians(), verified.texture());
     let workload = job.workload(gaussians as usize);
     observer.expect(workload.verification());
     let (psnr, verdict) = verified.judged(judge, observer)?;
@@ -193,7 +193,7 @@ fn encode_for_target(
         gaussians,
     };
     let shortfall = asked.of_file().and_then(|aim| Shortfall::of(aim, reached));
-    Ok(Outcome { file, work, gaussians, psnr, quality, shortfall, is_lost_to_rounding })
+    Ok(Outcome { file, work, gaussians, psnr, quality, texture, shortfall, is_lost_to_rounding })
 }
 
 /// The work from training on, about, with so many Gaussians.

@@ -96,6 +96,18 @@ impl<'a> Observer<'a> {
         }
     }
 
+    /// Calls `work` with an observer of its own, which polls this one, but whose progress is not reported.
+    pub(crate) fn silently<T>(
+        &mut self,
+        work: impl FnOnce(&mut Observer<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let mut callback = |_: &Progress| match self.poll() {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        };
+        work(&mut Observer::new(&mut callback, 0))
+    }
+
     /// What `task` makes of every item, in their order. All threads share the tasks, and every few
     /// milliseconds there is a poll on this one.
     pub(crate) fn map<T: Send, R: Send>(

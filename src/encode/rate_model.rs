@@ -80,6 +80,11 @@ pub(crate) fn step_for_lambda(lambda: f64) -> f64 {
     0.5 * (lambda / (255.0 * 255.0) / f64::from(LAMBDA)).log2()
 }
 
+/// The Lagrange multiplier for which [`step_for_lambda`] gives this step.
+pub(crate) fn lambda_for_step(step: f64) -> f64 {
+    (2.0 * step).exp2() * f64::from(LAMBDA) * 255.0 * 255.0
+}
+
 /// The distortion per Gaussian for which [`step_for`] gives this step.
 pub(crate) fn distortion_per_gaussian(step: f64) -> Distortion {
     Distortion((2.0 * step).exp2() / SQUARED_STEP)

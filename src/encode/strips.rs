@@ -14,7 +14,7 @@ const BANDS: usize = 2;
 /// Most pixels of a strip, unless a band has more.
 const MOST_PIXELS: usize = 1 << 21;
 
-/// Renders the first `prefix` Gaussians of a picture strip by strip from the top, and hands every strip to
+/// Renders the first `prefix` Gaussians of a picture, without its texture, strip by strip from the top, and hands every strip to
 /// `visit`: float samples, plane after plane. The number of rows of a strip is a multiple of
 /// [`BAND_HEIGHT`], except at the bottom. The picture must have no [`Limits`](crate::Limits).
 pub(crate) fn render(
@@ -24,7 +24,7 @@ pub(crate) fn render(
     mut visit: impl FnMut(Region, &[f32]),
 ) -> Result<()> {
     observer.poll()?;
-    let options = RenderOptions::new().with_prefix(prefix);
+    let options = RenderOptions::new().with_prefix(prefix).with_texture(false);
     picture.render_strips(&options, bands(picture.header().width), |region, planes| {
         observer.poll()?;
         visit(region, planes);

@@ -11,7 +11,8 @@ use super::progress::Observer;
 use super::quality::{Judge, Judgement, Verdict};
 use super::source::{SPAN, Source};
 use super::strips;
-use crate::decode::StreamDecoder;
+use crate::chunk::ChunkType;
+use crate::decode::{ChunkStatistics, StreamDecoder};
 use crate::error::DecodeError;
 use crate::limits::Limits;
 use crate::region::Region;
@@ -37,6 +38,13 @@ pub(crate) struct FilePsnr {
     pub(crate) rounded: f64,
     /// Of samples that are clamped, but not rounded.
     pub(crate) exact: f64,
+}
+
+/// What the texture of a file takes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TextureCost {
+    pub(crate) gaussians: u32,
+    pub(crate) bytes: u64,
 }
 
 /// Refuses a picture that no file can hold within the limits, as far as this is known before the work.
@@ -103,6 +111,16 @@ impl<'a> Verified<'a> {
     /// Number of Gaussians in the file.
     pub(crate) fn gaussians(&self) -> u32 {
         self.stream.gaussians().len() as u32
+    }
+
+    /// What its texture takes.
+    pub(crate) fn texture(&self) -> TextureCost {
+        let of_texture = |chunk: &&ChunkStatistics| chunk.kind == ChunkType::TXTR;
+        let chunks = self.stream.chunks().iter().find(of_texture);
+        TextureCost {
+            gaussians: self.stream.texture().len() as u32,
+            bytes: chunks.map_or(0, |chunks| chunks.bytes),
+        }
     }
 
     /// The PSNR in dB, at the source's depth, of the picture that the first `count` Gaussians make, or all

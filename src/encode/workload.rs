@@ -14,6 +14,8 @@ const COVERAGE: f64 = 6.7;
 const DESCENT: Rates = (70.0, 3_300.0);
 /// The rendering before each pass.
 const RENDERING: Rates = (25.0, 800.0);
+/// Finding the texture, fitting and coding it.
+pub(crate) const TEXTURE: Rates = (80.0, 0.0);
 /// Coding, and measuring the squared error or the visual quality of a file.
 pub(crate) const CODING: Rates = (0.0, 800.0);
 pub(crate) const ERROR: Rates = (4.0, 80.0);

@@ -34,6 +34,25 @@ const DIRECTION: (f32, f32) = (4.0, -2.0);
 const GAINS: [[f32; 2]; OCTAVES] =
     [[1.0 / 1024.0, 1.23 / 1024.0], [1.82 / 1024.0, 1.72 / 1024.0], [2.1 / 1024.0, 1.86 / 1024.0]];
 
+/// The sum for an amplitude, of which a decoder takes a little less.
+#[cfg(feature = "encode")]
+pub(crate) fn amplitude_sum(amplitude: f32) -> f32 {
+    beyond(LEAST_SUM, amplitude / AMPLITUDE).min(1.0)
+}
+
+/// The sum for a direction, of which a decoder takes a little less.
+#[cfg(feature = "encode")]
+pub(crate) fn direction_sum(direction: f32) -> f32 {
+    let strength = beyond(LEAST_DIRECTION, direction.abs());
+    (strength.copysign(direction) - DIRECTION.1) / DIRECTION.0
+}
+
+/// The value, or one nearer to 0 if it is less than what counts: down to half of that it falls to 0.
+#[cfg(feature = "encode")]
+fn beyond(least: f32, value: f32) -> f32 {
+    if value < least { (2.0 * value - least).max(0.0) } else { value }
+}
+
 /// The header of a picture's map: that of a picture of its own.
 pub(super) fn header(picture: &Header) -> Header {
     let nodes = |side: u32| side.div_ceil(CELL as u32) + 1;

@@ -15,4 +15,6 @@ pub(crate) use arithmetic::Vectors;
 pub(crate) use arithmetic::{Arithmetic, Plain};
 pub(crate) use chunk::Texture;
 pub(crate) use map::{CELL, NodeMap};
+#[cfg(feature = "encode")]
+pub(crate) use map::{OCTAVES, amplitude_sum, direction_sum};
 pub(crate) use synthesis::make_cells;

@@ -130,6 +130,26 @@ fn prints_for_humans() {
 }
 
 #[test]
+fn the_texture_of_a_file_is_told() {
+    let room = Room::new();
+    let mut rng = fastrand::Rng::with_seed(3);
+    let grains = image::GrayImage::from_fn(144, 128, |_, _| image::Luma([rng.u8(90..160)]));
+    DynamicImage::from(grains).save(room.path("a.png")).expect("writable");
+    let encode = ["encode", "a.png", "a.gip", "--effort", "1", "--gaussians", "20"];
+    let report = room.json(&[&encode[..], &["--json"]].concat());
+    let info = room.json(&["info", "a.gip", "--json"]);
+    assert!(report["texture_gaussians"].as_u64() > Some(0), "{report}");
+    for field in ["gaussians", "bytes"] {
+        assert_eq!(info["texture"][field], report[format!("texture_{field}")], "{info}");
+    }
+    assert!(room.ok(&["info", "a.gip"]).contains("\ntexture  "));
+    assert!(room.ok(&encode).contains(", texture "));
+    let report = room.json(&[&encode[..], &["--texture", "0", "--json"]].concat());
+    assert_eq!(report["texture_bytes"], 0);
+    assert!(room.json(&["info", "a.gip", "--json"])["texture"].is_null());
+}
+
+#[test]
 fn a_target_that_is_not_met_is_told_with_its_reason() {
     let room = Room::new();
     DynamicImage::from(image::GrayImage::from_pixel(20, 20, image::Luma([77])))
@@ -521,6 +541,7 @@ fn wrong_usage_exits_with_2() {
         (&["encode", "a.png"], &[], "OUTPUT"),
         (&encode, &["--effort", "0"], "1..=7"),
         (&encode, &["--effort", "8"], "1..=7"),
+        (&encode, &["--texture", "101"], "0..=100"),
         (&encode, &["--psnr", "-3"], "from 1 to 120"),
         (&encode, &["--psnr", "NaN"], "from 1 to 120"),
         (&encode, &["--psnr", "inf"], "from 1 to 120"),

@@ -42,12 +42,16 @@ const NEWS: f64 = 0.002;
 ///     bytes: A file of at most so many bytes, 1 to 2**30. That only the metadata keep it out of reach is
 ///         an error.
 ///     quality: A visual quality from 0 to 100, on the scale of the metric SSIMULACRA2: about 50 is
-///         medium, 70 high, and from 90 on people see no difference. No more than 97 is aimed at.
-///     psnr: A PSNR of the decoded file in dB, 1 to 120.
+///         medium, 70 high, and from 90 on people see no difference. No more than 97 is aimed at. It is that of
+///         the picture without its texture, which the metric takes for an error.
+///     psnr: A PSNR of the decoded file without its texture in dB, 1 to 120.
 ///     gaussians: At most so many Gaussians, 1 to 2**22.
 ///     effort: How much time to spend, 1 (least) to 7 (most).
 ///     tune: What to minimize for the size of the file: "visual", the error that a person sees, or
 ///         "psnr", the squared error.
+///     texture: The strength of the texture, 0 (none) to 100. It takes the place of fine irregular detail that
+///         the file has no bits for, such as sand, water and leaves. Files with tune="psnr", and those with
+///         another precision than "entropy", have none.
 ///     precision: How the Gaussians are stored: "entropy", for the smallest files; "packed", with codes
 ///         of fixed bit depths; or "f32", the fitted values themselves, in files several times as large.
 ///     threads: The number of threads that work, 1 to 1024. The calling thread only waits for them.
@@ -83,7 +87,7 @@ const NEWS: f64 = 0.002;
 ///     CancelledError: `progress` returned False.
 ///     MemoryError: There is no memory to convert float32.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", precision="entropy", threads=1, seed=0, keep_invisible=false, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, precision="entropy", threads=1, seed=0, keep_invisible=false, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -95,6 +99,7 @@ pub(crate) fn encode<'py>(
     gaussians: Option<Integer<'py>>,
     #[pyo3(from_py_with = checked_effort)] effort: u8,
     tune: &str,
+    #[pyo3(from_py_with = checked_texture)] texture: u8,
     precision: &str,
     #[pyo3(from_py_with = threads::checked)] threads: usize,
     #[pyo3(from_py_with = checked_seed)] seed: u64,
@@ -116,6 +121,7 @@ pub(crate) fn encode<'py>(
         .with_target(target)
         .with_tune(tuning(tune)?)
         .with_effort(effort)
+        .with_texture(texture)
         .with_precision(self::precision(precision)?)
         .with_seed(seed)
         .with_keep_invisible(keep_invisible)
@@ -140,6 +146,10 @@ pub(crate) fn encode<'py>(
 
 fn checked_effort(effort: &Bound<'_, PyAny>) -> PyResult<u8> {
     effort.extract::<Integer<'_>>()?.within("effort", 1..=7)
+}
+
+fn checked_texture(texture: &Bound<'_, PyAny>) -> PyResult<u8> {
+    texture.extract::<Integer<'_>>()?.within("texture", 0..=100)
 }
 
 fn checked_seed(seed: &Bound<'_, PyAny>) -> PyResult<u64> {

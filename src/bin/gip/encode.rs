@@ -102,6 +102,8 @@ struct JsonReport {
     psnr: f64,
     psnr_float: f64,
     quality: f64,
+    texture_gaussians: u32,
+    texture_bytes: u64,
     iterations: u32,
     evaluations: u64,
     seconds: f64,
@@ -123,6 +125,8 @@ impl JsonReport {
             psnr: json_psnr(encoded.report.psnr),
             psnr_float: json_psnr(encoded.report.psnr_float),
             quality: encoded.report.quality,
+            texture_gaussians: encoded.report.texture_gaussians,
+            texture_bytes: encoded.report.texture_bytes,
             iterations: encoded.report.iterations,
             evaluations: encoded.report.evaluations,
             seconds: encoded.report.seconds,
@@ -135,9 +139,13 @@ impl JsonReport {
     /// The report as text.
     fn to_line(&self, output: &Path, psnr: f64) -> String {
         let Self { width, height, gaussians, bytes, bpp, quality, seconds, .. } = self;
+        let texture = match self.texture_bytes {
+            0 => String::new(),
+            bytes => format!(", texture {bytes} bytes"),
+        };
         let mut line = format!(
             "{}: {width}x{height}, {gaussians} Gaussians, {bytes} bytes, {bpp:.3} bpp, \
-             {psnr:.2} dB, quality {quality:.0}, {seconds:.1} s",
+             {psnr:.2} dB, quality {quality:.0}{texture}, {seconds:.1} s",
             files::output_name(output)
         );
         if let Some(shortfall) = &self.shortfall {

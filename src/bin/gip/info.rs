@@ -51,7 +51,17 @@ struct FileInfo {
     components: Vec<Component>,
     /// Of the entropy coding; `None` with the packed coding.
     quantization_steps: Option<StepSizes>,
+    /// `None` without texture.
+    texture: Option<Texture>,
     metadata: MetadataSizes,
+}
+
+/// The texture: the Gaussians of its map, and what its chunk takes.
+#[derive(Debug, Serialize)]
+struct Texture {
+    gaussians: usize,
+    bytes: u64,
+    bits_per_gaussian: f64,
 }
 
 /// The chunks of one type. Their bytes include length, type and CRC.
@@ -124,6 +134,11 @@ impl FileInfo {
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
         let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::GAUS);
+        let texture = chunks.iter().find(|chunk| chunk.kind == ChunkType::TXTR).map(|chunk| {
+            let gaussians = stream.texture().len();
+            let bits_per_gaussian = chunk.bytes as f64 * 8.0 / gaussians.max(1) as f64;
+            Texture { gaussians, bytes: chunk.bytes, bits_per_gaussian }
+        });
         let gaussians = f64::from(header.gaussians.max(1));
         let bits = stream.attribute_bits().unwrap_or_default();
         let bits_per_gaussian = BitsPerGaussian {
@@ -183,6 +198,7 @@ impl FileInfo {
             bits_per_gaussian,
             components,
             quantization_steps: stream.quantization_steps().map(StepSizes::from),
+            texture,
             metadata: MetadataSizes {
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
@@ -283,6 +299,14 @@ impl Display for FileInfo {
             };
             let name = format!("  {attribute} {name}");
             row(&name, &format_args!("{kind}, {bits} bits{steps}"))?;
+        }
+        if let Some(Texture { gaussians, bytes, bits_per_gaussian }) = &self.texture {
+            row(
+                "texture",
+                &format_args!(
+                    "{gaussians} Gaussians, {bytes} bytes, {bits_per_gaussian:.2} bits per Gaussian"
+                ),
+            )?;
         }
         for Chunk { kind, count, bytes } in &self.chunks {
             row(&format!("chunk {kind}"), &format_args!("{count}, {bytes} bytes"))?;

@@ -20,11 +20,13 @@ pub(crate) struct CodedLayers {
     pub(crate) layers: Vec<EncodedLayer>,
 }
 
-/// The header and the metadata of a file, which its codes complete.
-#[derive(Debug)]
+/// The header, the metadata and the texture of a file, which its codes complete.
+#[derive(Clone, Debug)]
 pub(crate) struct FileLayout<'a> {
     header: Header,
     metadata: &'a Metadata,
+    /// The payload of `tXTR`.
+    texture: Option<&'a [u8]>,
 }
 
 impl<'a> FileLayout<'a> {
@@ -49,7 +51,15 @@ impl<'a> FileLayout<'a> {
             parameterization,
             base_color: mean.map(|value| (value * 65535.0).round() as u16),
         };
-        Self { header, metadata }
+        Self { header, metadata, texture: None }
+    }
+
+    /// The same with a texture, unless the payload is `None`.
+    pub(crate) fn with_texture<'b>(&self, texture: Option<&'b [u8]>) -> FileLayout<'b>
+    where
+        'a: 'b,
+    {
+        FileLayout { header: self.header.clone(), metadata: self.metadata, texture }
     }
 
     /// The header. Its coding and its numbers of Gaussians and layers are those of an empty packed
@@ -128,6 +138,9 @@ impl<'a> FileLayout<'a> {
         file.chunk(ChunkType::QNTZ, quantization);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &payload);
+        }
+        if let Some(texture) = self.texture {
+            file.chunk(ChunkType::TXTR, texture);
         }
         if let Some(bounds) = bounds {
             file.chunk(ChunkType::BNDS, &bounds);

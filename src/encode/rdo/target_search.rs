@@ -115,10 +115,7 @@ impl<'a> TargetSearch<'a> {
         aim: Aim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64)> {
-        let step = match aim {
-            Aim::Lambda(lambda) => rate_model::step_for_lambda(lambda),
-            Aim::Count(_) | Aim::File(_) => rate_model::step_for(distortion, gaussians.len()),
-        };
+        let step = aim.step(distortion, gaussians.len());
         let least = rate_model::least_step(gaussians, self.layout.header().color);
         let step = step.max(least);
         observer.expect(self.work.whole());

@@ -53,6 +53,7 @@ def encode(
     gaussians: int | None = None,
     effort: int = 4,
     tune: Tune = "visual",
+    texture: int = 50,
     precision: Precision = "entropy",
     threads: int = 1,
     seed: int = 0,

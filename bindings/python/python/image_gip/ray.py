@@ -73,6 +73,7 @@ def encode_dataset(
     gaussians: int | None = None,
     effort: int = 4,
     tune: Tune = "visual",
+    texture: int = 50,
     seed: int = 0,
     keep_invisible: bool = False,
     metadata: MetadataPolicy = "all",
@@ -96,6 +97,7 @@ def encode_dataset(
         gaussians: Number of Gaussians of each picture.
         effort: As in :func:`image_gip.encode`.
         tune: As in :func:`image_gip.encode`.
+        texture: As in :func:`image_gip.encode`.
         seed: As in :func:`image_gip.encode`.
         keep_invisible: As in :func:`image_gip.encode`.
         metadata: As in :func:`image_gip.encode`.
@@ -108,7 +110,8 @@ def encode_dataset(
     """
     targets = {"bpp": bpp, "bytes": bytes, "quality": quality, "psnr": psnr, "gaussians": gaussians}
     options: dict[str, Any] = {name: v for name, v in targets.items() if v is not None}
-    options |= {"effort": effort, "tune": tune, "seed": seed, "metadata": metadata}
+    options |= {"effort": effort, "tune": tune, "texture": texture}
+    options |= {"seed": seed, "metadata": metadata}
     options |= {"keep_invisible": keep_invisible}
     _check_encoder_options(options)
     return _run("encode", options, pictures, out_uri, container, shard_size)

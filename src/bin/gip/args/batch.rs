@@ -84,7 +84,7 @@ pub(crate) struct Batch {
     /// Fields: input, output (null if there is none), status ("written", "skipped", "failed", or
     /// "ignored" of a picture in a format that is not read), input_bytes, width, height, bytes,
     /// gaussians (their number), psnr (in dB; 999 if infinite), quality (an estimate of SSIMULACRA2),
-    /// seconds (from reading to the encoded result), shortfall (null, or why the target was not met),
+    /// both without texture, seconds (from reading to the encoded result), shortfall (null, or why the target was not met),
     /// warnings (an array of what of the input is lost, such as all frames but the first), error (null,
     /// or why there is no result). What is unknown or does not apply is null. In input and output, a
     /// byte that is not UTF-8 is U+FFFD and two hexadecimal digits, and so are the bytes of a U+FFFD in

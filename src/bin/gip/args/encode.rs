@@ -64,7 +64,8 @@ pub(crate) struct Encode {
     ///
     /// Fields: width, height, gaussians (their number), bytes, bpp (bits per pixel of the whole
     /// file), psnr (in dB, of the decoded file), psnr_float (in dB, before rounding to samples), quality
-    /// (an estimate of SSIMULACRA2, from 0 to 100), iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
+    /// (an estimate of SSIMULACRA2, from 0 to 100; it and both PSNRs are those of the picture without its
+    /// texture), texture_gaussians and texture_bytes (what the texture takes), iterations (of training), evaluations (of the kernel, during training), seconds, peak_memory
     /// (in bytes), shortfall (null, or why the target was not met), warnings (an array of what of the input is
     /// lost, such as all frames but the first). An infinite PSNR, of an exact
     /// copy, is given as 999.
@@ -84,6 +85,12 @@ pub(crate) struct EncoderArgs {
     #[arg(long, value_name = "E", default_value_t = 4,
           value_parser = clap::value_parser!(u8).range(1..=7))]
     effort: u8,
+    /// Strength of the texture, from 0 (none) to 100. It takes the place of fine irregular detail that the
+    /// file has no bits for, such as sand, water and leaves. Files of --tune psnr and of the packed
+    /// coding have none.
+    #[arg(long, value_name = "T", default_value_t = 50,
+          value_parser = clap::value_parser!(u8).range(0..=100))]
+    texture: u8,
     /// How the Gaussians are stored.
     #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
     precision: PrecisionArg,
@@ -99,14 +106,15 @@ pub(crate) struct EncoderArgs {
 impl EncoderArgs {
     /// The arguments above and the group of the targets, for what excludes them. The group that
     /// `clap` makes of a struct is empty if another struct is flattened into it.
-    pub(super) const IDS: [&str; 6] =
-        ["TargetArgs", "tune", "effort", "precision", "seed", "keep_invisible"];
+    pub(super) const IDS: [&str; 7] =
+        ["TargetArgs", "tune", "effort", "texture", "precision", "seed", "keep_invisible"];
 
     pub(crate) fn encoder(&self) -> Encoder {
         Encoder::new()
             .with_target(self.target.target())
             .with_tune(self.tune.into())
             .with_effort(self.effort)
+            .with_texture(self.texture)
             .with_precision(self.precision.into())
             .with_seed(self.seed)
             .with_keep_invisible(self.keep_invisible)
@@ -129,12 +137,12 @@ struct TargetArgs {
     #[arg(long, help_heading = "Targets", value_name = "N",
           value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     bytes: Option<u64>,
-    /// A PSNR of the decoded file of DB decibels, from 1 to 120.
+    /// A PSNR of the decoded file without its texture of DB decibels, from 1 to 120.
     #[arg(long, help_heading = "Targets", value_name = "DB",
           value_parser = |text: &str| number(text, 1.0, 120.0))]
     psnr: Option<f64>,
-    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2; no more than 97 is
-    /// aimed at [default: 75].
+    /// A visual quality from 0 (smallest) to 100 (best), on the scale of SSIMULACRA2, of the picture without
+    /// its texture; no more than 97 is aimed at [default: 75].
     #[arg(long, help_heading = "Targets", value_name = "Q",
           value_parser = |text: &str| number(text, 0.0, 100.0))]
     quality: Option<f64>,
