@@ -5,6 +5,7 @@ use image_gip::{DecodeError, StreamDecoder};
 
 use crate::entropy::{self, Code, Grid};
 use crate::rans;
+use crate::texture::{self, map_sides};
 
 /// What an entropy-coded file has instead of quantizers and packed codes.
 #[derive(Arbitrary, Debug)]
@@ -17,6 +18,13 @@ pub struct EntropyCoded {
 struct Step {
     exponent: u8,
     mantissa: u8,
+}
+
+/// What `tXTR` holds, whose layer is one of the entropy coding.
+#[derive(Arbitrary, Debug)]
+pub struct Map {
+    step: Step,
+    layer: Layer,
 }
 
 #[derive(Arbitrary, Debug)]
@@ -51,20 +59,9 @@ impl EntropyCoded {
     /// The payloads of `GAUS`, each with its number of Gaussians.
     pub fn layers(&self, sides: [u32; 2], channels: usize) -> Vec<(u32, Vec<u8>)> {
         let steps = self.steps(channels);
-        let payload = |layer: &Layer| {
-            let (count, bytes) = match layer {
-                Layer::Bytes(count, bytes) => (u32::from(*count) + 1, bytes.clone()),
-                Layer::Gaussians(gaussians) => {
-                    let code = |gaussian: &Gaussian| gaussian.code(sides, channels);
-                    let mut codes: Vec<Code> = gaussians.iter().map(code).collect();
-                    let ops = entropy::write(sides, &steps, &mut codes);
-                    (codes.len() as u32, rans::encode(&ops))
-                }
-            };
-            (count, [&count.to_le_bytes()[..], &bytes].concat())
-        };
         let filled = |layer: &&Layer| !matches!(layer, Layer::Gaussians(all) if all.is_empty());
-        self.layers.iter().filter(filled).map(payload).collect()
+        let layers = self.layers.iter().filter(filled);
+        layers.map(|layer| layer.payload(sides, &steps, channels)).collect()
     }
 
     /// Checks that a decoder made of the layers what the tests' coder makes of them.
@@ -100,6 +97,36 @@ impl EntropyCoded {
 
     fn steps(&self, channels: usize) -> Vec<f32> {
         self.steps[..4 + channels].iter().map(Step::value).collect()
+    }
+}
+
+impl Layer {
+    /// Its number of Gaussians, and its payload.
+    fn payload(&self, sides: [u32; 2], steps: &[f32], channels: usize) -> (u32, Vec<u8>) {
+        let (count, bytes) = match self {
+            Self::Bytes(count, bytes) => (u32::from(*count) + 1, bytes.clone()),
+            Self::Gaussians(gaussians) => {
+                let code = |gaussian: &Gaussian| gaussian.code(sides, channels);
+                let mut codes: Vec<Code> = gaussians.iter().map(code).collect();
+                let ops = entropy::write(sides, steps, &mut codes);
+                (codes.len() as u32, rans::encode(&ops))
+            }
+        };
+        (count, [&count.to_le_bytes()[..], &bytes].concat())
+    }
+}
+
+impl Map {
+    /// The payload of `tXTR` in a picture with these sides.
+    pub fn payload(&self, sides: [u32; 2]) -> Vec<u8> {
+        let step = self.step.value();
+        let (_, layer) = self.layer.payload(map_sides(sides), &texture::steps(step), 4);
+        [&step.to_le_bytes()[..], &layer].concat()
+    }
+
+    /// Whether the tests' coder reads it.
+    pub fn is_sound(&self, sides: [u32; 2]) -> bool {
+        texture::read(sides, &self.payload(sides)).is_ok()
     }
 }
 

@@ -6,7 +6,7 @@
 use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
-use crate::entropy_coded::EntropyCoded;
+use crate::entropy_coded::{EntropyCoded, Map};
 
 const SIGNATURE: &[u8] = b"\xC7GIP\r\n\x1A\n";
 
@@ -29,6 +29,7 @@ pub struct File {
     layers: Vec<Vec<u8>>,
     extras: Vec<Extra>,
     flaw: Option<Flaw>,
+    texture: Option<Map>,
 }
 
 #[derive(Arbitrary, Debug)]
@@ -111,6 +112,7 @@ impl File {
             Some(entropy_coded) => entropy_coded.quantizers(self.channels()),
         };
         let mut chunks = vec![(*b"GHDR", self.header(&layers)), (*b"QNTZ", quantizers)];
+        chunks.extend(self.texture.iter().map(|map| (*b"tXTR", map.payload(self.sides()))));
         chunks.extend(layers.into_iter().map(|(_, payload)| (*b"GAUS", payload)));
         chunks.push((*b"GEND", Vec::new()));
         for extra in &self.extras {
@@ -136,6 +138,12 @@ impl File {
             return;
         }
         assert_eq!(error.is_none(), decoder.is_complete());
+        if let Some(map) = &self.texture
+            && !map.is_sound(self.sides())
+        {
+            assert!(error.is_some(), "a flaw of the texture was not noticed");
+            return;
+        }
         if let Some(entropy_coded) = &self.entropy_coded {
             entropy_coded.check(self.sides(), self.channels(), decoder, error);
         } else if !self.quantizers().iter().any(|q| matches!(q, Quantizer::Float)) {

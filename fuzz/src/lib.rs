@@ -11,6 +11,9 @@ mod exp;
 pub mod file;
 #[path = "../../tests/common/rans.rs"]
 mod rans;
+#[path = "../../tests/common/texture.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod texture;
 
 use fearless_simd::Level;
 use image_gip::{
@@ -49,7 +52,7 @@ pub fn check(decoder: &StreamDecoder) {
     let Some(picture) = decoder.picture() else { return };
     let header = picture.header();
     assert!(picture.gaussians().len() <= header.gaussians as usize);
-    let [small, middle] = views(&picture).map(|options| options.with_threads(Threads::One));
+    let [small, middle, large] = views(&picture).map(|options| options.with_threads(Threads::One));
 
     check_backend(&picture, &small);
     let (width, height) = small.output_size(header);
@@ -57,6 +60,7 @@ pub fn check(decoder: &StreamDecoder) {
     check_region(&picture, &small, width, part);
 
     check_backend(&picture, &middle);
+    check_backend(&picture, &large);
 }
 
 /// Decodes the middle of a file from the layers that show in it: the same as from all of them, where
@@ -64,7 +68,7 @@ pub fn check(decoder: &StreamDecoder) {
 pub fn decode_region(bytes: &[u8]) {
     let Ok(mut decoder) = Decoder::new_with_limits(bytes, limits()) else { return };
     let Ok(picture) = decoder.picture() else { return };
-    let [_, middle] = views(&picture).map(|options| options.with_threads(Threads::One));
+    let [_, middle, _] = views(&picture).map(|options| options.with_threads(Threads::One));
     decoder.set_options(middle.clone());
     let Ok(length) = decoder.output_len() else { return };
     let mut samples = vec![0; length];
@@ -78,15 +82,18 @@ pub fn decode_region(bytes: &[u8]) {
     }
 }
 
-/// All of a picture, small, and its middle at its stored size, however large that is.
-fn views(picture: &Picture<'_>) -> [RenderOptions; 2] {
+/// All of a picture, small, its middle at its stored size, however large that is, and the same enlarged.
+fn views(picture: &Picture<'_>) -> [RenderOptions; 3] {
     let header = picture.header();
     let (width, height) = (header.width.min(MAX_SIDE), header.height.min(MAX_SIDE));
-    let (x, y) = ((header.width - width) / 2, (header.height - height) / 2);
-    [
-        RenderOptions::new().with_size(width, height),
-        RenderOptions::new().with_region(Region { x, y, width, height }),
-    ]
+    let middle = |size: (u32, u32)| {
+        let (x, y) = ((size.0 - width) / 2, (size.1 - height) / 2);
+        let region = Region { x, y, width, height };
+        RenderOptions::new().with_size(size.0, size.1).with_region(region)
+    };
+    let stored = (header.width, header.height);
+    let large = (stored.0 + stored.0 / 2 + 1, stored.1 + stored.1 / 3);
+    [RenderOptions::new().with_size(width, height), middle(stored), middle(large)]
 }
 
 /// The fast code gives the bits of the reference code, or refuses just as it does.
