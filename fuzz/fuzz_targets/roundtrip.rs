@@ -131,7 +131,8 @@ fn rendered<'a, T: Clone + Default>(
     picture: &Picture<'a>,
     render: impl Fn(&Picture<'a>, &RenderOptions, &mut [T]) -> Result<(), DecodeError>,
 ) -> Vec<T> {
-    let options = RenderOptions::new();
+    // The report is of the picture without texture.
+    let options = RenderOptions::new().with_texture(false);
     let mut samples = vec![T::default(); picture.output_len(&options).expect("small")];
     render(picture, &options, &mut samples).expect("within the default limits");
     samples
