@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
+use crate::contents::Contents;
 use crate::pictures::{self, PictureSet, TestPicture};
 use crate::store::Store;
 use crate::{gip, provenance};
@@ -33,6 +34,9 @@ pub(crate) struct Folders {
     /// Folder with screenshots, as .png, for `monotony`.
     #[arg(long, value_name = "DIR")]
     screens: Option<PathBuf>,
+    /// CSV with the columns picture and content, for means by class of content in `texture`.
+    #[arg(long, value_name = "CSV")]
+    content: Option<PathBuf>,
 }
 
 /// The pictures and settings of a run, and where its measurements are kept.
@@ -45,6 +49,8 @@ pub(crate) struct Bench {
     /// For the paper's fits at 2K.
     pub(crate) large: Vec<TestPicture>,
     pub(crate) screens: Vec<TestPicture>,
+    /// What the pictures show, as far as it is known.
+    pub(crate) contents: Contents,
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
@@ -76,6 +82,7 @@ impl Bench {
             photos: others(&folders.photos, QUICK_PICTURES)?,
             large: others(&folders.large, QUICK_LARGE_PICTURES)?,
             screens: others(&folders.screens, QUICK_LARGE_PICTURES)?,
+            contents: folders.content.as_deref().map_or(Ok(Contents::default()), Contents::load)?,
             quick,
             iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
             reference,
@@ -215,7 +222,13 @@ mod tests {
     use super::*;
 
     fn open(images: &Path, report: &Path) -> Result<Bench> {
-        let folders = Folders { kodak: images.into(), photos: None, large: None, screens: None };
+        let folders = Folders {
+            kodak: images.into(),
+            photos: None,
+            large: None,
+            screens: None,
+            content: None,
+        };
         Bench::new(&folders, report.into(), false, None, None)
     }
 

@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image_gip::{
-    ColorModel, Decoder, Encoder, RenderOptions, Report, Source, StreamDecoder, Threads, Tune,
+    ColorModel, Decoder, Encoded, Encoder, RenderOptions, Report, Source, StreamDecoder, Threads,
+    Tune,
 };
 
 use crate::memory;
@@ -15,6 +16,8 @@ use crate::table::median;
 pub(crate) const NAME: &str = "gip";
 /// The same for [`psnr_encoder`], beside the default.
 pub(crate) const PSNR_NAME: &str = "gip --tune psnr";
+/// The same for [`plain_encoder`].
+pub(crate) const PLAIN_NAME: &str = "gip --texture 0";
 /// The encoder's default effort, used wherever no other is named.
 pub(crate) const EFFORT: u8 = 4;
 /// All efforts.
@@ -46,6 +49,11 @@ pub(crate) fn psnr_encoder(effort: u8) -> Encoder {
     encoder(effort).with_tune(Tune::Psnr)
 }
 
+/// The same without texture, beside the default.
+pub(crate) fn plain_encoder(effort: u8) -> Encoder {
+    encoder(effort).with_texture(0)
+}
+
 /// Encodes a picture and measures the file.
 pub(crate) fn encode(
     encoder: Encoder,
@@ -62,8 +70,8 @@ pub(crate) fn encode(
 }
 
 /// Encodes a picture with all threads.
-pub(crate) fn file(encoder: Encoder, picture: &TestPicture) -> Result<Vec<u8>> {
-    Ok(encoder.with_threads(Threads::Pool).encode(&source(picture)?)?.bytes)
+pub(crate) fn file(encoder: Encoder, picture: &TestPicture) -> Result<Encoded> {
+    Ok(encoder.with_threads(Threads::Pool).encode(&source(picture)?)?)
 }
 
 fn source(picture: &TestPicture) -> Result<Source<'_>> {

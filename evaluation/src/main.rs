@@ -4,9 +4,11 @@ mod baselines;
 mod bench;
 mod canvas;
 mod comparison;
+mod contents;
 mod curve;
 mod gip;
 mod kernel_benchmark;
+mod local_statistics;
 mod memory;
 mod metric;
 mod pictures;
@@ -30,7 +32,7 @@ use bench::{Bench, Folders};
 use report::Section;
 use sections::{
     ablation, content, decode, monotony, printed, quality, rate, representation, sheet, speed,
-    stability,
+    stability, texture,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -45,7 +47,7 @@ struct Args {
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
-    /// Four pictures of each set and fewer settings: a quarter of an hour on two cores.
+    /// Four pictures of each set and fewer settings: twenty minutes on two cores.
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].
@@ -89,6 +91,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
+        Section::Texture => texture::measure(bench),
         Section::Printed => printed::measure(bench),
         Section::Quality => quality::measure(bench),
         Section::Sheet => sheet::measure(bench),

@@ -23,6 +23,8 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
+    /// Figures that see texture
+    Texture,
     /// Our curve on Kodak beside curves and codecs that papers print
     Printed,
     /// Whether the same quality looks the same on every picture
@@ -43,10 +45,11 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 11] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
+        Self::Texture,
         Self::Printed,
         Self::Quality,
         Self::Sheet,
@@ -62,6 +65,7 @@ impl Section {
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
+            Self::Texture => "Texture",
             Self::Printed => "Beside printed figures",
             Self::Quality => "Quality as asked for",
             Self::Sheet => "Contact sheets",

@@ -1,11 +1,14 @@
 //! What codecs show of a picture in files of the same size.
 
 use anyhow::{Context, Result};
-use image_gip::Threads;
+use image_gip::{Encoder, Report, Target, Threads};
 
 use crate::baselines::{BASELINES, Baseline, Worker};
 use crate::gip;
 use crate::pictures::TestPicture;
+
+/// The rates at which texture is looked at, in bits per pixel.
+pub(crate) const RATES: [f64; 4] = [0.15, 0.25, 0.5, 1.0];
 
 /// A picture as a codec shows it.
 #[derive(Clone, Debug)]
@@ -13,12 +16,22 @@ pub(crate) struct Version {
     /// Of the file.
     pub(crate) bytes: f64,
     pub(crate) samples: Vec<u8>,
+    /// Of our encoder, if it was asked for this.
+    pub(crate) report: Option<Report>,
 }
 
 impl Version {
+    /// Ours, at a rate in bits per pixel.
+    pub(crate) fn ours(encoder: Encoder, picture: &TestPicture, rate: f64) -> Result<Self> {
+        let encoder = encoder.with_target(Target::BitsPerPixel(rate));
+        let encoded = gip::file(encoder, picture)?;
+        Self::of_file(&encoded.bytes, Some(encoded.report))
+    }
+
     /// What a file of ours shows.
-    pub(crate) fn of_file(file: &[u8]) -> Result<Self> {
-        Ok(Self { bytes: file.len() as f64, samples: gip::decode(file, Threads::Pool)? })
+    pub(crate) fn of_file(file: &[u8], report: Option<Report>) -> Result<Self> {
+        let samples = gip::decode(file, Threads::Pool)?;
+        Ok(Self { bytes: file.len() as f64, samples, report })
     }
 
     /// A baseline's, at the quality whose file is nearest in size.
@@ -34,7 +47,7 @@ impl Version {
             |setting: &str| worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2]);
         let setting = nearest(&settings, bytes, |setting| Ok(trip(setting)?.bytes))?;
         let trip = trip(setting)?;
-        Ok(Self { bytes: trip.bytes, samples: trip.decoded })
+        Ok(Self { bytes: trip.bytes, samples: trip.decoded, report: None })
     }
 }
 

@@ -33,8 +33,9 @@ const RATES: &[Target] = &[
 ];
 
 /// Our encoder as it is by default, and then other ways to run it.
-pub(super) const OURS: [Variant; 2] = [
+pub(super) const OURS: [Variant; 3] = [
     Variant { name: gip::NAME, encoder: gip::encoder, targets: RATES },
+    Variant { name: gip::PLAIN_NAME, encoder: gip::plain_encoder, targets: RATES },
     Variant { name: gip::PSNR_NAME, encoder: gip::psnr_encoder, targets: RATES },
 ];
 

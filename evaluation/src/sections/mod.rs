@@ -26,4 +26,5 @@ mod residual_vq;
 pub(crate) mod sheet;
 pub(crate) mod speed;
 pub(crate) mod stability;
+pub(crate) mod texture;
 mod two_level;

@@ -27,8 +27,8 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut all = vec![Vec::new(); qualities.len()];
     let mut text = format!(
         "Compared with each other: pictures encoded with the same `--quality`, at effort {}. It is \
-         meant to be the SSIMULACRA2 of the file, and at most {TOLERANCE} from its mean on every \
-         picture.\n",
+         meant to be the SSIMULACRA2 of the picture without texture, which is what is measured here, \
+         and at most {TOLERANCE} from its mean on every picture.\n",
         gip::EFFORT
     );
     for set in &sets {
@@ -37,9 +37,10 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             let mut files: Vec<File> = Vec::new();
             for picture in &set.pictures {
                 let target = Target::Quality(quality);
-                let encoder = gip::encoder(gip::EFFORT).with_target(target);
+                let encoder = gip::plain_encoder(gip::EFFORT).with_target(target);
                 let setting = setting(target);
-                let point = store.ours(&bench.product, gip::NAME, &setting, encoder, picture)?;
+                let point =
+                    store.ours(&bench.product, gip::PLAIN_NAME, &setting, encoder, picture)?;
                 files.push((picture.name.clone(), point));
             }
             all.extend_from_slice(&files);

@@ -125,9 +125,9 @@ fn ours(bench: &Bench, picture: &TestPicture) -> Result<Version> {
     let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
     let file = bench.file(&name, || {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
-        gip::file(encoder, picture)
+        Ok(gip::file(encoder, picture)?.bytes)
     })?;
-    Version::of_file(&file)
+    Version::of_file(&file, None)
 }
 
 fn strip(picture: &TestPicture, shown: &[Shown], crop: Crop, side: u32) -> Strip {

@@ -1,0 +1,269 @@
+//! Texture: what figures that see it say, beside those that compare pixel by pixel.
+
+use std::array;
+
+use anyhow::Result;
+use image_gip::Encoder;
+
+use crate::bench::{Bench, timing_version};
+use crate::comparison::{Better, NamedFigures, better_than};
+use crate::contents::Contents;
+use crate::gip;
+use crate::local_statistics::{deviation_error, wasserstein_distortion};
+use crate::metric::Metric;
+use crate::pictures::{Distortion, PictureSet, TestPicture};
+use crate::store::Store;
+use crate::table::{Table, mean};
+use crate::versions::{self, RATES, Version};
+
+/// A name, and the encoder at an effort.
+type Ours = (&'static str, fn(u8) -> Encoder);
+/// With texture as by default, and without.
+const OURS: [Ours; 2] = [(gip::NAME, gip::encoder), (gip::PLAIN_NAME, gip::plain_encoder)];
+/// The baselines beside us.
+const OTHERS: [&str; 3] = ["AVIF", "JPEG XL", "WebP"];
+/// The codec beside ours in the table of single pictures.
+const RIVAL: usize = OURS.len();
+
+pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let mut store = FigureStore::open(bench)?;
+    let mut text = introduction();
+    for set in bench.sets() {
+        let codecs = codecs(bench, &mut store, &set)?;
+        for (index, rate) in RATES.iter().enumerate() {
+            text.push_str(&format!("\n### Texture: {}, {rate} bpp\n", set.name));
+            text.push_str(&means(&codecs, index));
+        }
+        text.push_str(&format!("\n### Local deviations by picture: {}\n", set.name));
+        text.push_str(&by_picture(&set, &codecs, &bench.contents));
+    }
+    Ok(text)
+}
+
+fn introduction() -> String {
+    format!(
+        "Ours, with texture as by default and without it, and {} at the setting whose file is \
+         nearest to ours in size. Texture is not the source's own, pixel by pixel; figures that \
+         compare pixels take it for noise, and take a smear for the better picture. Two figures \
+         compare what is around a place, of luma from 0 to 255, with Gaussian windows:\n\n\
+         - *Local deviations* (tex): the mean of |log2((d + 2) / (s + 2))| over pixels and three \
+         octaves, of the local deviations s of the source and d of the decoded picture. The octaves \
+         are differences of the picture blurred by 0, 1, 2 and 4 pixels (about 0.3, 0.15 and 0.08 \
+         cycles a pixel); a deviation is the root of the mean square in a window of 6, 8.5 and 12 \
+         pixels. 0 is as much texture everywhere as in the source, 1 is half or twice as much. The 2 \
+         keeps flat areas from counting.\n\
+         - *Wasserstein distortion* (wd): the picture at full size and halved one to three times; at \
+         each place the means and the deviations of its derivatives in four directions in a window \
+         of 4 pixels; the mean of the root of the squared differences of both, in levels of 255. What \
+         varies slowly is compared place by place, what varies fast by how much it varies.\n\n\
+         The other figures are those of the section about rate.\n",
+        OTHERS.join(", "),
+    )
+}
+
+/// What is measured of a file.
+#[derive(Clone, Copy, Debug)]
+struct Figures {
+    bytes: f64,
+    rate: f64,
+    distortion: Distortion,
+    /// The error of local deviations.
+    tex: f64,
+    /// The Wasserstein distortion.
+    wd: f64,
+    /// Gaussians of our texture, and its bytes in the file.
+    texture: [f64; 2],
+}
+
+impl Figures {
+    fn of(picture: &TestPicture, version: &Version) -> Result<Self> {
+        let (source, decoded, width) = (&picture.rgb, &version.samples, picture.width);
+        let report = version.report.as_ref();
+        Ok(Self {
+            bytes: version.bytes,
+            rate: picture.rate(version.bytes),
+            distortion: picture.distortion(decoded)?,
+            tex: deviation_error(source, decoded, width),
+            wd: wasserstein_distortion(source, decoded, width),
+            texture: report.map_or([0.0; 2], |report| {
+                [report.texture_gaussians.into(), report.texture_bytes as f64]
+            }),
+        })
+    }
+}
+
+/// `texture.csv`: figures of files by codec, rate asked for, and picture.
+struct FigureStore(Store<3, 11>);
+
+impl FigureStore {
+    fn open(bench: &Bench) -> Result<Self> {
+        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
+        let values = [
+            "bytes",
+            "bpp",
+            psnr,
+            ms_ssim,
+            ssimulacra2,
+            butteraugli,
+            cvvdp,
+            "tex",
+            "wd",
+            "texture_gaussians",
+            "texture_bytes",
+        ];
+        Ok(Self(bench.store("texture.csv", ["codec", "rate", "image"], values)?))
+    }
+
+    fn get(
+        &mut self,
+        version: &str,
+        codec: &str,
+        rate: f64,
+        picture: &TestPicture,
+        show: impl FnOnce() -> Result<Version>,
+    ) -> Result<Figures> {
+        let values = self.0.get(version, [codec, &format!("{rate} bpp"), &picture.name], || {
+            let figures = Figures::of(picture, &show()?)?;
+            let Figures { bytes, rate, distortion, tex, wd, texture } = figures;
+            let [gaussians, texture] = texture;
+            let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = distortion.values();
+            Ok([
+                bytes,
+                rate,
+                psnr,
+                ms_ssim,
+                ssimulacra2,
+                butteraugli,
+                cvvdp,
+                tex,
+                wd,
+                gaussians,
+                texture,
+            ])
+        })?;
+        let [bytes, rate, distortion @ .., tex, wd, gaussians, texture] = values;
+        let (distortion, texture) = (Distortion::from(distortion), [gaussians, texture]);
+        Ok(Figures { bytes, rate, distortion, tex, wd, texture })
+    }
+}
+
+/// A codec on all pictures of a set.
+struct Codec {
+    name: &'static str,
+    /// For each of [`RATES`], the figures of each picture.
+    figures: Vec<Vec<Figures>>,
+}
+
+/// [`OURS`], and then [`OTHERS`].
+fn codecs(bench: &mut Bench, store: &mut FigureStore, set: &PictureSet) -> Result<Vec<Codec>> {
+    let product = bench.product.clone();
+    let (worker, versions) = bench.baselines()?;
+    let beside = timing_version(&product, &versions);
+    let mut codecs = Vec::new();
+    for (name, encoder) in OURS {
+        let figures = at_rates(set, |_, rate, picture| {
+            store.get(&product, name, RATES[rate], picture, || {
+                Version::ours(encoder(gip::EFFORT), picture, RATES[rate])
+            })
+        })?;
+        codecs.push(Codec { name, figures });
+    }
+    for name in OTHERS {
+        let baseline = versions::baseline_called(name)?;
+        let figures = at_rates(set, |index, rate, picture| {
+            let bytes = codecs[0].figures[rate][index].bytes;
+            store.get(&beside, baseline.id, RATES[rate], picture, || {
+                Version::baseline(worker, baseline, picture, bytes)
+            })
+        })?;
+        codecs.push(Codec { name, figures });
+    }
+    Ok(codecs)
+}
+
+/// What `get` says, of the indices of picture and rate, for each rate and picture.
+fn at_rates(
+    set: &PictureSet,
+    mut get: impl FnMut(usize, usize, &TestPicture) -> Result<Figures>,
+) -> Result<Vec<Vec<Figures>>> {
+    (0..RATES.len())
+        .map(|rate| {
+            let pictures = set.pictures.iter().enumerate();
+            pictures.map(|(index, picture)| get(index, rate, picture)).collect()
+        })
+        .collect()
+}
+
+/// Means over the pictures at one rate, and who is better than ours.
+fn means(codecs: &[Codec], rate: usize) -> String {
+    let mut columns = vec!["codec", "bpp", "Gaussians of texture", "of the bytes", "tex", "wd"];
+    columns.extend(Metric::ALL.map(Metric::with_unit));
+    let mut table = Table::new(&columns);
+    let mut compared: Vec<NamedFigures> = Vec::new();
+    for Codec { name, figures } in codecs {
+        let figures = &figures[rate];
+        let of = |figure: fn(&Figures) -> f64| mean(figures.iter().map(figure)).unwrap_or(f64::NAN);
+        let (tex, wd) = (of(|file| file.tex), of(|file| file.wd));
+        let levels = Metric::ALL.map(|metric| {
+            let levels = figures.iter().map(|file| metric.level(&file.distortion));
+            metric.mean(levels).unwrap_or(f64::NAN)
+        });
+        let mut cells = vec![
+            (*name).to_owned(),
+            format!("{:.3}", of(|file| file.rate)),
+            format!("{:.0}", of(|file| file.texture[0])),
+            format!("{:.1} %", 100.0 * of(|file| file.texture[1] / file.bytes)),
+            format!("{tex:.3}"),
+            format!("{wd:.2}"),
+        ];
+        cells.extend(Metric::ALL.iter().zip(levels).map(|(metric, level)| metric.cell(level)));
+        table.row(&cells);
+        compared.push(((*name).to_owned(), [&[tex, wd], &levels[..]].concat()));
+    }
+    let mut figures = vec![("tex", Better::Lower), ("wd", Better::Lower)];
+    figures.extend(Metric::ALL.map(|metric| (metric.name(), Better::Higher)));
+    format!("{}{}", table.finish(), better_than(&figures, &compared[0], &compared[1..]))
+}
+
+/// The error of local deviations of each picture, and means by content.
+fn by_picture(set: &PictureSet, codecs: &[Codec], contents: &Contents) -> String {
+    let mut columns = vec!["picture".to_owned(), "content".to_owned()];
+    columns.extend(RATES.map(|rate| format!("{rate} bpp")));
+    let mut table = Table::new(&columns);
+    // Of the pictures with these indices, for each rate.
+    let cells = |indices: &[usize]| {
+        array::from_fn::<_, { RATES.len() }, _>(|rate| {
+            let [ours, plain, rival] = [0, 1, RIVAL].map(|codec| {
+                let all = &codecs[codec].figures[rate];
+                mean(indices.iter().map(|&index| all[index].tex)).unwrap_or(f64::NAN)
+            });
+            format!("{ours:.3} / {plain:.3} / {rival:.3} ({:.0} %)", 100.0 * ours / plain)
+        })
+    };
+    let names: Vec<&str> = set.pictures.iter().map(|picture| picture.name.as_str()).collect();
+    for (index, name) in names.iter().enumerate() {
+        let mut row = vec![(*name).to_owned(), contents.of(name).to_owned()];
+        row.extend(cells(&[index]));
+        table.row(&row);
+    }
+    let mut classes: Vec<&str> = names.iter().map(|name| contents.of(name)).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    for class in classes.into_iter().filter(|class| !class.is_empty()) {
+        let all = 0..names.len();
+        let indices: Vec<usize> = all.filter(|&index| contents.of(names[index]) == class).collect();
+        let mut row = vec!["**mean**".to_owned(), class.to_owned()];
+        row.extend(cells(&indices));
+        table.row(&row);
+    }
+    let mut row = vec!["**mean**".to_owned(), "all".to_owned()];
+    row.extend(cells(&(0..names.len()).collect::<Vec<_>>()));
+    table.row(&row);
+    format!(
+        "\n{} / {} / {}, and the first as a share of the second:\n{}",
+        codecs[0].name,
+        codecs[1].name,
+        codecs[RIVAL].name,
+        table.finish()
+    )
+}
