@@ -42,6 +42,10 @@ impl Canvas {
         }
     }
 
+    pub(crate) fn save_png(&self, path: &Path) -> Result<()> {
+        self.0.save(path).with_context(|| format!("cannot write {}", path.display()))
+    }
+
     pub(crate) fn save_jpeg(&self, path: &Path, quality: u8) -> Result<()> {
         let file =
             File::create(path).with_context(|| format!("cannot write {}", path.display()))?;

@@ -2,6 +2,7 @@
 
 mod baselines;
 mod bench;
+mod blind;
 mod canvas;
 mod comparison;
 mod contents;
@@ -26,9 +27,10 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use clap::Parser;
+use clap::{Parser, Subcommand};
 
 use bench::{Bench, Folders};
+use blind::{choices, triplets};
 use report::Section;
 use sections::{
     ablation, content, decode, monotony, printed, quality, rate, representation, sheet, speed,
@@ -41,9 +43,26 @@ use sections::{
 /// Nothing is measured twice on the same machine with the same version of the codec: an interrupted
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
-struct Args {
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct Cli {
     #[command(flatten)]
-    folders: Folders,
+    folders: Option<Folders>,
+    #[command(flatten)]
+    report: Option<Args>,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// What there is to do besides the report: the blind choice.
+#[derive(Debug, Subcommand)]
+enum Command {
+    Triplets(triplets::Args),
+    Choices(choices::Args),
+}
+
+/// What to measure, beside the pictures.
+#[derive(Debug, clap::Args)]
+struct Args {
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
@@ -67,12 +86,22 @@ struct Args {
 }
 
 fn main() -> Result<()> {
+    let Cli { folders, report, command } = Cli::parse();
+    match command {
+        Some(Command::Triplets(args)) => triplets::make(&args),
+        Some(Command::Choices(args)) => choices::print(&args),
+        None => {
+            let (folders, args) = folders.zip(report).expect("both have arguments that it needs");
+            write_report(&folders, args)
+        }
+    }
+}
+
+fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
-    let args = Args::parse();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench =
-        Bench::new(&args.folders, args.out, args.quick, args.iterations, args.reference)?;
+    let mut bench = Bench::new(folders, args.out, args.quick, args.iterations, args.reference)?;
     bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {
@@ -110,10 +139,15 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Args::command().debug_assert();
+        Cli::command().debug_assert();
         let args = ["evaluation", "--kodak", "a", "--out", "b", "--only", "rate"];
-        let args = Args::try_parse_from(args).expect("it is as the README has it");
-        assert_eq!(args.only, [Section::Rate]);
-        assert!(Args::try_parse_from(["evaluation", "--kodak", "a"]).is_err());
+        let cli = Cli::try_parse_from(args).expect("it is as the README has it");
+        assert_eq!(cli.report.expect("a report is asked for").only, [Section::Rate]);
+        assert!(Cli::try_parse_from(["evaluation", "--kodak", "a"]).is_err());
+        let args = ["evaluation", "triplets", "--pictures", "a", "--pictures", "b", "--out", "c"];
+        let cli = Cli::try_parse_from(args).expect("it is as the README has it");
+        assert!(matches!(cli.command, Some(Command::Triplets(_))));
+        let cli = Cli::try_parse_from(["evaluation", "choices", "a"]);
+        assert!(matches!(cli.expect("as the README has it").command, Some(Command::Choices(_))));
     }
 }

@@ -23,7 +23,7 @@ pub(crate) enum Section {
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
-    /// Figures that see texture
+    /// Figures that see texture, and the blind choice
     Texture,
     /// Our curve on Kodak beside curves and codecs that papers print
     Printed,

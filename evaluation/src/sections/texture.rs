@@ -1,4 +1,5 @@
-//! Texture: what figures that see it say, beside those that compare pixel by pixel.
+//! Texture: what figures that see it say, beside those that compare pixel by pixel, and what people
+//! chose.
 
 use std::array;
 
@@ -6,6 +7,7 @@ use anyhow::Result;
 use image_gip::Encoder;
 
 use crate::bench::{Bench, timing_version};
+use crate::blind::choices;
 use crate::comparison::{Better, NamedFigures, better_than};
 use crate::contents::Contents;
 use crate::gip;
@@ -24,6 +26,8 @@ const OURS: [Ours; 2] = [(gip::NAME, gip::encoder), (gip::PLAIN_NAME, gip::plain
 const OTHERS: [&str; 3] = ["AVIF", "JPEG XL", "WebP"];
 /// The codec beside ours in the table of single pictures.
 const RIVAL: usize = OURS.len();
+/// The name of the report's folder with the rounds of the blind choice.
+const ROUNDS: &str = "blind";
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut store = FigureStore::open(bench)?;
@@ -36,6 +40,14 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         }
         text.push_str(&format!("\n### Local deviations by picture: {}\n", set.name));
         text.push_str(&by_picture(&set, &codecs, &bench.contents));
+    }
+    let rounds = choices::report(&bench.path(ROUNDS))?;
+    if !rounds.is_empty() {
+        text.push_str(&format!(
+            "\n### The blind choice\n\nViewers saw an original between two versions of it, in files \
+             of equal size, and did not know what was compared: which one is nearer to the original \
+             in a normal look?\n{rounds}"
+        ));
     }
     Ok(text)
 }
