@@ -351,7 +351,7 @@ fn gains_at(point: vec2<i32>, octave: i32) -> vec3<f32> {
 
 // Three odd numbers from -1023 to 1023 for a block of a pattern.
 fn numbers(block: vec2<i32>, pattern: i32, octave: i32) -> vec3<f32> {
-    var seed = 16u * bitcast<u32>(block.y) + u32(4 * pattern + octave);
+    var seed = 16u * bitcast<u32>(block.y) + u32(4 * pattern + octave + 1);
     seed = (seed ^ (seed >> 16u)) * 0x21f0aaadu;
     seed = (seed ^ (seed >> 15u)) * 0x735a2d97u;
     seed ^= seed >> 15u;

@@ -127,7 +127,8 @@ impl Pattern {
 
     /// The seed of a row of blocks.
     fn seed(self, row: i32) -> u32 {
-        let pattern = self.kind * (OCTAVES + 1) + self.octave;
+        // From 1 on: the hash of 0 is 0.
+        let pattern = self.kind * (OCTAVES + 1) + self.octave + 1;
         let mut hash = (row as u32).wrapping_mul(16).wrapping_add(pattern as u32);
         hash = (hash ^ (hash >> 16)).wrapping_mul(0x21F0_AAAD);
         hash = (hash ^ (hash >> 15)).wrapping_mul(0x735A_2D97);

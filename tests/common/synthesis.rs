@@ -104,7 +104,7 @@ pub(crate) struct Block {
 
 impl Block {
     pub(crate) fn new(octave: usize, pattern: usize, x: i64, y: i64) -> Self {
-        let k = 4 * pattern as u32 + octave as u32;
+        let k = 4 * pattern as u32 + octave as u32 + 1;
         let mut s = ((16 * y) as u32).wrapping_add(k);
         s = (s ^ (s >> 16)).wrapping_mul(0x21F0_AAAD);
         s = (s ^ (s >> 15)).wrapping_mul(0x735A_2D97);
