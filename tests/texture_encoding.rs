@@ -49,7 +49,9 @@ fn texture(file: &[u8]) -> (u32, u64) {
     let mut stream = StreamDecoder::new();
     stream.feed(file).expect("a sound file");
     let chunk = stream.chunks().iter().find(|chunk| chunk.kind == ChunkType::TXTR);
-    (stream.texture().len() as u32, chunk.map_or(0, |chunk| chunk.bytes))
+    let map = stream.picture().and_then(|picture| picture.texture_map());
+    let gaussians = map.map_or(0, |map| map.gaussians().len() as u32);
+    (gaussians, chunk.map_or(0, |chunk| chunk.bytes))
 }
 
 /// The deviation of the differences of neighbours in some rows.

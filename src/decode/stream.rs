@@ -17,7 +17,6 @@ use crate::orientation::Orientation;
 use crate::render::Picture;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
-use crate::texture::Texture;
 use crate::threads::Threads;
 
 /// Decodes bytes as they arrive, in pieces of any size, and does no I/O.
@@ -230,15 +229,6 @@ impl StreamDecoder {
     #[must_use]
     pub fn gaussians(&self) -> &[Gaussian] {
         &self.chunks.gaussians
-    }
-
-    /// The Gaussians of the texture's map, in file order: see [`Picture`]. Empty for a picture without
-    /// texture, and until it has arrived. Their pixels are the map's nodes, one for every eight pixels of the
-    /// picture along each axis; their colours are the amplitudes of three octaves, and the direction (spec,
-    /// section 9.7).
-    #[must_use]
-    pub fn texture(&self) -> &[Gaussian] {
-        self.chunks.texture.as_ref().map_or(&[], Texture::gaussians)
     }
 
     /// The number of Gaussians in each layer that has arrived, in file order.

@@ -117,8 +117,9 @@ impl<'a> Verified<'a> {
     pub(crate) fn texture(&self) -> TextureCost {
         let of_texture = |chunk: &&ChunkStatistics| chunk.kind == ChunkType::TXTR;
         let chunks = self.stream.chunks().iter().find(of_texture);
+        let map = self.picture().texture_map();
         TextureCost {
-            gaussians: self.stream.texture().len() as u32,
+            gaussians: map.map_or(0, |map| map.gaussians().len() as u32),
             bytes: chunks.map_or(0, |chunks| chunks.bytes),
         }
     }

@@ -135,7 +135,8 @@ impl FileInfo {
         let chunks = stream.chunks();
         let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::GAUS);
         let texture = chunks.iter().find(|chunk| chunk.kind == ChunkType::TXTR).map(|chunk| {
-            let gaussians = stream.texture().len();
+            let map = stream.picture().and_then(|picture| picture.texture_map());
+            let gaussians = map.map_or(0, |map| map.gaussians().len());
             let bits_per_gaussian = chunk.bytes as f64 * 8.0 / gaussians.max(1) as f64;
             Texture { gaussians, bytes: chunk.bytes, bits_per_gaussian }
         });
