@@ -4,7 +4,7 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-#[cfg(feature = "std")]
+#[cfg(all(feature = "std", not(any(target_arch = "x86", target_arch = "x86_64"))))]
 use fearless_simd::dispatch;
 
 use super::tile::TileTexture;
@@ -192,15 +192,21 @@ impl TextureRow {
         top: u32,
     ) -> Option<TileTexture<'a>> {
         match backend {
-            Backend::Reference(_) => self.prepare_with(view, top, Plain),
-            #[cfg(feature = "std")]
+            // The code is long, so it is compiled for few levels: the others of x86 are near to the plain code.
+            #[cfg(all(feature = "std", any(target_arch = "x86", target_arch = "x86_64")))]
+            Backend::Simd(level) => match (level.as_avx512(), level.as_avx2()) {
+                (Some(avx512), _) => self.prepare_with(view, top, Vectors(avx512)),
+                (_, Some(avx2)) => self.prepare_with(view, top, Vectors(avx2)),
+                _ => self.prepare_with(view, top, Plain),
+            },
+            #[cfg(all(feature = "std", not(any(target_arch = "x86", target_arch = "x86_64"))))]
             Backend::Simd(level) => {
                 dispatch!(level, simd => self.prepare_with(view, top, Vectors(simd)))
             }
+            Backend::Reference(_) => self.prepare_with(view, top, Plain),
         }
     }
 
-    #[inline(always)]
     fn prepare_with<'a>(
         &'a mut self,
         view: &TextureView,

@@ -105,7 +105,6 @@ impl NodeMap {
 
     /// Finds the cells of a row that can have texture, as ranges of at most `most` cells: all that have a
     /// node with an amplitude within one cell from them.
-    #[inline(always)]
     pub(super) fn cells_that_show(
         &self,
         row: i32,

@@ -141,5 +141,6 @@ impl Pattern {
 fn numbers(block: i32, seed: u32) -> [f32; 3] {
     let mut hash = (block as u32).wrapping_mul(0x9E37_79B1).wrapping_add(seed);
     hash = (hash ^ (hash >> 15)).wrapping_mul(0x2C1B_3C6D);
-    [hash >> 2 & 1023, hash >> 12 & 1023, hash >> 22].map(|bits| (2 * bits as i32 - 1023) as f32)
+    let (a, b, c) = (hash >> 2 & 1023, hash >> 12 & 1023, hash >> 22);
+    [(2 * a as i32 - 1023) as f32, (2 * b as i32 - 1023) as f32, (2 * c as i32 - 1023) as f32]
 }

@@ -22,7 +22,6 @@ const QUARTER: usize = FULL / 4;
 
 /// Sets the texture of cells in row `row`, which are given by their columns: [`CELL`] rows of `stride`
 /// values, of which the first is that of the first cell. Returns whether any of them can be other than 0.
-#[inline(always)]
 pub(crate) fn make_cells(
     map: &NodeMap,
     row: i32,
@@ -33,22 +32,16 @@ pub(crate) fn make_cells(
 ) -> bool {
     out.fill(0.0);
     let mut shows = false;
-    map.cells_that_show(
-        row,
-        cells.clone(),
-        CELLS,
-        #[inline(always)]
-        |part| {
-            shows = true;
-            let x = (part.start - cells.start) as usize * CELL;
-            make_part(map, row, part, &mut out[x..], stride, arithmetic);
-        },
-    );
+    map.cells_that_show(row, cells.clone(), CELLS, |part| {
+        shows = true;
+        let x = (part.start - cells.start) as usize * CELL;
+        make_part(map, row, part, &mut out[x..], stride, arithmetic);
+    });
     shows
 }
 
-/// That of at most [`CELLS`] cells.
-#[inline(always)]
+/// That of at most [`CELLS`] cells. Each of its steps is vectorized as a function of its own, which bounds what a
+/// compiler has to make of it.
 fn make_part(
     map: &NodeMap,
     row: i32,
@@ -60,9 +53,14 @@ fn make_part(
     // It is even, so that the blocks of all lattices begin there.
     let first = (cells.start - 1) & !1;
     let mut gains = [[[[0.0; NODES]; PATTERNS]; OCTAVES]; NODE_ROWS];
-    for (row, gains) in (row - 1..).zip(&mut gains) {
-        map.gains(row, first, gains);
-    }
+    arithmetic.run(
+        #[inline(always)]
+        || {
+            for (row, gains) in (row - 1..).zip(&mut gains) {
+                map.gains(row, first, gains);
+            }
+        },
+    );
     let shows = core::array::from_fn(|octave| gains.each_ref().map(|gains| shows(&gains[octave])));
     let part = Part { gains, shows, row, first };
     let mut full = [[0.0; FULL]; CELL];
@@ -71,20 +69,41 @@ fn make_part(
         let mut half = [[0.0; HALF]; 6];
         if part.has(2) {
             let mut quarter = [[0.0; QUARTER]; 4];
-            part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
-            for (index, line) in half.iter_mut().enumerate() {
-                // The row above the cells is the lower half of a coarser row.
-                let [near, far] = around(index + 1).map(|row| &quarter[row]);
-                arithmetic.enlarge(near, far, line);
-            }
+            arithmetic.run(
+                #[inline(always)]
+                || {
+                    part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
+                    for (index, line) in half.iter_mut().enumerate() {
+                        // The row above the cells is the lower half of a coarser row.
+                        let [near, far] = around(index + 1);
+                        arithmetic.enlarge(&quarter[near], &quarter[far], line);
+                    }
+                },
+            );
         }
-        part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
-        for (index, line) in full.iter_mut().enumerate() {
-            let [near, far] = around(index + 2).map(|row| &half[row]);
-            arithmetic.enlarge(near, far, line);
-        }
+        arithmetic.run(
+            #[inline(always)]
+            || {
+                part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
+                for (index, line) in full.iter_mut().enumerate() {
+                    let [near, far] = around(index + 2);
+                    arithmetic.enlarge(&half[near], &half[far], line);
+                }
+            },
+        );
     }
-    part.add_octave(0, CELL as i32 * row, &mut full, |left, change| arithmetic.ramp(left, change));
+    arithmetic.run(
+        #[inline(always)]
+        || {
+            part.add_octave(
+                0,
+                CELL as i32 * row,
+                &mut full,
+                #[inline(always)]
+                |left, change| arithmetic.ramp(left, change),
+            );
+        },
+    );
     let (x, width) = ((cells.start - first) as usize * CELL, cells.len() * CELL);
     for (line, full) in out.chunks_mut(stride).zip(&full) {
         line[..width].copy_from_slice(&full[x..x + width]);
