@@ -76,7 +76,7 @@ class GipImageFile(ImageFile.ImageFile):
 
     @property
     def texture(self) -> bool:
-        """Whether the texture of the picture is rendered: the noise in place of sand, water or leaves.
+        """Whether texture is rendered: the noise in place of sand, water or leaves.
 
         It can be set until the picture is loaded.
         """
