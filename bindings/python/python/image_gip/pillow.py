@@ -72,7 +72,12 @@ class GipImageFile(ImageFile.ImageFile):
 
     def _set_size(self, size: tuple[int, int], *, is_draft: bool) -> None:
         self._size = size
-        self.tile = [ImageFile._Tile("gip", (0, 0, *size), 0, (is_draft, self._texture))]
+        self._is_draft = is_draft
+        self._set_tile()
+
+    def _set_tile(self) -> None:
+        arguments = (self._is_draft, self._texture)
+        self.tile = [ImageFile._Tile("gip", (0, 0, *self._size), 0, arguments)]
 
     @property
     def texture(self) -> bool:
@@ -87,8 +92,7 @@ class GipImageFile(ImageFile.ImageFile):
         if not self.tile:
             raise ValueError("the picture is loaded already")
         self._texture = bool(texture)
-        ((name, extents, offset, (is_draft, _)),) = self.tile
-        self.tile = [ImageFile._Tile(name, extents, offset, (is_draft, self._texture))]
+        self._set_tile()
 
     def draft(
         self, mode: str | None, size: tuple[int, int] | None
