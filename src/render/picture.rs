@@ -196,8 +196,8 @@ impl<'a> Picture<'a> {
         let count = options.prefix.map_or(self.gaussians.len(), |count| count as usize);
         let gaussians = &self.gaussians[..count.min(self.gaussians.len())];
         let input = RenderInput { gaussians, view, kernel: self.header.kernel };
-        let texture = match self.texture.filter(|_| options.texture) {
-            Some(texture) => self.texture_view(texture, &view, options)?,
+        let texture = match self.texture_map().filter(|_| options.texture) {
+            Some(map) => self.texture_view(&map, &view, options)?,
             None => None,
         };
         PreparedRender::new(
@@ -210,25 +210,24 @@ impl<'a> Picture<'a> {
             options,
         )
     }
-    /// The texture of a view, for which the map is rendered like a picture.
+    /// The texture of a view, for which the map is rendered.
     fn texture_view(
         &self,
-        texture: &Texture,
+        map: &Picture<'_>,
         view: &View,
         options: &RenderOptions,
     ) -> Result<Option<TextureView>, DecodeError> {
-        let map = texture.header();
         // Its size follows that of the picture, which was checked.
         let (max_width, max_height, max_pixels) = (u32::MAX, u32::MAX, u64::MAX);
         let limits = Limits { max_width, max_height, max_pixels, ..self.limits.clone() };
-        let sides = [self.header, map].map(|header| [header.width, header.height]);
+        let sides = [self.header, map.header].map(|header| [header.width, header.height]);
         TextureView::new(sides[0], sides[1], view, |nodes| {
-            let samples = nodes.pixels() * map.color.channels() as u64;
+            let samples = nodes.pixels() * map.header.color.channels() as u64;
             let memory = self.decoder_memory + samples * size_of::<f32>() as u64;
             limits.check_memory(memory)?;
             let mut sums = vec![0.0; samples as usize];
-            let picture = Picture::new(map, texture.gaussians(), &limits, memory);
-            picture.render_planes(&options.for_map(nodes), &mut sums)?;
+            let map = Picture { limits: &limits, decoder_memory: memory, ..*map };
+            map.render_planes(&options.for_map(nodes), &mut sums)?;
             Ok(sums)
         })
     }

@@ -32,8 +32,6 @@ pub(super) struct PreparedRender<'a> {
     averaging: Option<Averaging>,
     /// The number of channels of the picture.
     channels: usize,
-    /// Whether the last of them is alpha.
-    has_alpha: bool,
     /// For each channel of the output the plane that it is copied from; see [`output::sources`].
     pub(super) sources: &'static [Option<usize>],
     base: [f32; 4],
@@ -74,7 +72,6 @@ impl<'a> PreparedRender<'a> {
             texture,
             averaging,
             channels: header.color.channels(),
-            has_alpha: header.color.has_alpha(),
             sources: output::sources(header.color, color),
             base: header.base(),
             backend: options.backend,
@@ -236,7 +233,6 @@ impl<'a> PreparedRender<'a> {
                     origin,
                     base,
                     texture: texture.map(|row| row.from(column * TILE_WIDTH)),
-                    has_alpha: self.has_alpha,
                     blocks,
                     splats: lists.splats(column),
                     kernel: self.input.kernel,

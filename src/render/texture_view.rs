@@ -26,14 +26,13 @@ pub(super) struct TextureView {
     map: NodeMap,
     /// The columns of cells that the output needs.
     cells: Range<i32>,
-    columns: Sampling,
     rows: Sampling,
     /// The columns of the grid, and its first row.
     grid: Range<u32>,
     top: u32,
     /// For each of them the first of its taps, counted from the first pixel of the cells, and their weights;
-    /// empty where the grid is that of the stored pixels.
-    taps: Vec<(u32, [f32; TAPS])>,
+    /// `None` where the columns of the grid are those of the stored pixels.
+    taps: Option<Vec<(u32, [f32; TAPS])>>,
 }
 
 /// How the pixels of a grid along an axis follow from the stored ones.
@@ -41,8 +40,15 @@ pub(super) struct TextureView {
 enum Sampling {
     /// They are the same.
     Stored,
-    /// There are more of them. The sides are in pixels.
-    Cubic { stored: u32, grid: u32 },
+    /// There are more of them.
+    Cubic(Cubic),
+}
+
+/// An interpolation. The sides are in pixels.
+#[derive(Clone, Copy, Debug)]
+struct Cubic {
+    stored: u32,
+    grid: u32,
 }
 
 impl TextureView {
@@ -64,7 +70,7 @@ impl TextureView {
         }
         let [columns, rows] = [0, 1].map(|axis| {
             let (stored, grid) = (sides[axis], view.axes[axis].grid());
-            if grid > stored { Sampling::Cubic { stored, grid } } else { Sampling::Stored }
+            if grid > stored { Sampling::Cubic(Cubic { stored, grid }) } else { Sampling::Stored }
         });
         let Region { x, y, width, height } = view.region;
         let grid = x..x + width;
@@ -84,21 +90,21 @@ impl TextureView {
         };
         let map = NodeMap::new(nodes, render(nodes)?, fade);
         let taps = match columns {
-            Sampling::Stored => Vec::new(),
-            Sampling::Cubic { .. } => grid
-                .clone()
-                .map(|column| {
-                    let (first, weights) = columns.taps(column);
+            Sampling::Stored => None,
+            Sampling::Cubic(cubic) => {
+                let taps = grid.clone().map(|column| {
+                    let (first, weights) = cubic.taps(column);
                     ((first - cells.start * CELL as i32) as u32, weights)
-                })
-                .collect(),
+                });
+                Some(taps.collect())
+            }
         };
-        Ok(Some(Self { map, cells, columns, rows, grid, top: y, taps }))
+        Ok(Some(Self { map, cells, rows, grid, top: y, taps }))
     }
 
     /// Bytes of memory that it holds, and that each thread needs.
     pub(super) fn memory(&self) -> (u64, u64) {
-        let taps = size_of_val(&self.taps[..]);
+        let taps = self.taps.as_ref().map_or(0, |taps| size_of_val(&taps[..]));
         let values =
             self.cell_rows() * CELL * self.width() + self.width() + TILE_HEIGHT * self.stride();
         (self.map.memory() + taps as u64, (values * size_of::<f32>()) as u64)
@@ -110,13 +116,13 @@ impl TextureView {
             Sampling::Stored if self.top.is_multiple_of(CELL as u32) => 1,
             Sampling::Stored => 2,
             // Eleven rows of pixels.
-            Sampling::Cubic { .. } => 3,
+            Sampling::Cubic(_) => 3,
         }
     }
 
     /// Whether rows of tiles are rows of cells.
     fn is_of_cells(&self) -> bool {
-        matches!(self.columns, Sampling::Stored) && self.cell_rows() == 1
+        self.taps.is_none() && self.cell_rows() == 1
     }
 
     /// Stored pixels in a row of the cells.
@@ -140,17 +146,18 @@ impl Sampling {
     fn stored(self, grid: Range<u32>) -> Range<i32> {
         match self {
             Self::Stored => grid.start as i32..grid.end as i32,
-            Self::Cubic { .. } => self.taps(grid.start).0..self.taps(grid.end - 1).0 + TAPS as i32,
+            Self::Cubic(cubic) => {
+                cubic.taps(grid.start).0..cubic.taps(grid.end - 1).0 + TAPS as i32
+            }
         }
     }
+}
 
-    /// The first of the stored pixels that a pixel of a finer grid is interpolated from, and the weights of
+impl Cubic {
+    /// The first of the stored pixels that a pixel of the grid is interpolated from, and the weights of
     /// Catmull and Rom.
     fn taps(self, pixel: u32) -> (i32, [f32; TAPS]) {
-        let Self::Cubic { stored, grid } = self else {
-            return (pixel as i32 - 1, [0.0, 1.0, 0.0, 0.0]);
-        };
-        let (stored, grid) = (i64::from(stored), i64::from(grid));
+        let (stored, grid) = (i64::from(self.stored), i64::from(self.grid));
         let place = (2 * i64::from(pixel) + 1) * stored - grid;
         let t = place.rem_euclid(2 * grid) as f32 / (2 * grid) as f32;
         let weights = [
@@ -247,8 +254,8 @@ impl TextureRow {
         for (row, line) in grid.zip(self.values.chunks_exact_mut(stride)) {
             let values = match view.rows {
                 Sampling::Stored => stored(row as i32),
-                Sampling::Cubic { .. } => {
-                    let (first, weights) = view.rows.taps(row);
+                Sampling::Cubic(cubic) => {
+                    let (first, weights) = cubic.taps(row);
                     let rows = [0, 1, 2, 3].map(|tap| stored(first + tap));
                     for (column, mixed) in self.mixed.iter_mut().enumerate() {
                         *mixed = interpolated(rows.map(|row| row[column]), weights);
@@ -257,10 +264,10 @@ impl TextureRow {
                 }
             };
             let line = &mut line[..view.grid.len()];
-            match view.columns {
-                Sampling::Stored => line.copy_from_slice(&values[first..][..view.grid.len()]),
-                Sampling::Cubic { .. } => {
-                    for (value, &(first, weights)) in line.iter_mut().zip(&view.taps) {
+            match &view.taps {
+                None => line.copy_from_slice(&values[first..][..view.grid.len()]),
+                Some(taps) => {
+                    for (value, &(first, weights)) in line.iter_mut().zip(taps) {
                         let taps = values[first as usize..].first_chunk();
                         *value = interpolated(*taps.expect("the cells hold all taps"), weights);
                     }

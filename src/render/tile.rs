@@ -50,8 +50,6 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
     pub(crate) base: [f32; CHANNELS],
     /// What is added to the colours.
     pub(crate) texture: Option<TileTexture<'a>>,
-    /// Whether the last channel is no colour.
-    pub(crate) has_alpha: bool,
     /// All splats of the band.
     pub(crate) blocks: &'a [Block],
     /// The splats that are added to this tile, in file order.
@@ -60,6 +58,9 @@ pub(crate) struct Tile<'a, const CHANNELS: usize> {
 }
 
 impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
+    /// The channels that texture is added to: gray, or red, green and blue. What is more is alpha.
+    const COLORS: usize = if CHANNELS < 3 { 1 } else { 3 };
+
     /// Renders the tile into the first half (0) or the second half (1) of the planes of a pair.
     pub(crate) fn render(&self, backend: Backend, half: usize, planes: &mut [PairPlane; CHANNELS]) {
         let left = half * TILE_WIDTH;
@@ -77,17 +78,12 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
         }
     }
 
-    /// The number of channels that texture is added to.
-    fn colors(&self) -> usize {
-        CHANNELS - usize::from(self.has_alpha)
-    }
-
     fn render_scalar(&self, left: usize, planes: &mut [PairPlane; CHANNELS]) {
         for (plane, base) in planes.iter_mut().zip(self.base) {
             plane.iter_mut().for_each(|row| row[left..][..TILE_WIDTH].fill(base));
         }
         if let Some(texture) = self.texture {
-            for plane in planes.iter_mut().take(self.colors()) {
+            for plane in planes.iter_mut().take(Self::COLORS) {
                 for (row, texture) in plane.iter_mut().zip(texture.rows()) {
                     for (sum, texture) in row[left..].iter_mut().zip(texture) {
                         *sum += texture;
@@ -138,7 +134,7 @@ impl<const CHANNELS: usize> Tile<'_, CHANNELS> {
             for row in 0..TILE_HEIGHT / VECTOR_ROWS {
                 if let (Some(upper), Some(lower)) = (rows.next(), rows.next()) {
                     let texture = upper.combine(lower);
-                    for sums in sums.iter_mut().take(self.colors()) {
+                    for sums in sums.iter_mut().take(Self::COLORS) {
                         sums[row] += texture;
                     }
                 }
@@ -241,7 +237,6 @@ mod tests {
                 origin: (origin.0 + (half * TILE_WIDTH) as u32, origin.1),
                 base,
                 texture: (half == 1).then_some(texture),
-                has_alpha: CHANNELS.is_multiple_of(2),
                 blocks: &blocks,
                 splats,
                 kernel,
