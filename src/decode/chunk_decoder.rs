@@ -302,12 +302,13 @@ impl ChunkDecoder {
     /// Decodes the texture, if there is memory for it and for all Gaussians.
     fn insert_texture(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
         let Some(header) = &self.header else { return Ok(()) };
-        let count = Texture::count(payload, header)?;
-        self.limits.check_gaussians(count)?;
-        let texture = payload.len() as u64 + u64::from(count) * size_of::<Gaussian>() as u64;
-        let layers = Self::memory_of_layers(header);
-        self.limits.check_memory(self.preamble_memory() + layers + texture)?;
-        self.texture = Some(Texture::parse(payload, header)?);
+        let texture = Texture::parse(payload, header, |count| {
+            self.limits.check_gaussians(count)?;
+            let texture = payload.len() as u64 + u64::from(count) * size_of::<Gaussian>() as u64;
+            let layers = Self::memory_of_layers(header);
+            self.limits.check_memory(self.preamble_memory() + layers + texture)
+        })?;
+        self.texture = Some(texture);
         Ok(())
     }
 

@@ -3,8 +3,6 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use byteorder::{ByteOrder, LittleEndian};
-
 use super::map;
 use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
@@ -16,8 +14,6 @@ use crate::gaussian::Gaussian;
 
 /// The steps of position, size, ratio and slant.
 const GEOMETRY: [f32; 4] = [1.095_445_1, 0.774_596_7, 0.866_025_4, 1.732_050_8];
-/// Bytes of the colour step, which precedes the layer.
-const STEP_BYTES: usize = size_of::<f32>();
 
 /// The texture of a picture: the Gaussians of its map.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,35 +24,28 @@ pub(crate) struct Texture {
 }
 
 impl Texture {
-    /// Reads the number of Gaussians in a payload, of which a map has at most as many as nodes.
+    /// Reads a payload. `check` decides whether so many Gaussians may be decoded.
     ///
     /// # Errors
-    /// When the payload is too short, or declares too many.
-    pub(crate) fn count(payload: &[u8], picture: &Header) -> Result<u32, DecodeError> {
+    /// When the payload is malformed or has more Gaussians than the map has nodes, and those of `check`.
+    pub(crate) fn parse(
+        payload: &[u8],
+        picture: &Header,
+        check: impl FnOnce(u32) -> Result<(), DecodeError>,
+    ) -> Result<Self, DecodeError> {
         let malformed = |reason| DecodeError::malformed(ChunkType::TXTR, reason);
-        let layer = payload.get(STEP_BYTES..).ok_or_else(|| malformed("too short for a step"))?;
-        let map = map::header(picture);
-        let most = u64::from(map.width) * u64::from(map.height);
-        let (count, _) = LayerCoder::read_count(layer, u32::MAX)
-            .map_err(|error| error.in_chunk(ChunkType::TXTR))?;
-        if count as u64 > most {
+        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
+        let Some((step, layer)) = payload.split_first_chunk() else {
+            return Err(malformed("too short for a step"));
+        };
+        let header = map::header(picture);
+        let (count, bytes) = LayerCoder::read_count(layer, u32::MAX).map_err(named)?;
+        if count as u64 > u64::from(header.width) * u64::from(header.height) {
             return Err(malformed("more Gaussians than nodes"));
         }
-        Ok(count as u32)
-    }
-
-    /// Reads a payload, the number of whose Gaussians was checked.
-    ///
-    /// # Errors
-    /// When it is malformed.
-    pub(crate) fn parse(payload: &[u8], picture: &Header) -> Result<Self, DecodeError> {
-        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
-        let header = map::header(picture);
-        let step = LittleEndian::read_f32(payload);
-        let quantization = quantization(step).map_err(named)?;
+        check(count as u32)?;
+        let quantization = quantization(f32::from_le_bytes(*step)).map_err(named)?;
         let coder = LayerCoder::new(&quantization, &header);
-        let (count, bytes) =
-            LayerCoder::read_count(&payload[STEP_BYTES..], u32::MAX).map_err(named)?;
         let mut gaussians = vec![Gaussian::NOTHING; count];
         coder.read_gaussians(bytes, None, header.color, &mut gaussians).map_err(named)?;
         Ok(Self { header, gaussians })

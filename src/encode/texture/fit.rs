@@ -112,7 +112,8 @@ fn coded(
     }
     let color_step = rate_model::color_step(step) as f32;
     let payload = Texture::to_payload(&mut coded.codes, color_step, picture.header());
-    let texture = Texture::parse(&payload, picture.header()).expect("it was just written");
+    let texture =
+        Texture::parse(&payload, picture.header(), |_| Ok(())).expect("it was just written");
     let without = error(&Picture::new(layout.header(), &[], &limits, 0), map, observer)?;
     let with = Picture::new(layout.header(), texture.gaussians(), &limits, 0);
     let gain = without.0 - error(&with, map, observer)?.0;
