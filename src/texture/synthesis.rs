@@ -69,35 +69,20 @@ fn make_part(
         let mut half = [[0.0; HALF]; 6];
         if part.has(2) {
             let mut quarter = [[0.0; QUARTER]; 4];
-            arithmetic.run(
-                #[inline(always)]
-                || {
-                    part.add_octave(2, 2 * row - 1, &mut quarter, ramp::<{ CELL / 4 }>);
-                    for (index, line) in half.iter_mut().enumerate() {
-                        // The row above the cells is the lower half of a coarser row.
-                        let [near, far] = around(index + 1);
-                        arithmetic.enlarge(&quarter[near], &quarter[far], line);
-                    }
-                },
+            part.add_enlarged::<2, _, _>(
+                [2 * row - 1, 4 * row - 1],
+                &mut quarter,
+                &mut half,
+                arithmetic,
             );
         }
-        arithmetic.run(
-            #[inline(always)]
-            || {
-                part.add_octave(1, 4 * row - 1, &mut half, ramp::<{ CELL / 2 }>);
-                for (index, line) in full.iter_mut().enumerate() {
-                    let [near, far] = around(index + 2);
-                    arithmetic.enlarge(&half[near], &half[far], line);
-                }
-            },
-        );
+        part.add_enlarged::<4, _, _>([4 * row - 1, 8 * row], &mut half, &mut full, arithmetic);
     }
     arithmetic.run(
         #[inline(always)]
         || {
             part.add_octave(
-                0,
-                CELL as i32 * row,
+                8 * row,
                 &mut full,
                 #[inline(always)]
                 |left, change| arithmetic.ramp(left, change),
@@ -141,18 +126,40 @@ impl Part {
         self.shows[octave].iter().flatten().any(|&shows| shows)
     }
 
+    /// Adds the patterns of an octave to rows of its lattice, and enlarges these to rows of the next finer one. The
+    /// first rows of both are given; the rest is as for [`Part::add_octave`].
+    fn add_enlarged<const POINTS: usize, const WIDTH: usize, const TWICE: usize>(
+        &self,
+        [row, finer_row]: [i32; 2],
+        lines: &mut [[f32; WIDTH]],
+        finer: &mut [[f32; TWICE]],
+        arithmetic: impl Arithmetic,
+    ) {
+        arithmetic.run(
+            #[inline(always)]
+            || {
+                self.add_octave(row, lines, ramp::<POINTS>);
+                // Rows before the first ones are not needed.
+                let skipped = (finer_row - 2 * row) as usize;
+                for (index, line) in finer.iter_mut().enumerate() {
+                    let [near, far] = around(skipped + index);
+                    arithmetic.enlarge(&lines[near], &lines[far], line);
+                }
+            },
+        );
+    }
+
     /// Adds the patterns of an octave to rows of its lattice, from row `row` on. `POINTS` are those of a cell
     /// along each axis; `ramp` has the values at these points, from the one at the node before them and its
     /// change up to the next node.
     #[inline(always)]
     fn add_octave<const POINTS: usize, const WIDTH: usize>(
         &self,
-        octave: usize,
         row: i32,
         lines: &mut [[f32; WIDTH]],
         ramp: impl Fn(f32, f32) -> [f32; POINTS],
     ) {
-        let points = POINTS as i32;
+        let (octave, points) = ((CELL / POINTS).ilog2() as usize, POINTS as i32);
         // The row of nodes above a row of points.
         let above = |row: i32| (row.div_euclid(points) - (self.row - 1)) as usize;
         let rows = above(row)..above(row + lines.len() as i32 - 1) + 2;
