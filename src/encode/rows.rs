@@ -127,7 +127,7 @@ impl Rows {
 }
 
 /// An index inside of a length, mirrored at its ends.
-fn mirrored(at: isize, length: usize) -> usize {
+pub(crate) fn mirrored(at: isize, length: usize) -> usize {
     let period = (2 * (length as isize - 1)).max(1);
     let at = at.rem_euclid(period);
     at.min(period - at).min(length as isize - 1) as usize

@@ -14,8 +14,8 @@ const BANDS: usize = 2;
 /// Most pixels of a strip, unless a band has more.
 const MOST_PIXELS: usize = 1 << 21;
 
-/// Renders the first `prefix` Gaussians of a picture, without its texture, strip by strip from the top, and hands every strip to
-/// `visit`: float samples, plane after plane. The number of rows of a strip is a multiple of
+/// Renders the first `prefix` Gaussians of a picture, without its texture, strip by strip from the top, and hands
+/// every strip to `visit`: float samples, plane after plane. The number of rows of a strip is a multiple of
 /// [`BAND_HEIGHT`], except at the bottom. The picture must have no [`Limits`](crate::Limits).
 pub(crate) fn render(
     picture: &Picture<'_>,

@@ -127,10 +127,7 @@ impl<'a> Verified<'a> {
     /// The PSNR in dB, at the source's depth, of the picture that the first `count` Gaussians make, or all
     /// of them if there are fewer.
     pub(crate) fn psnr(&self, count: u32, observer: &mut Observer<'_>) -> Result<f64> {
-        let mut errors = Errors::default();
-        strips::render(&self.picture(), count, observer, |region, planes| {
-            errors.add(self.source, region, planes);
-        })?;
+        let errors = Errors::of(&self.picture(), self.source, count, observer)?;
         Ok(errors.psnr(self.source).rounded)
     }
 
@@ -149,6 +146,17 @@ impl<'a> Verified<'a> {
     }
 }
 
+/// The squared error of a picture without limits, over all samples, which are clamped but not rounded. A full sample
+/// is 1.
+pub(crate) fn squared_error(
+    picture: &Picture<'_>,
+    source: &Source<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<f64> {
+    let errors = Errors::of(picture, source, u32::MAX, observer)?;
+    Ok(errors.exact / f64::from(source.depth().max_sample()).powi(2))
+}
+
 /// Sums of squared errors of a rendering, which comes in strips.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
@@ -159,6 +167,20 @@ struct Errors {
 }
 
 impl Errors {
+    /// Those of the first `count` Gaussians of a picture.
+    fn of(
+        picture: &Picture<'_>,
+        source: &Source<'_>,
+        count: u32,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self> {
+        let mut errors = Self::default();
+        strips::render(picture, count, observer, |region, planes| {
+            errors.add(source, region, planes);
+        })?;
+        Ok(errors)
+    }
+
     /// Adds those of a strip: float samples, plane after plane.
     fn add(&mut self, source: &Source<'_>, region: Region, planes: &[f32]) {
         let level = Level::new();

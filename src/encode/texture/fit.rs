@@ -12,15 +12,14 @@ use crate::encode::fit::budget::Budget;
 use crate::encode::fit::training::Training;
 use crate::encode::fit::{Fit, Work};
 use crate::encode::job::Job;
-use crate::encode::loss::Distortion;
 use crate::encode::options::{Precision, Tune};
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
 use crate::encode::rate_model;
 use crate::encode::rdo::{SearchWork, TargetSearch};
-use crate::encode::source::{Source, SourceSamples};
-use crate::encode::strips;
+use crate::encode::source::Source;
 use crate::encode::tiled_source::TiledSource;
+use crate::encode::verify::squared_error;
 use crate::limits::Limits;
 use crate::render::Picture;
 use crate::texture::{OCTAVES, Texture, amplitude_sum, direction_sum};
@@ -114,35 +113,11 @@ fn coded(
     let payload = Texture::to_payload(&mut coded.codes, color_step, picture.header());
     let texture =
         Texture::parse(&payload, picture.header(), |_| Ok(())).expect("it was just written");
-    let without = error(&Picture::new(layout.header(), &[], &limits, 0), map, observer)?;
+    // Where there shall be no texture, less than none is no error: samples are clamped.
+    let without = Picture::new(layout.header(), &[], &limits, 0);
     let with = Picture::new(layout.header(), texture.gaussians(), &limits, 0);
-    let gain = without.0 - error(&with, map, observer)?.0;
+    let gain = squared_error(&without, map, observer)? - squared_error(&with, map, observer)?;
     let bits = ((payload.len() + FRAMING) * 8) as f64;
     let price = f64::from(rate_model::lambda(&coded.quantization));
     Ok((gain > price * bits).then_some(payload))
-}
-
-/// The distortion of a map. Where there shall be no texture, less than none is no error.
-fn error(
-    map: &Picture<'_>,
-    source: &Source<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<Distortion> {
-    let SourceSamples::Sixteen(samples) = source.samples() else {
-        unreachable!("maps have 16 bits")
-    };
-    let mut sum = 0.0;
-    strips::render(map, u32::MAX, observer, |region, planes| {
-        let pixels = region.pixels() as usize;
-        let first = (region.y * region.width) as usize;
-        let samples = samples[first * (OCTAVES + 1)..].chunks_exact(OCTAVES + 1);
-        for (at, samples) in (0..pixels).zip(samples) {
-            for (channel, &sample) in samples.iter().enumerate() {
-                let value = planes[channel * pixels + at].clamp(0.0, 1.0);
-                let error = f64::from(value) - f64::from(sample) / 65_535.0;
-                sum += error * error;
-            }
-        }
-    })?;
-    Ok(Distortion(sum))
 }

@@ -7,6 +7,7 @@ use super::bands::Content;
 use super::cells::Cells;
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
+use crate::encode::rows::mirrored;
 use crate::texture::OCTAVES;
 
 /// The weights of the two rows, or columns, of cells on each side of a node, from the outer one on: a window
@@ -81,12 +82,6 @@ pub(super) fn strengths(
         smoothed.collect::<Vec<_>>()
     })?;
     Ok(smoothed.concat())
-}
-
-/// An index inside of a length, mirrored at its ends.
-fn mirrored(at: isize, length: usize) -> usize {
-    let last = length as isize - 1;
-    (if at > last { 2 * last - at } else { at.abs() }).clamp(0, last) as usize
 }
 
 /// What was found at a row of nodes, before it is smoothed.
