@@ -42,9 +42,18 @@ pub(crate) struct Distortion {
 
 impl Distortion {
     /// What CSV files call the values.
-    pub(crate) const COLUMNS: [&str; 5] = ["psnr", "msssim", "ssimulacra2", "butteraugli", "cvvdp"];
+    const COLUMNS: [&str; 5] = ["psnr", "msssim", "ssimulacra2", "butteraugli", "cvvdp"];
 
-    /// In the order of [`Self::COLUMNS`].
+    /// The columns of a CSV file of `V` values: the size and the rate of a file, its distortion, and others.
+    ///
+    /// # Panics
+    /// When there are not so many.
+    pub(crate) fn columns_of_file<const V: usize>(others: &[&'static str]) -> [&'static str; V] {
+        let columns = [&["bytes", "bpp"], &Self::COLUMNS[..], others].concat();
+        columns.try_into().expect("the store has as many values as columns")
+    }
+
+    /// In the order of the columns.
     pub(crate) fn values(&self) -> [f64; 5] {
         [self.psnr, self.ms_ssim, self.ssimulacra2, self.butteraugli, self.cvvdp]
     }

@@ -24,8 +24,7 @@ pub(super) struct RateStore(Store<3, 7>);
 
 impl RateStore {
     pub(super) fn open(bench: &Bench) -> Result<Self> {
-        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
-        let values = ["bytes", "bpp", psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp];
+        let values = Distortion::columns_of_file(&[]);
         Ok(Self(bench.store("rate.csv", ["codec", "quality", "image"], values)?))
     }
 

@@ -92,22 +92,9 @@ fn pictures(bench: &Bench) -> Vec<TestPicture> {
 }
 
 fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
-    let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
-    let mut store = bench.store(
-        "speed.csv",
-        ["codec", "quality", "threads", "image"],
-        [
-            "bytes",
-            "bpp",
-            psnr,
-            ms_ssim,
-            ssimulacra2,
-            butteraugli,
-            cvvdp,
-            "encode_seconds",
-            "decode_seconds",
-        ],
-    )?;
+    let columns = Distortion::columns_of_file(&["encode_seconds", "decode_seconds"]);
+    let keys = ["codec", "quality", "threads", "image"];
+    let mut store = bench.store("speed.csv", keys, columns)?;
     let mut files = RateStore::open(bench)?;
     let pictures = pictures(bench);
     let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };

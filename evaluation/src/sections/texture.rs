@@ -109,20 +109,8 @@ struct FigureStore(Store<3, 11>);
 
 impl FigureStore {
     fn open(bench: &Bench) -> Result<Self> {
-        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = Distortion::COLUMNS;
-        let values = [
-            "bytes",
-            "bpp",
-            psnr,
-            ms_ssim,
-            ssimulacra2,
-            butteraugli,
-            cvvdp,
-            "tex",
-            "wd",
-            "texture_gaussians",
-            "texture_bytes",
-        ];
+        let others = ["tex", "wd", "texture_gaussians", "texture_bytes"];
+        let values = Distortion::columns_of_file(&others);
         Ok(Self(bench.store("texture.csv", ["codec", "rate", "image"], values)?))
     }
 
