@@ -15,7 +15,7 @@ use crate::region::Region;
 use crate::simd::Backend;
 #[cfg(feature = "std")]
 use crate::texture::Vectors;
-use crate::texture::{Arithmetic, CELL, NodeMap, Plain, make_cells};
+use crate::texture::{Arithmetic, CELL, NodeMap, Plain, Synthesis};
 
 /// Points of a cubic interpolation.
 const TAPS: usize = 4;
@@ -78,7 +78,7 @@ impl TextureView {
         let cells = columns.cells(x..x + width.next_multiple_of(TILE_WIDTH as u32));
         let nodes = |cells: &Range<i32>, side: u32| {
             let last = side as i32 - 1;
-            (cells.start - 1).clamp(0, last) as u32..(cells.end + 1).clamp(0, last) as u32 + 1
+            cells.start.clamp(0, last) as u32..(cells.end + 1).clamp(0, last) as u32 + 1
         };
         let across = nodes(&cells, map_sides[0]);
         let down = nodes(&rows.cells(y..y + height), map_sides[1]);
@@ -107,7 +107,8 @@ impl TextureView {
         let taps = self.taps.as_ref().map_or(0, |taps| size_of_val(&taps[..]));
         let values =
             self.cell_rows() * CELL * self.width() + self.width() + TILE_HEIGHT * self.stride();
-        (self.map.memory() + taps as u64, (values * size_of::<f32>()) as u64)
+        let by_thread = values * size_of::<f32>() + Synthesis::memory(self.cells.len());
+        (self.map.memory() + taps as u64, by_thread as u64)
     }
 
     /// Rows of cells that a row of tiles may need.
@@ -125,9 +126,9 @@ impl TextureView {
         self.taps.is_none() && self.cell_rows() == 1
     }
 
-    /// Stored pixels in a row of the cells.
+    /// Stored pixels in a row of the cells, and some more.
     fn width(&self) -> usize {
-        self.cells.len() * CELL
+        Synthesis::width(self.cells.len())
     }
 
     /// Values in a row of the grid, which ends with a whole pair of tiles.
@@ -173,6 +174,7 @@ impl Cubic {
 /// The texture of a row of tiles, and what a thread needs to make it.
 #[derive(Debug, Default)]
 pub(super) struct TextureRow {
+    synthesis: Synthesis,
     /// Rows of cells, each in the place that its number has by the remainder.
     cells: Vec<CellRow>,
     /// A row of stored pixels between rows.
@@ -230,9 +232,8 @@ impl TextureRow {
             if cells.row != Some(row) {
                 cells.row = Some(row);
                 cells.values.resize(width * CELL, 0.0);
-                let columns = view.cells.clone();
                 let values = &mut cells.values;
-                cells.shows = make_cells(&view.map, row, columns, values, width, arithmetic);
+                cells.shows = self.synthesis.make(&view.map, row, &view.cells, values, arithmetic);
             }
             shows |= cells.shows;
         }

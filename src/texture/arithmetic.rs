@@ -1,26 +1,73 @@
-//! The two loops of texture for which the plain code is far slower than SIMD code; both have the same bits.
+//! What texture is computed with: one value at a time, or sixteen; both have the same bits.
+
+use core::ops::{Add, Mul, Neg, Sub};
 
 #[cfg(feature = "std")]
-use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*, u32x16};
 
-use super::map::CELL;
+use super::noise;
+use crate::math;
 
 /// Plain code, or SIMD code.
 pub(crate) trait Arithmetic: Copy {
-    /// Runs `work`, whose loops are vectorized for the level of this code.
+    /// Values side by side.
+    type Values: Copy
+        + Add<Output = Self::Values>
+        + Sub<Output = Self::Values>
+        + Mul<Output = Self::Values>
+        + Neg<Output = Self::Values>;
+
+    /// How many these are: 16 or a divisor of it.
+    const LANES: usize;
+
+    /// Runs `work`, which is compiled for the level of this code.
     fn run<T>(self, work: impl FnOnce() -> T) -> T;
 
-    /// The values at the points of a cell between two nodes, from that at the first of them and its change.
-    fn ramp(self, left: f32, change: f32) -> [f32; CELL];
+    fn splat(self, value: f32) -> Self::Values;
 
-    /// A row between two rows of a lattice, enlarged by two: three quarters of the nearest point and one quarter
-    /// of the next one, first between the rows, then along them. The first and the last value are not right.
-    fn enlarge<const WIDTH: usize, const TWICE: usize>(
-        self,
-        near: &[f32; WIDTH],
-        far: &[f32; WIDTH],
-        out: &mut [f32; TWICE],
-    );
+    /// The first values of a slice.
+    fn load(self, from: &[f32]) -> Self::Values;
+
+    /// Sets the first values of a slice.
+    fn store(self, values: Self::Values, to: &mut [f32]);
+
+    /// Sets the first values of a slice, four times as many.
+    #[inline(always)]
+    fn store_four(self, [a, b, c, d]: [Self::Values; 4], to: &mut [f32]) {
+        self.store(a, to);
+        self.store(b, &mut to[Self::LANES..]);
+        self.store(c, &mut to[2 * Self::LANES..]);
+        self.store(d, &mut to[3 * Self::LANES..]);
+    }
+
+    /// The values one by one from either side.
+    fn interleave(self, a: Self::Values, b: Self::Values) -> [Self::Values; 2];
+
+    /// The values one by one from each of four.
+    #[inline(always)]
+    fn interleave_four(self, [a, b, c, d]: [Self::Values; 4]) -> [Self::Values; 4] {
+        let ([even, later_even], [odd, later_odd]) = (self.interleave(a, c), self.interleave(b, d));
+        let [first, second] = self.interleave(even, odd);
+        let [third, fourth] = self.interleave(later_even, later_odd);
+        [first, second, third, fourth]
+    }
+
+    /// What is so far on the way from one to the other.
+    #[inline(always)]
+    fn between(self, a: Self::Values, b: Self::Values, part: f32) -> Self::Values {
+        a + (b - a) * self.splat(part)
+    }
+
+    /// The nearest numbers from 0 to 1; 0 for NaN.
+    fn unit(self, values: Self::Values) -> Self::Values;
+
+    fn sqrt(self, values: Self::Values) -> Self::Values;
+
+    /// Whether all are 0.
+    fn is_zero(self, values: Self::Values) -> bool;
+
+    /// The numbers of blocks from `first` on, in a row with this seed: see [`noise::numbers`].
+    fn numbers(self, first: u32, seed: u32) -> [Self::Values; 3];
 }
 
 /// Scalar code: the reference.
@@ -28,26 +75,54 @@ pub(crate) trait Arithmetic: Copy {
 pub(crate) struct Plain;
 
 impl Arithmetic for Plain {
+    type Values = f32;
+
+    const LANES: usize = 1;
+
+    #[inline(always)]
     fn run<T>(self, work: impl FnOnce() -> T) -> T {
         work()
     }
 
-    fn ramp(self, left: f32, change: f32) -> [f32; CELL] {
-        ramp(left, change)
+    #[inline(always)]
+    fn splat(self, value: f32) -> f32 {
+        value
     }
 
-    fn enlarge<const WIDTH: usize, const TWICE: usize>(
-        self,
-        near: &[f32; WIDTH],
-        far: &[f32; WIDTH],
-        out: &mut [f32; TWICE],
-    ) {
-        let mixed = |column: usize| near[column] * 0.75 + far[column] * 0.25;
-        for column in 1..WIDTH - 1 {
-            let near = mixed(column) * 0.75;
-            out[2 * column] = near + mixed(column - 1) * 0.25;
-            out[2 * column + 1] = near + mixed(column + 1) * 0.25;
-        }
+    #[inline(always)]
+    fn load(self, from: &[f32]) -> f32 {
+        from[0]
+    }
+
+    #[inline(always)]
+    fn store(self, values: f32, to: &mut [f32]) {
+        to[0] = values;
+    }
+
+    #[inline(always)]
+    fn interleave(self, a: f32, b: f32) -> [f32; 2] {
+        [a, b]
+    }
+
+    #[inline(always)]
+    #[expect(clippy::manual_clamp, reason = "`clamp` keeps NaN")]
+    fn unit(self, values: f32) -> f32 {
+        values.max(0.0).min(1.0)
+    }
+
+    #[inline(always)]
+    fn sqrt(self, values: f32) -> f32 {
+        math::sqrt(values)
+    }
+
+    #[inline(always)]
+    fn is_zero(self, values: f32) -> bool {
+        values == 0.0
+    }
+
+    #[inline(always)]
+    fn numbers(self, first: u32, seed: u32) -> [f32; 3] {
+        noise::numbers(first, seed).map(|number| number as f32)
     }
 }
 
@@ -58,63 +133,66 @@ pub(crate) struct Vectors<S>(pub(crate) S);
 
 #[cfg(feature = "std")]
 impl<S: Simd> Arithmetic for Vectors<S> {
+    type Values = f32x16<S>;
+
+    const LANES: usize = 16;
+
     #[inline]
     fn run<T>(self, work: impl FnOnce() -> T) -> T {
         self.0.vectorize(work)
     }
 
     #[inline(always)]
-    fn ramp(self, left: f32, change: f32) -> [f32; CELL] {
-        let steps = f32x8::load_array(self.0, ramp(0.0, 1.0));
-        (f32x8::splat(self.0, left) + steps * change).to_array()
+    fn splat(self, value: f32) -> f32x16<S> {
+        f32x16::splat(self.0, value)
     }
 
     #[inline(always)]
-    fn enlarge<const WIDTH: usize, const TWICE: usize>(
-        self,
-        near: &[f32; WIDTH],
-        far: &[f32; WIDTH],
-        out: &mut [f32; TWICE],
-    ) {
-        let (near, far) = (near.as_chunks::<16>().0, far.as_chunks::<16>().0);
-        let mut last = f32x16::splat(self.0, 0.0);
-        let mut mean = mixed(self.0, &near[0], &far[0]);
-        for (at, out) in out.as_chunks_mut::<32>().0.iter_mut().enumerate() {
-            let next = match (near.get(at + 1), far.get(at + 1)) {
-                (Some(near), Some(far)) => mixed(self.0, near, far),
-                _ => last,
-            };
-            let near = mean * 0.75;
-            let first = near + last.slide::<15>(mean) * 0.25;
-            let second = near + mean.slide::<1>(next) * 0.25;
-            let (low, high) = first.interleave(second);
-            low.store_slice(&mut out[..16]);
-            high.store_slice(&mut out[16..]);
-            (last, mean) = (mean, next);
-        }
+    fn load(self, from: &[f32]) -> f32x16<S> {
+        f32x16::from_slice(self.0, &from[..16])
+    }
+
+    #[inline(always)]
+    fn store(self, values: f32x16<S>, to: &mut [f32]) {
+        values.store_slice(&mut to[..16]);
+    }
+
+    #[inline(always)]
+    fn interleave(self, a: f32x16<S>, b: f32x16<S>) -> [f32x16<S>; 2] {
+        let (low, high) = a.interleave(b);
+        [low, high]
+    }
+
+    #[inline(always)]
+    fn unit(self, values: f32x16<S>) -> f32x16<S> {
+        values.max_precise(self.splat(0.0)).min(self.splat(1.0))
+    }
+
+    #[inline(always)]
+    fn sqrt(self, values: f32x16<S>) -> f32x16<S> {
+        values.sqrt()
+    }
+
+    #[inline(always)]
+    fn is_zero(self, values: f32x16<S>) -> bool {
+        values.simd_eq(0.0).all_true()
+    }
+
+    #[inline(always)]
+    fn numbers(self, first: u32, seed: u32) -> [f32x16<S>; 3] {
+        // As in `noise::numbers`.
+        let blocks = u32x16::load_array(self.0, core::array::from_fn(|at| at as u32)) + first;
+        let mut hash = blocks * noise::BLOCK_FACTOR + seed;
+        hash = (hash ^ (hash >> 15)) * noise::HASH_FACTOR;
+        let [a, b, c] = noise::NUMBER_SHIFTS;
+        [number(hash, a), number(hash, b), number(hash, c)]
     }
 }
 
-/// Points between two rows.
+/// A number of each hash.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn mixed<S: Simd>(simd: S, near: &[f32; 16], far: &[f32; 16]) -> f32x16<S> {
-    f32x16::load_array_ref(simd, near) * 0.75 + f32x16::load_array_ref(simd, far) * 0.25
-}
-
-/// How far a point in a cell is on the way from one node to the next.
-#[inline(always)]
-pub(super) const fn step<const POINTS: usize>(at: usize) -> f32 {
-    (at as f32 + 0.5) / POINTS as f32
-}
-
-/// [`Arithmetic::ramp`] for any lattice.
-#[inline(always)]
-pub(super) fn ramp<const POINTS: usize>(left: f32, change: f32) -> [f32; POINTS] {
-    // A closure would not always be compiled into the loop around it.
-    let mut values = [0.0; POINTS];
-    for (at, value) in values.iter_mut().enumerate() {
-        *value = left + change * step::<POINTS>(at);
-    }
-    values
+fn number<S: Simd>(hash: u32x16<S>, shift: u32) -> f32x16<S> {
+    let number: i32x16<S> = ((hash >> shift) & noise::NUMBER_MASK).bitcast();
+    (number - noise::NUMBER_MEAN).to_float()
 }

@@ -2,10 +2,12 @@
 //! map gives (spec, sections 5.7 and 9.7).
 //!
 //! [`chunk`] reads and writes the Gaussians of the map, [`map`] says what the map's values mean,
-//! [`noise`] makes the patterns, and [`synthesis`] adds them up, with the [`arithmetic`] of the backend.
+//! [`noise`] lists the patterns, [`gains`] has what they are multiplied by, and [`synthesis`] adds them up, all
+//! with the [`arithmetic`] of the backend.
 
 mod arithmetic;
 mod chunk;
+mod gains;
 mod map;
 mod noise;
 mod synthesis;
@@ -17,4 +19,4 @@ pub(crate) use chunk::Texture;
 pub(crate) use map::{CELL, NodeMap};
 #[cfg(feature = "encode")]
 pub(crate) use map::{OCTAVES, amplitude_sum, direction_sum};
-pub(crate) use synthesis::make_cells;
+pub(crate) use synthesis::Synthesis;

@@ -1,7 +1,7 @@
 //! The bands of a block of luma, and how much there is in each, cell by cell.
 //!
 //! A band is the difference of two blurs, the coarser of which has taps twice as far apart as the finer
-//! one ("à trous"): an octave, centred at about 0.3, 0.15 and 0.08 cycles a pixel.
+//! one ("à trous"): an octave, centred at about 0.3 and 0.15 cycles a pixel.
 
 use crate::encode::source::SPAN;
 use crate::texture::{CELL, OCTAVES};
@@ -9,7 +9,7 @@ use crate::texture::{CELL, OCTAVES};
 /// Columns and rows of a block.
 pub(super) const COLUMNS: usize = SPAN;
 pub(super) const ROWS: usize = 32;
-/// Columns and rows around a block that are known, of which its bands need all but one.
+/// Columns and rows around a block that are known, more than its bands need.
 pub(super) const HALO: usize = 16;
 /// Columns and rows of a block with what is around it.
 pub(super) const STRIDE: usize = COLUMNS + 2 * HALO;
@@ -65,16 +65,16 @@ type Plane = Vec<[f32; STRIDE]>;
 #[derive(Debug)]
 pub(super) struct Block {
     luma: Plane,
-    /// Luma that is blurred horizontally, and luma that is blurred once or thrice, and twice.
+    /// Luma that is blurred horizontally, and luma that is blurred once and twice.
     half: Plane,
-    odd: Plane,
-    even: Plane,
+    once: Plane,
+    twice: Plane,
 }
 
 impl Default for Block {
     fn default() -> Self {
         let plane = || vec![[0.0; STRIDE]; HEIGHT];
-        Self { luma: plane(), half: plane(), odd: plane(), even: plane() }
+        Self { luma: plane(), half: plane(), once: plane(), twice: plane() }
     }
 }
 
@@ -90,14 +90,12 @@ impl Block {
     #[inline(always)]
     pub(super) fn cells(&mut self, size: [usize; 2]) -> BlockCells {
         let mut cells = [[Content::default(); COLUMNS / CELL]; ROWS / CELL];
-        let Self { luma, half, odd, even } = self;
-        blur(luma, half, odd, 0);
-        add_band(luma, odd, 0, size, &mut cells);
-        blur(odd, half, even, 1);
-        add_band(odd, even, 1, size, &mut cells);
-        blur(even, half, odd, 2);
-        add_band(even, odd, 2, size, &mut cells);
-        add_slopes(luma, odd, size, &mut cells);
+        let Self { luma, half, once, twice } = self;
+        blur(luma, half, once, 0);
+        add_band(luma, once, 0, size, &mut cells);
+        blur(once, half, twice, 1);
+        add_band(once, twice, 1, size, &mut cells);
+        add_slopes(luma, twice, size, &mut cells);
         cells
     }
 }

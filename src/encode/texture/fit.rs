@@ -59,9 +59,8 @@ pub(crate) fn payload(
     if samples.chunks_exact(OCTAVES + 1).all(|node| node[..OCTAVES] == [0; OCTAVES]) {
         return Ok(None);
     }
-    let map = Source::new_u16(size[0] as u32, size[1] as u32, ColorModel::Rgba, &samples)
-        .expect("the sizes agree")
-        .keeping_invisible(true);
+    let map = Source::new_u16(size[0] as u32, size[1] as u32, ColorModel::Rgb, &samples)
+        .expect("the sizes agree");
     observer.silently(|observer| coded(job, &map, picture, step + STEP.log2(), observer))
 }
 
@@ -69,8 +68,8 @@ pub(crate) fn payload(
 fn samples_of(strength: &Strength) -> [u16; OCTAVES + 1] {
     let most = strength.amplitudes.into_iter().fold(0.0, f32::max);
     let direction = strength.direction * (most / LEAST_DIRECTED).min(1.0);
-    let [a, b, c] = strength.amplitudes.map(amplitude_sum);
-    [a, b, c, direction_sum(direction)].map(|sum| (sum * 65_535.0 + 0.5) as u16)
+    let [fine, coarse] = strength.amplitudes.map(amplitude_sum);
+    [fine, coarse, direction_sum(direction)].map(|sum| (sum * 65_535.0 + 0.5) as u16)
 }
 
 /// The payload of a map, coded with a step, unless it has no Gaussians or is not worth its bytes.
@@ -93,7 +92,7 @@ fn coded(
         ..*job
     };
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let base = [0.0, 0.0, 0.0, direction_sum(0.0)];
+    let base = [0.0, 0.0, direction_sum(0.0), 0.0];
     let layout = FileLayout::new(map, base, kernel, parameterization, &metadata);
     let tiled = TiledSource::new(map, job.tune, observer)?;
     let budget = Budget::DistortionPerGaussian(rate_model::distortion_per_gaussian(step));
