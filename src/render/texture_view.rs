@@ -78,7 +78,7 @@ impl TextureView {
         let cells = columns.cells(x..x + width.next_multiple_of(TILE_WIDTH as u32));
         let nodes = |cells: &Range<i32>, side: u32| {
             let last = side as i32 - 1;
-            cells.start.clamp(0, last) as u32..(cells.end + 1).clamp(0, last) as u32 + 1
+            (cells.start - 1).clamp(0, last) as u32..(cells.end + 1).clamp(0, last) as u32 + 1
         };
         let across = nodes(&cells, map_sides[0]);
         let down = nodes(&rows.cells(y..y + height), map_sides[1]);

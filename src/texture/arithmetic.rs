@@ -31,6 +31,19 @@ pub(crate) trait Arithmetic: Copy {
     /// Sets the first values of a slice.
     fn store(self, values: Self::Values, to: &mut [f32]);
 
+    /// The first values of a slice, twice as many.
+    #[inline(always)]
+    fn load_two(self, from: &[f32]) -> [Self::Values; 2] {
+        [self.load(from), self.load(&from[Self::LANES..])]
+    }
+
+    /// Sets the first values of a slice, twice as many.
+    #[inline(always)]
+    fn store_two(self, [a, b]: [Self::Values; 2], to: &mut [f32]) {
+        self.store(a, to);
+        self.store(b, &mut to[Self::LANES..]);
+    }
+
     /// Sets the first values of a slice, four times as many.
     #[inline(always)]
     fn store_four(self, [a, b, c, d]: [Self::Values; 4], to: &mut [f32]) {
@@ -184,15 +197,15 @@ impl<S: Simd> Arithmetic for Vectors<S> {
         let blocks = u32x16::load_array(self.0, core::array::from_fn(|at| at as u32)) + first;
         let mut hash = blocks * noise::BLOCK_FACTOR + seed;
         hash = (hash ^ (hash >> 15)) * noise::HASH_FACTOR;
-        let [a, b, c] = noise::NUMBER_SHIFTS;
-        [number(hash, a), number(hash, b), number(hash, c)]
+        let hash: i32x16<S> = hash.bitcast();
+        let [a, b, c] = [hash, hash << noise::BITS_AFTER, hash << noise::BITS_BEFORE];
+        [number(a), number(b), number(c)]
     }
 }
 
-/// A number of each hash.
+/// The number in the highest bits.
 #[cfg(feature = "std")]
 #[inline(always)]
-fn number<S: Simd>(hash: u32x16<S>, shift: u32) -> f32x16<S> {
-    let number: i32x16<S> = ((hash >> shift) & noise::NUMBER_MASK).bitcast();
-    (number - noise::NUMBER_MEAN).to_float()
+fn number<S: Simd>(bits: i32x16<S>) -> f32x16<S> {
+    (bits >> noise::BITS_BEFORE).to_float()
 }

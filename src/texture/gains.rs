@@ -21,13 +21,14 @@ struct Places {
 }
 
 impl Pattern {
-    /// What makes its standard deviation 1. The numbers of a block are integers, 1024 of which are 1.
+    /// What makes its standard deviation 1. The numbers of a block are integers, 1024 of which are 1, and the coarser
+    /// octave becomes larger by 16 where it is enlarged.
     fn deviation(self) -> f32 {
         match (self.octave, self.kind) {
             (0, Kind::Isotropic) => 1.0 / 1024.0,
             (0, _) => 1.23 / 1024.0,
-            (_, Kind::Isotropic) => 1.82 / 1024.0,
-            (..) => 1.72 / 1024.0,
+            (_, Kind::Isotropic) => 1.82 / 16384.0,
+            (..) => 1.72 / 16384.0,
         }
     }
 
@@ -56,6 +57,8 @@ impl Places {
 /// The gains along some rows of nodes, each in the place that its number has by the remainder.
 #[derive(Debug, Default)]
 pub(super) struct NodeRows {
+    /// The column of the first cell for which there are gains.
+    first: i32,
     rows: [NodeRow; NODE_ROWS],
     sums: [Vec<f32>; CHANNELS],
     /// The gains at the nodes.
@@ -77,8 +80,8 @@ impl NodeRows {
         (cells + 16) * (CHANNELS + PATTERNS + NODE_ROWS * blocks) * size_of::<f32>()
     }
 
-    /// Makes the rows that a row of so many cells needs, of which the first is given by its column and its row.
-    /// Their number is a multiple of 16.
+    /// Makes some rows from row `row` on, for so many cells from column `first` on, the same in all calls. Their number
+    /// is a multiple of 16.
     #[inline(always)]
     pub(super) fn prepare<A: Arithmetic>(
         &mut self,
@@ -87,6 +90,7 @@ impl NodeRows {
         cells: usize,
         a: A,
     ) {
+        self.first = first;
         for row in row..row + NODE_ROWS as i32 {
             let into = &mut self.rows[slot(row)];
             if into.row == Some(row) {
@@ -119,17 +123,22 @@ impl NodeRows {
         self.rows.iter().any(|row| row.shows[pattern.index()])
     }
 
-    /// The gains along the rows of nodes above and below a row of blocks, and how far it is on the way from one to
-    /// the other; `None` without the pattern.
-    pub(super) fn around(&self, pattern: Pattern, block_row: i32) -> Option<([&[f32]; 2], f32)> {
+    /// The gains of a row of blocks along the rows of nodes above and below it, from a column of cells on, and how far it
+    /// is on the way from one to the other.
+    pub(super) fn around(
+        &self,
+        pattern: Pattern,
+        column: i32,
+        block_row: i32,
+    ) -> ([&[f32]; 2], f32) {
         let (index, places) = (pattern.index(), pattern.down());
         let blocks = places.blocks as i32;
         let row = block_row.div_euclid(blocks);
         let part = places.part(block_row.rem_euclid(blocks) as usize);
         // On a row of nodes, the one below it has no part, and may not be there.
         let rows = [row, row + i32::from(part > 0.0)].map(|row| &self.rows[slot(row)]);
-        let shows = rows.iter().any(|row| row.shows[index]);
-        shows.then(|| (rows.map(|row| &row.gains[index][..]), part))
+        let first = (column - self.first) as usize * places.blocks;
+        (rows.map(|row| &row.gains[index][first..]), part)
     }
 }
 

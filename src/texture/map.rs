@@ -14,8 +14,8 @@ use crate::region::Region;
 pub(crate) const CELL: usize = 8;
 /// Octaves. Their lattices have a pitch of 1 and 2 pixels.
 pub(crate) const OCTAVES: usize = 2;
-/// Rows of nodes that a row of cells depends on, from the one at its upper edge on.
-pub(super) const NODE_ROWS: usize = 3;
+/// Rows of nodes that a row of cells depends on, from the one above it on.
+pub(super) const NODE_ROWS: usize = 4;
 /// The channels of the map: an amplitude for each octave, and the direction.
 pub(super) const CHANNELS: usize = OCTAVES + 1;
 
@@ -104,7 +104,7 @@ impl NodeMap {
 
     /// Whether a row of cells can have texture.
     pub(super) fn shows_around(&self, row: i32) -> bool {
-        (row..row + NODE_ROWS as i32).any(|row| self.shows(row))
+        (row - 1..row - 1 + NODE_ROWS as i32).any(|row| self.shows(row))
     }
 
     /// Copies the sums of a channel at nodes in a row, from column `first` on.

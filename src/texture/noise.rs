@@ -61,15 +61,15 @@ impl Pattern {
 /// What the hash of a block in a row is made with.
 pub(super) const BLOCK_FACTOR: u32 = 0x9E37_79B1;
 pub(super) const HASH_FACTOR: u32 = 0x2C1B_3C6D;
-/// Where the three numbers are in it.
-pub(super) const NUMBER_SHIFTS: [u32; 3] = [1, 11, 21];
-pub(super) const NUMBER_MASK: u32 = 2046;
-pub(super) const NUMBER_MEAN: i32 = 1023;
+/// What is before a number in its highest bits, and where it ends.
+pub(super) const BITS_BEFORE: u32 = 21;
+pub(super) const BITS_AFTER: u32 = 11;
 
-/// Three odd numbers from -1023 to 1023 for a block in a row with this seed.
+/// Three numbers from -1024 to 1023 for a block in a row with this seed.
 #[inline(always)]
 pub(super) fn numbers(block: u32, seed: u32) -> [i32; 3] {
     let mut hash = block.wrapping_mul(BLOCK_FACTOR).wrapping_add(seed);
     hash = (hash ^ (hash >> 15)).wrapping_mul(HASH_FACTOR);
-    NUMBER_SHIFTS.map(|shift| (hash >> shift & NUMBER_MASK) as i32 - NUMBER_MEAN)
+    let hash = hash as i32;
+    [hash, hash << BITS_AFTER, hash << BITS_BEFORE].map(|bits| bits >> BITS_BEFORE)
 }
