@@ -123,6 +123,11 @@ impl NodeRows {
         self.rows.iter().any(|row| row.shows[pattern.index()])
     }
 
+    /// Whether a row of blocks can have a pattern.
+    pub(super) fn has_in_row(&self, pattern: Pattern, block_row: i32) -> bool {
+        self.rows_around(pattern, block_row).0.iter().any(|row| row.shows[pattern.index()])
+    }
+
     /// The gains of a row of blocks along the rows of nodes above and below it, from a column of cells on, and how far it
     /// is on the way from one to the other.
     pub(super) fn around(
@@ -131,14 +136,18 @@ impl NodeRows {
         column: i32,
         block_row: i32,
     ) -> ([&[f32]; 2], f32) {
-        let (index, places) = (pattern.index(), pattern.down());
-        let blocks = places.blocks as i32;
+        let (rows, part) = self.rows_around(pattern, block_row);
+        let first = (column - self.first) as usize * pattern.blocks();
+        (rows.map(|row| &row.gains[pattern.index()][first..]), part)
+    }
+
+    /// The rows of nodes above and below a row of blocks, and how far it is on the way from one to the other.
+    fn rows_around(&self, pattern: Pattern, block_row: i32) -> ([&NodeRow; 2], f32) {
+        let blocks = pattern.blocks() as i32;
         let row = block_row.div_euclid(blocks);
-        let part = places.part(block_row.rem_euclid(blocks) as usize);
+        let part = pattern.down().part(block_row.rem_euclid(blocks) as usize);
         // On a row of nodes, the one below it has no part, and may not be there.
-        let rows = [row, row + i32::from(part > 0.0)].map(|row| &self.rows[slot(row)]);
-        let first = (column - self.first) as usize * places.blocks;
-        (rows.map(|row| &row.gains[index][first..]), part)
+        ([row, row + i32::from(part > 0.0)].map(|row| &self.rows[slot(row)]), part)
     }
 }
 

@@ -22,28 +22,23 @@ pub(super) const CHANNELS: usize = OCTAVES + 1;
 /// What does not count as amplitude and as direction, since the Gaussians of the map do not end exactly where
 /// texture and streaks do.
 pub(super) const LEAST_SUM: f32 = 1.0 / 128.0;
-pub(super) const LEAST_DIRECTION: f32 = 0.25;
+pub(super) const LEAST_DIRECTION: f32 = 0.375;
 /// Amplitude per sum.
 pub(super) const AMPLITUDE: f32 = 0.5;
 /// Direction per sum, and the direction of a sum of zero.
 pub(super) const DIRECTION: (f32, f32) = (4.0, -2.0);
-/// The sum for an amplitude, of which a decoder takes a little less.
+/// The sum for an amplitude. A small one becomes smaller, so that there is nothing where it is next to invisible.
 #[cfg(feature = "encode")]
 pub(crate) fn amplitude_sum(amplitude: f32) -> f32 {
-    beyond(LEAST_SUM, amplitude / AMPLITUDE).min(1.0)
+    let sum = amplitude / AMPLITUDE;
+    // Below `LEAST_SUM` it stays what it is, which has no effect.
+    sum.max((sum + LEAST_SUM).min(1.5 * sum - 0.5 * LEAST_SUM)).min(1.0)
 }
 
-/// The sum for a direction, of which a decoder takes a little less.
+/// The sum for a direction, of which [`LEAST_DIRECTION`] does not count.
 #[cfg(feature = "encode")]
 pub(crate) fn direction_sum(direction: f32) -> f32 {
-    let strength = beyond(LEAST_DIRECTION, direction.abs());
-    (strength.copysign(direction) - DIRECTION.1) / DIRECTION.0
-}
-
-/// The value, or one nearer to 0 if it is less than three times what counts: it falls to 0 down to that.
-#[cfg(feature = "encode")]
-fn beyond(least: f32, value: f32) -> f32 {
-    value.min(1.5 * (value - least)).max(0.0)
+    (direction - DIRECTION.1) / DIRECTION.0
 }
 
 /// The header of a picture's map: that of a picture of its own.

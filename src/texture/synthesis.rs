@@ -208,10 +208,11 @@ impl Pair<'_> {
     ) {
         let [isotropic, horizontal, vertical] = Pattern::of(self.octave);
         self.set_isotropic(&self.blocks(isotropic, nodes), coarse, a);
-        if nodes.has(horizontal) {
+        let row = self.number >> 1;
+        if nodes.has_in_row(horizontal, row) {
             self.add_horizontal(&self.blocks(horizontal, nodes), &mut streaks.horizontal, a);
         }
-        if nodes.has(vertical) {
+        if nodes.has_in_row(vertical, row) || nodes.has_in_row(vertical, row + 1) {
             self.add_vertical(&self.blocks(vertical, nodes), &mut streaks.vertical, a);
         }
     }

@@ -21,7 +21,7 @@ const MEAN_MAGNITUDE: f32 = 0.797_884_6;
 /// found.
 const RESPONSES: [[f32; OCTAVES]; OCTAVES] = [[0.943, 0.274], [0.015, 0.147]];
 /// The direction of streaks alone.
-const MOST_DIRECTION: f32 = 1.25;
+const MOST_DIRECTION: f32 = 1.375;
 /// A variance that is nothing, as of a difference of quantization steps of 16 bits.
 const NOTHING: f32 = 1e-9;
 
@@ -37,7 +37,7 @@ const DIRECTION: f32 = 1.5;
 const LEAST_SLOPE: f32 = 1e-7;
 
 /// What is wanted at the nodes of a map: amplitudes in samples, and the direction, which is positive for horizontal
-/// streaks. Of both, a decoder takes a little less.
+/// streaks. Of the latter, a decoder takes a little less.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Strength {
     pub(super) amplitudes: [f32; OCTAVES],
@@ -259,7 +259,7 @@ mod tests {
         for octave in 0..OCTAVES {
             // Gray with a texture of one octave everywhere.
             let mut color = [0.0; 4];
-            color[octave] = amplitude_sum(amplitude + 1.0 / 256.0);
+            color[octave] = amplitude_sum(amplitude);
             let gaussian = Gaussian { center: [32.0; 2], cholesky: [2000.0, 0.0, 2000.0], color };
             let step = 0.01;
             let quantization = rate_model::quantization(f64::from(step).log2(), ColorModel::Rgb);
