@@ -27,6 +27,7 @@ pub(super) const LEAST_DIRECTION: f32 = 0.375;
 pub(super) const AMPLITUDE: f32 = 0.5;
 /// Direction per sum, and the direction of a sum of zero.
 pub(super) const DIRECTION: (f32, f32) = (4.0, -2.0);
+// Constants: docs/tuning.md, "Texture".
 /// The sum for an amplitude. A small one becomes smaller, so that there is nothing where it is next to invisible.
 #[cfg(feature = "encode")]
 pub(crate) fn amplitude_sum(amplitude: f32) -> f32 {
