@@ -16,7 +16,7 @@ const SPLAT_BYTES: u64 = 48;
 
 /// A picture in the memory of the GPU, to be drawn many times: see
 /// [`GpuRenderer::upload`](crate::GpuRenderer::upload). Each Gaussian takes 116 bytes there, and the texture a
-/// quarter of a byte for each pixel.
+/// fifth of a byte for each pixel.
 #[derive(Debug)]
 pub struct GpuPicture {
     /// That of the renderer.

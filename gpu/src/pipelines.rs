@@ -14,7 +14,7 @@ pub(crate) const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 /// Invocations of a workgroup of either entry point.
 const INVOCATIONS: u32 = 256;
 /// Bytes of the memory that a workgroup of `render` shares.
-const SHARED_BYTES: u32 = 14_000;
+const SHARED_BYTES: u32 = 14_800;
 
 /// The entry points of the shader and their bindings.
 #[derive(Debug)]

@@ -12,12 +12,12 @@
 //
 // Bindings, all in group 0, with the buffers' sizes in bytes for N Gaussians:
 //
-//   0  view       uniform, 96        what to draw; see `View`
+//   0  view       uniform, 112       what to draw; see `View`
 //   1  gaussians  storage, 36 N      see below
 //   2  splats     storage, 48 N      filled by `prepare`
 //   3  bins       storage, 4 ceil(N / 32) x number of bins; at most 1024 ceil(N / 32)
 //   4  output     storage texture, rgba8unorm, of at least `pixels`
-//   5  map        storage, 16 M      the map of the picture's texture, which has M nodes; see below
+//   5  map        storage, 12 M      the map of the picture's texture, which has M nodes; see below
 //
 // `prepare` uses 0 to 3, `render` 0 and 2 to 5. Both accept a bind group with all six.
 
@@ -86,7 +86,7 @@ struct Splat {
 // For each bin, row by row, a bit for each Gaussian: the lowest bit of the first word is the first.
 @group(0) @binding(3) var<storage, read_write> bins: array<atomic<u32>>;
 @group(0) @binding(4) var output: texture_storage_2d<rgba8unorm, write>;
-// The sums m0 to m3 of the map (spec, section 9.7): four planes of ceil(stored.y / 8) + 1 rows of
+// The sums m0 to m2 of the map (spec, section 9.7): three planes of ceil(stored.y / 8) + 1 rows of
 // ceil(stored.x / 8) + 1 nodes.
 @group(0) @binding(5) var<storage, read> map: array<f32>;
 
@@ -303,119 +303,155 @@ fn sum_before(invocation: u32, count: u32) -> u32 {
     return before;
 }
 
-// ---- texture: three lattices for each tile (spec, section 9.7) ----
+// ---- texture: two lattices for each tile (spec, section 9.7) ----
 
 // The texture of a tile of the grid is interpolated from that of stored pixels, the lattice of octave 0, which is
-// made from those of octaves 1 and 2. Of these there are so many points along each axis, in one array.
-const OCTAVES: i32 = 3;
-const SIDES = array<i32, 3>(20, 13, 9);
-const STARTS = array<i32, 3>(0, 400, 569);
-var<workgroup> lattices: array<f32, 650>;
+// made from that of octave 1. Of these there are so many points along each axis, in one array.
+const OCTAVES: i32 = 2;
+const SIDES = array<i32, 2>(20, 12);
+const STARTS = array<i32, 2>(0, 400);
+var<workgroup> lattices: array<f32, 544>;
 
-// What makes the standard deviation of each octave 1: isotropic, and of streaks.
-const GAINS = array<vec3<f32>, 3>(vec3(1.0, 1.23, 1.23), vec3(1.82, 1.72, 1.72), vec3(2.1, 1.86, 1.86));
-// The signs of three numbers in the four values of a block.
-const SIGNS = array<vec3<f32>, 4>(
-    vec3(1.0, 1.0, 1.0),
-    vec3(1.0, -1.0, -1.0),
-    vec3(-1.0, 1.0, -1.0),
-    vec3(-1.0, -1.0, 1.0),
+// The gains of both octaves at the nodes that the lattices need, so many along each axis: of isotropic noise, and of
+// horizontal and vertical streaks.
+const NODES: i32 = 6;
+var<workgroup> nodes: array<vec3<f32>, 72>;
+// What makes the standard deviation of each octave's patterns 1. Octave 1 becomes larger by 16 where it is enlarged.
+const DEVIATIONS = array<vec3<f32>, 2>(
+    vec3(1.0, 1.23, 1.23) / 1024.0,
+    vec3(1.82, 1.72, 1.72) / 16384.0,
 );
 
-// The gains of the patterns of an octave at a node: isotropic, horizontal and vertical streaks.
+// A pattern of noise.
+struct Pattern {
+    octave: i32,
+    // Its place among those of its octave.
+    kind: i32,
+    // The direction of streaks: a step along them, and 0 where there are none.
+    along: vec2<i32>,
+    // Blocks from one node to the next are 1 << bits.
+    bits: u32,
+}
+
+// The first point of a lattice, if `first` is that of octave 0.
+fn first_point(first: vec2<i32>, octave: i32) -> vec2<i32> {
+    return (first >> vec2(u32(octave))) - octave;
+}
+
+// The first node that these lattices need.
+fn first_node(first: vec2<i32>) -> vec2<i32> {
+    return first_point(first, 1) >> vec2(2u);
+}
+
+// The gains of an octave at a node.
 fn gains_of_node(node: vec2<i32>, octave: i32) -> vec3<f32> {
     let count = vec2<i32>((view.stored + 7u) / 8u) + 1;
     let at = clamp(node, vec2(0), count - 1);
     let first = at.y * count.x + at.x;
     let plane = count.x * count.y;
     let strength = clamp((map[octave * plane + first] - 0.0078125) * 0.5, 0.0, 1.0) * view.fade;
-    let direction = map[3 * plane + first] * 4.0 - 2.0;
-    let horizontal = clamp(direction - 0.125, 0.0, 1.0);
-    let vertical = clamp(-0.125 - direction, 0.0, 1.0);
+    let direction = map[OCTAVES * plane + first] * 4.0 - 2.0;
+    let horizontal = clamp(direction - 0.375, 0.0, 1.0);
+    let vertical = clamp(-0.375 - direction, 0.0, 1.0);
     let streaks = horizontal + vertical;
     let isotropic = sqrt(max(1.0 - streaks * streaks, 0.0));
-    return strength * vec3(isotropic, horizontal, vertical) * GAINS[octave] / 1024.0;
+    return strength * vec3(isotropic, horizontal, vertical) * DEVIATIONS[octave];
 }
 
-// The same at a point of the lattice.
-fn gains_at(point: vec2<i32>, octave: i32) -> vec3<f32> {
-    let bits = vec2(3u - u32(octave));
-    let node = point >> bits;
-    let within = vec2<f32>(point - (node << bits)) + 0.5;
-    let part = within / f32(1u << bits.x);
-    let above = mix(gains_of_node(node, octave), gains_of_node(node + vec2(1, 0), octave), part.x);
-    let below =
-        mix(gains_of_node(node + vec2(0, 1), octave), gains_of_node(node + vec2(1, 1), octave), part.x);
+// The gain of a pattern at a node, counted from the first one.
+fn gain_of_node(node: vec2<i32>, pattern: Pattern) -> f32 {
+    return nodes[(pattern.octave * NODES + node.y) * NODES + node.x][pattern.kind];
+}
+
+// The gain of a block, in the middle or, along streaks, where it begins.
+fn gain(block: vec2<i32>, first: vec2<i32>, pattern: Pattern) -> f32 {
+    let bits = vec2(pattern.bits);
+    let node = block >> bits;
+    let within = vec2<f32>(block - (node << bits)) + 0.5 * vec2<f32>(1 - pattern.along);
+    let part = within / f32(1u << pattern.bits);
+    let at = node - first_node(first);
+    let above = mix(gain_of_node(at, pattern), gain_of_node(at + vec2(1, 0), pattern), part.x);
+    let below = mix(gain_of_node(at + vec2(0, 1), pattern), gain_of_node(at + vec2(1, 1), pattern), part.x);
     return mix(above, below, part.y);
 }
 
-// Three odd numbers from -1023 to 1023 for a block of a pattern.
-fn numbers(block: vec2<i32>, pattern: i32, octave: i32) -> vec3<f32> {
-    var seed = 16u * bitcast<u32>(block.y) + u32(4 * pattern + octave + 1);
+// One of the four values of a block: a sum of three numbers from -1024 to 1023 with the signs + + +, + - -, - + - or
+// - - +.
+fn value(block: vec2<i32>, index: i32, pattern: Pattern) -> f32 {
+    var seed = 8u * bitcast<u32>(block.y) + u32(3 * pattern.octave + pattern.kind + 1);
     seed = (seed ^ (seed >> 16u)) * 0x21f0aaadu;
     seed = (seed ^ (seed >> 15u)) * 0x735a2d97u;
     seed ^= seed >> 15u;
     var random = bitcast<u32>(block.x) * 0x9e3779b1u + seed;
     random = (random ^ (random >> 15u)) * 0x2c1b3c6du;
-    let bits = vec3(random >> 2u, random >> 12u, random >> 22u) & vec3(1023u);
-    return vec3<f32>(2 * vec3<i32>(bits) - 1023);
+    let numbers = bitcast<vec3<i32>>(vec3(random, random << 11u, random << 21u)) >> vec3(21u);
+    let signs = select(vec3(-1), vec3(1), vec3(index < 2, index % 2 == 0, index % 3 == 0));
+    let products = signs * numbers;
+    return f32(products.x + products.y + products.z);
 }
 
-// A pattern at a point of the lattice of an octave.
-fn isotropic(point: vec2<i32>, octave: i32) -> f32 {
-    let value = (point.y & 1) * 2 + (point.x & 1);
-    return dot(SIGNS[value], numbers(point >> vec2(1u), 0, octave));
+// Noise at a point of a lattice, multiplied by its gain.
+fn isotropic(point: vec2<i32>, first: vec2<i32>, octave: i32) -> f32 {
+    let pattern = Pattern(octave, 0, vec2(0), u32(2 - octave));
+    let block = point >> vec2(1u);
+    let factor = gain(block, first, pattern);
+    if (factor == 0.0) {
+        return 0.0;
+    }
+    return factor * value(block, (point.y & 1) * 2 + (point.x & 1), pattern);
 }
 
-fn streaks(point: vec2<i32>, pattern: i32, octave: i32) -> f32 {
-    let along = select(vec2(0, 1), vec2(1, 0), pattern == 1);
-    let within = point & vec2(3);
-    let signs = SIGNS[select(within.x, within.y, pattern == 1)];
+// The same of streaks, whose values change from one block to the next.
+fn streaks(point: vec2<i32>, first: vec2<i32>, octave: i32, kind: i32) -> f32 {
+    let along = select(vec2(0, 1), vec2(1, 0), kind == 1);
+    let pattern = Pattern(octave, kind, along, u32(1 - octave));
     let block = point >> vec2(2u);
-    let near = dot(signs, numbers(block, pattern, octave));
-    let far = dot(signs, numbers(block + along, pattern, octave));
-    let part = (f32(select(within.y, within.x, pattern == 1)) + 0.5) / 4.0;
-    return near + (far - near) * part;
+    let factors = vec2(gain(block, first, pattern), gain(block + along, first, pattern));
+    if (all(factors == vec2(0.0))) {
+        return 0.0;
+    }
+    let within = point & vec2(3);
+    let index = dot(within, 1 - along);
+    let near = factors.x * value(block, index, pattern);
+    let far = factors.y * value(block + along, index, pattern);
+    return mix(near, far, (f32(dot(within, along)) + 0.5) / 4.0);
 }
 
-// A point of the lattice of the next coarser octave, of which `first` is the first point there is.
-fn coarser(point: vec2<i32>, first: vec2<i32>, octave: i32) -> f32 {
-    let at = point - first;
-    return lattices[STARTS[octave] + at.y * SIDES[octave] + at.x];
+// A point of the lattice of octave 1, counted from the first one.
+fn coarser(at: vec2<i32>) -> f32 {
+    return lattices[STARTS[1] + at.y * SIDES[1] + at.x];
 }
 
-// The lattice of the next coarser octave, enlarged by two, at a point.
-fn enlarged(point: vec2<i32>, first: vec2<i32>, octave: i32) -> f32 {
-    let near = point >> vec2(1u);
+// The lattice of octave 1, enlarged by two, at a point.
+fn enlarged(point: vec2<i32>, first: vec2<i32>) -> f32 {
+    let near = (point >> vec2(1u)) - first_point(first, 1);
     let far = near + (point & vec2(1)) * 2 - 1;
-    let left = coarser(near, first, octave) * 0.75 + coarser(vec2(near.x, far.y), first, octave) * 0.25;
-    let right = coarser(vec2(far.x, near.y), first, octave) * 0.75 + coarser(far, first, octave) * 0.25;
-    return left * 0.75 + right * 0.25;
+    let in_row = 3.0 * coarser(near) + coarser(vec2(far.x, near.y));
+    let beside = 3.0 * coarser(vec2(near.x, far.y)) + coarser(far);
+    return 3.0 * in_row + beside;
 }
 
-// Fills the lattices, of which the finest begins at the stored pixel `first`. All invocations of the workgroup call
+// Fills the lattices, of which the finer begins at the stored pixel `first`. All invocations of the workgroup call
 // it together.
 fn make_lattices(first: vec2<i32>, invocation: u32) {
-    let firsts = array(first, (first >> vec2(1u)) - 1, (((first >> vec2(1u)) - 1) >> vec2(1u)) - 1);
+    let index = i32(invocation);
+    if (index < OCTAVES * NODES * NODES) {
+        let node = vec2(index % NODES, index / NODES % NODES);
+        nodes[index] = gains_of_node(first_node(first) + node, index / (NODES * NODES));
+    }
+    workgroupBarrier();
     for (var octave = OCTAVES - 1; octave >= 0; octave--) {
         let side = SIDES[octave];
-        for (var i = i32(invocation); i < side * side; i += i32(BATCH)) {
-            let point = firsts[octave] + vec2(i % side, i / side);
-            var value = 0.0;
-            if (octave < OCTAVES - 1) {
-                value = enlarged(point, firsts[octave + 1], octave + 1);
+        for (var i = index; i < side * side; i += i32(BATCH)) {
+            let point = first_point(first, octave) + vec2(i % side, i / side);
+            var sum = 0.0;
+            if (octave == 0) {
+                sum = enlarged(point, first);
             }
-            let gains = gains_at(point, octave);
-            if (gains.x > 0.0) {
-                value += gains.x * isotropic(point, octave);
-            }
-            if (gains.y > 0.0) {
-                value += gains.y * streaks(point, 1, octave);
-            }
-            if (gains.z > 0.0) {
-                value += gains.z * streaks(point, 2, octave);
-            }
-            lattices[STARTS[octave] + i] = value;
+            sum += isotropic(point, first, octave);
+            sum += streaks(point, first, octave, 1);
+            sum += streaks(point, first, octave, 2);
+            lattices[STARTS[octave] + i] = sum;
         }
         workgroupBarrier();
     }
