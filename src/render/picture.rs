@@ -68,7 +68,7 @@ impl<'a> Picture<'a> {
     }
 
     /// The map of the texture as a picture of its own; `None` without texture. Its pixels are the map's nodes,
-    /// and the planes that it renders are their sums: the strengths of three octaves, and the direction (spec,
+    /// and the planes that it renders are their sums: the strengths of two octaves, and the direction (spec,
     /// section 9.7). This is for programs that make the texture themselves, for instance on a GPU.
     #[must_use]
     pub fn texture_map(&self) -> Option<Self> {

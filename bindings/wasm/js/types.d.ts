@@ -126,9 +126,9 @@ export interface Samples {
 export type Gaussian9 = Float32Array;
 
 /**
- * The map of a texture, for programs that make the texture themselves (spec, section 9.7): four planes of
+ * The map of a texture, for programs that make the texture themselves (spec, section 9.7): three planes of
  * ceil(height / 8) + 1 rows of ceil(width / 8) + 1 nodes, of the picture's stored size. They are the sums m0 to
- * m3, of which the strengths of three octaves follow, and the direction.
+ * m2, of which the strengths of two octaves follow, and the direction.
  */
 export type TextureMap = Float32Array;
 

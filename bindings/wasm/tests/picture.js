@@ -23,7 +23,7 @@ export function exif(orientation) {
  * A texture for pictures of 96 x 64 pixels, in all octaves and directions, as the chunk `['tXTR', texture]`
  * (spec, section 5.7).
  */
-export const texture = Buffer.from('cdcc4c3d0400000058ec9600dd08f627913958c64ebb94947c0030f2117f4aa0abdad283', 'hex');
+export const texture = Buffer.from('cdcc4c3d0500000016cf390289de2efaff32b0f962893d665ac3fc6f284695d15f64d4820c80c6b1a77bb2d580dec560', 'hex');
 
 /** By Exif's values: where a place of a picture of this size, as stored, is in the upright one. */
 export const turns = (width, height) => ({
