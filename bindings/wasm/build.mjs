@@ -46,8 +46,8 @@ mkdirSync(dist);
 const wasm = join(dist, 'image_gip_bg.wasm');
 run(
   join(root, 'node_modules', '.bin', 'wasm-opt'),
-  // The features are those that the module says it has.
-  '-O3',
+  // The features are those that the module says it has. With `-O3`, it is as fast and 16 kB larger.
+  '-O2',
   // Once more while the module shrinks: it is 2 kB smaller when compressed.
   '--converge',
   '--strip-debug',

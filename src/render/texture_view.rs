@@ -174,7 +174,8 @@ impl Cubic {
 /// The texture of a row of tiles, and what a thread needs to make it.
 #[derive(Debug, Default)]
 pub(super) struct TextureRow {
-    synthesis: Synthesis,
+    /// Made with the first row: only pictures with texture have it.
+    synthesis: Option<Synthesis>,
     /// Rows of cells, each in the place that its number has by the remainder.
     cells: Vec<CellRow>,
     /// A row of stored pixels between rows.
@@ -226,6 +227,7 @@ impl TextureRow {
         let width = view.width();
         self.cells.resize_with(view.cell_rows(), CellRow::default);
         let place = |row: i32| row.rem_euclid(view.cell_rows() as i32) as usize;
+        let synthesis = self.synthesis.get_or_insert_default();
         let mut shows = false;
         for row in view.rows.cells(grid.clone()) {
             let cells = &mut self.cells[place(row)];
@@ -233,7 +235,7 @@ impl TextureRow {
                 cells.row = Some(row);
                 cells.values.resize(width * CELL, 0.0);
                 let values = &mut cells.values;
-                cells.shows = self.synthesis.make(&view.map, row, &view.cells, values, arithmetic);
+                cells.shows = synthesis.make(&view.map, row, &view.cells, values, arithmetic);
             }
             shows |= cells.shows;
         }

@@ -142,6 +142,7 @@ impl NodeRows {
     }
 
     /// The rows of nodes above and below a row of blocks, and how far it is on the way from one to the other.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn rows_around(&self, pattern: Pattern, block_row: i32) -> ([&NodeRow; 2], f32) {
         let blocks = pattern.blocks() as i32;
         let row = block_row.div_euclid(blocks);
@@ -157,7 +158,8 @@ fn slot(row: i32) -> usize {
 }
 
 /// Makes the gains of all patterns at nodes with these sums, and says which patterns have any.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
 fn at_nodes<A: Arithmetic>(
     sums: &[Vec<f32>; CHANNELS],
     fade: f32,
@@ -192,7 +194,8 @@ fn at_nodes<A: Arithmetic>(
 }
 
 /// Makes the gains of blocks from those at the nodes. There are `LANES` more nodes than cells.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
 fn between<A: Arithmetic>(nodes: &[f32], places: Places, gains: &mut [f32], a: A) {
     let cells = nodes.len() - A::LANES;
     for at in (0..cells).step_by(A::LANES) {

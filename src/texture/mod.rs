@@ -3,7 +3,8 @@
 //!
 //! [`chunk`] reads and writes the Gaussians of the map, [`map`] says what the map's values mean,
 //! [`noise`] lists the patterns, [`gains`] has what they are multiplied by, and [`synthesis`] adds them up, all
-//! with the [`arithmetic`] of the backend.
+//! with the [`arithmetic`] of the backend. Functions are inlined into that of a level, where that has instructions of
+//! its own; WebAssembly has one level for all code, and the large ones are not copied there: pages load them.
 
 mod arithmetic;
 mod chunk;

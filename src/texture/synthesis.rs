@@ -164,7 +164,8 @@ impl Synthesis {
 impl CoarsePair {
     /// Takes in two rows that begin a cell before these: of two points in place of one, the first is three times the one
     /// point and the one before it, and the second is three times the one point and the one after it.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn enlarge<A: Arithmetic>(&mut self, narrow: &[f32], width: usize, a: A) {
         self.values.resize(2 * width, 0.0);
         let rows = narrow.chunks_exact(narrow.len() / 2);
@@ -198,7 +199,8 @@ fn sums<V: Add<Output = V>>([a, b]: [V; 2], [c, d]: [V; 2]) -> [V; 2] {
 
 impl Pair<'_> {
     /// Sets the rows to the patterns of their octave, and to the coarser octaves.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn set<A: Arithmetic>(
         mut self,
         nodes: &NodeRows,
