@@ -139,6 +139,10 @@ impl Arithmetic for Plain {
     }
 }
 
+/// What all slices have.
+#[cfg(feature = "std")]
+const WHOLE: &str = "a whole vector";
+
 /// SIMD code of a level.
 #[cfg(feature = "std")]
 #[derive(Clone, Copy, Debug)]
@@ -162,12 +166,12 @@ impl<S: Simd> Arithmetic for Vectors<S> {
 
     #[inline(always)]
     fn load(self, from: &[f32]) -> f32x16<S> {
-        f32x16::from_slice(self.0, &from[..16])
+        f32x16::load_array_ref(self.0, from.first_chunk().expect(WHOLE))
     }
 
     #[inline(always)]
     fn store(self, values: f32x16<S>, to: &mut [f32]) {
-        values.store_slice(&mut to[..16]);
+        values.store_array(to.first_chunk_mut().expect(WHOLE));
     }
 
     #[inline(always)]
