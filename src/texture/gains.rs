@@ -177,8 +177,8 @@ fn at_nodes<A: Arithmetic>(
         let (horizontal, vertical) = (a.unit(direction - least), a.unit(-least - direction));
         let streaks = horizontal + vertical;
         let isotropic = a.sqrt(a.splat(1.0) - streaks * streaks);
-        for octave in 0..OCTAVES {
-            let sum = a.load(&sums[octave][at..]) - a.splat(LEAST_SUM);
+        for (octave, sums) in sums[..OCTAVES].iter().enumerate() {
+            let sum = a.load(&sums[at..]) - a.splat(LEAST_SUM);
             let amplitude = a.unit(sum * a.splat(AMPLITUDE)) * a.splat(fade);
             for (pattern, weight) in
                 Pattern::of(octave).into_iter().zip([isotropic, horizontal, vertical])
