@@ -131,7 +131,7 @@ fn map(sides: [u32; 2], count: u32, size: i32) -> Texture {
     let grid = Grid::new(map);
     let code = |n: u32| {
         let center = grid.units([(n % map[0]) as f32 + 0.5, (n / map[0] % map[1]) as f32 + 0.5]);
-        Code { exponent: 2, axes: vec![3, 1, 0, 1], size, center, ..Code::default() }
+        Code { exponent: 2, axes: vec![3, 1, 0], size, center, ..Code::default() }
     };
     Texture { step: 0.5, codes: (0..count).map(code).collect() }
 }

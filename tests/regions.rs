@@ -27,7 +27,7 @@ fn a_region_is_that_part_of_the_picture() {
 #[test]
 fn a_region_has_the_texture_of_that_part() {
     let mut chunks = chunks();
-    let texture = Texture::constant(SIZE.into(), [0.2, 0.1, 0.3, 0.6]).payload(SIZE.into());
+    let texture = Texture::constant(SIZE.into(), [0.2, 0.3, 0.7]).payload(SIZE.into());
     chunks.insert(BEFORE, chunk(b"tXTR", &texture));
     let bytes = of_chunks(&chunks);
     a_region_of(&bytes);

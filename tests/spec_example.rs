@@ -5,7 +5,7 @@ mod common;
 
 use common::oracle::{self, Request};
 use common::rans::Op;
-use common::synthesis::{Block, Node, Synthesis, map_sums, noise};
+use common::synthesis::{Block, Node, Synthesis, map_sums};
 use common::{File, Ghdr, decode_valid, entropy, texture};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
@@ -57,6 +57,13 @@ impl Example {
             .lines()
             .flat_map(|line| line.split(';').next().unwrap_or_default().split_ascii_whitespace());
         bytes.map(|byte| u8::from_str_radix(byte, 16).expect("a byte in hex")).collect()
+    }
+
+    /// Checks that the text has these words, however its lines are broken.
+    #[track_caller]
+    fn says(self, words: &str) {
+        let text = self.0.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(words), "{words}");
     }
 
     /// Checks that these are the Gaussians whose values are printed.
@@ -227,7 +234,7 @@ fn the_hex_of_the_texture_decodes_to_what_is_printed() {
     let planes = oracle::render(&file, &Request::whole(&file));
     assert!(oracle::samples(&planes, 8).into_iter().eq(printed.iter().map(|&s| s.into())));
     let pixel = planes[0][6 + 3];
-    assert!(textured().0.contains(&format!("the pixel is {pixel}, and the sample {}", printed[9])));
+    textured().says(&format!("the pixel is {pixel}, and the sample {}", printed[9]));
 }
 
 #[test]
@@ -238,18 +245,18 @@ fn the_map_of_the_texture_is_what_is_printed() {
     let layer = entropy::read(texture::map_sides(SIDES), &steps, &payload()[4..]);
     let layer = layer.expect("a sound layer");
     let code = &layer.codes[0];
-    assert_eq!((code.exponent, &code.axes[..], code.size), (2, &[4, 4, 0, 4][..], 0));
+    assert_eq!((code.exponent, &code.axes[..], code.size), (2, &[7, 0, 2][..], 0));
     assert_eq!((code.ratio, code.slant), (0, 1));
-    assert!(textured().0.contains(&format!("; state 0x{:08X}", layer.states[0])));
-    assert!(textured().0.contains(&format!("0.19 \\* 6) / ({} ", steps[1])));
+    textured().says(&format!("; state 0x{:08X}", layer.states[0]));
+    textured().says(&format!("0.19 \\* 6) / ({} ", steps[1]));
     check_rows("| x | y |", [texts(&layer.values[0])]);
 
     let sums = map_sums(SIDES, &payload());
     let row = |node: usize| {
-        let sums = [0, 1, 2, 3].map(|m| sums[m][node]);
+        let sums = [0, 1, 2].map(|m| sums[m][node]);
         let found = Node::new(sums, 1.0);
-        assert_eq!((found.amplitudes[2], found.vertical), (0.0, 0.0));
-        let [a0, a1, _] = found.amplitudes;
+        assert_eq!(found.vertical, 0.0);
+        let [a0, a1] = found.amplitudes;
         let numbers = [&sums[..], &[a0, a1, found.horizontal, found.isotropic]].concat();
         [vec![format!("{}, {}", node % 2, node / 2)], texts(&numbers)].concat()
     };
@@ -258,28 +265,46 @@ fn the_map_of_the_texture_is_what_is_printed() {
 
 #[test]
 fn the_trace_of_the_texture_is_what_is_printed() {
+    let synthesis = Synthesis::new(&textured_file(), SIDES.into()).expect("texture");
     let block = |(octave, pattern, x): (usize, usize, i64)| {
         let Block { k, s, r, numbers: [a, b, c] } = Block::new(octave, pattern, x, 0);
         let cells = [format!("{x}, 0"), k.to_string(), format!("`{s:08X}`"), format!("`{r:08X}`")];
         let start = [octave, pattern].map(|n| n.to_string());
-        [&start[..], &cells, &[a, b, c].map(|n| n.to_string())].concat()
+        let gain = synthesis.gain(octave, pattern, x, 0).to_string();
+        [&start[..], &cells, &[a, b, c].map(|n| n.to_string()), &[gain]].concat()
     };
     let of_octave_1 = [(1, 0, 0), (1, 0, 1), (1, 1, 0), (1, 1, 1)];
     let of_octave_0 = [(0, 0, 1), (0, 1, 0), (0, 1, 1)];
     check_rows("| octave | p |", of_octave_1.into_iter().chain(of_octave_0).map(block));
 
-    let synthesis = Synthesis::new(&textured_file(), SIDES.into()).expect("texture");
+    // The values of octave 0.
+    let gain = synthesis.gain(0, 0, 1, 0);
+    let [a, b, c] = Block::new(0, 0, 1, 0).numbers.map(|number| number as f32 * gain);
+    let isotropic = synthesis.values(0, 0, 1, 0)[3];
+    textured().says(&format!("a = {a}, b = {b} and c = {c}, so V3 = -((b - c) + a) = {isotropic}"));
+    let [this, next] = [0, 1].map(|x| synthesis.values(0, 1, x, 0)[1]);
+    let streaks = synthesis.noise(0, 1, 3, 1);
+    textured().says(&format!("V1 = {this} of the one block and V1 = {next} of"));
+    textured().says(&format!("that is {streaks}"));
+
     let [fine, coarse] = [0, 1].map(|octave| synthesis.lattice(octave, -2..8, -2..6));
     let point = |(octave, x, y): (usize, i64, i64)| {
+        let [isotropic, streaks] = [0, 1].map(|pattern| synthesis.noise(octave, pattern, x, y));
         let (start, sum) = match octave {
-            0 => (coarse.enlarged(x, y), fine.at(x, y)),
-            _ => (0.0, coarse.at(x, y)),
+            0 => (coarse.enlarged(x, y).to_string(), fine.at(x, y)),
+            _ => ("-".into(), coarse.at(x, y)),
         };
-        let gain = |pattern| synthesis.gain(x, y, octave, pattern);
-        let [isotropic, streaks] = [0, 1].map(|pattern| noise(octave, pattern, x, y));
-        let numbers = texts(&[start, gain(0), isotropic, gain(1), streaks, sum]);
-        [vec![octave.to_string(), format!("{x}, {y}")], numbers].concat()
+        let place = [octave.to_string(), format!("{x}, {y}"), start];
+        [&place[..], &texts(&[isotropic, streaks, sum])].concat()
     };
     let points = [(1, 1, 0), (1, 2, 0), (1, 1, 1), (1, 2, 1), (0, 3, 1)];
     check_rows("| octave | point |", points.map(point));
+    let sum = |old: f32, beside: f32, sum: f32| {
+        textured().says(&format!("3 \\* {old} + {beside} = {sum}").replace("+ -", "- "));
+    };
+    let rows = [0, 1].map(|row| coarse.enlarged_along_x(3, row));
+    for row in [0, 1] {
+        sum(coarse.at(1, row), coarse.at(2, row), rows[row as usize]);
+    }
+    sum(rows[0], rows[1], coarse.enlarged(3, 1));
 }

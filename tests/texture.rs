@@ -6,10 +6,15 @@ mod common;
 use common::entropy::{Code, Grid};
 use common::oracle::{self, Request};
 use common::scenes::{SMOOTH, assert_matches_oracle, planes, random_rows, scene};
-use common::synthesis::{map_sums, noise};
-use common::texture::{Texture, map_sides};
+use common::synthesis::{Block, Place, blocks_between_nodes, map_sums, place_in_block};
+use common::texture::{Texture, axes, map_sides};
 use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, decode, of_chunks};
 use image_gip::{RenderOptions, Threads};
+
+/// The codes of the colour axes of about this much of each sum.
+fn rounded_axes(colors: [f32; 3]) -> [i32; 3] {
+    axes(colors).map(|axis| axis.round() as i32)
+}
 
 /// Random Gaussians with small codes over a map.
 fn random_map(random: &mut Random, sides: [u32; 2], step: f32, count: usize) -> Texture {
@@ -19,7 +24,8 @@ fn random_map(random: &mut Random, sides: [u32; 2], step: f32, count: usize) -> 
         let exponent = (random.next() % 6) as u32;
         let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
         let shape = 1 << exponent.saturating_sub(1);
-        let axes = [6, 6, 6, 2].map(&mut within).to_vec();
+        // Directions are of all kinds: their whole range is narrower than that of strengths.
+        let axes = rounded_axes([9, 9, 2].map(|most| within(most) as f32)).to_vec();
         let [size, ratio, slant] = [within(shape), within(shape), within(shape)];
         let center = grid.units(map.map(|side| random.range(0.0, side as f32)));
         Code { exponent, axes, size, ratio, slant, center }
@@ -68,8 +74,8 @@ fn random_maps_match_the_oracle_bit_for_bit() {
     for (size, color) in sizes.into_iter().zip(colors.into_iter().cycle()) {
         let sides = [size.0, size.1];
         let nodes = map_sides(sides).map(|side| side as usize);
-        // Strong, and just above what is cut off.
-        for step in [1.0, 0.02] {
+        // Strong, of directions between the patterns, and just above what is cut off.
+        for step in [1.0, 0.2, 0.02] {
             let count = (nodes[0] * nodes[1]).min(14);
             let file = textured(color, size, &random_map(&mut random, sides, step, count));
             for (width, height) in outputs(size) {
@@ -81,9 +87,9 @@ fn random_maps_match_the_oracle_bit_for_bit() {
 
 #[test]
 fn every_octave_and_direction_matches_the_oracle() {
-    for octave in 0..3 {
-        for direction in [0.5, 0.95, 0.05, 0.6, 0.4] {
-            let mut sums = [0.0, 0.0, 0.0, direction];
+    for octave in 0..2 {
+        for direction in [0.5, 0.95, 0.05, 0.7, 0.3] {
+            let mut sums = [0.0, 0.0, direction];
             sums[octave] = 0.7;
             let size = (37, 45);
             let file = textured(GRAY, size, &Texture::constant([size.0, size.1], sums));
@@ -145,35 +151,38 @@ fn without_texture_the_samples_are_those_of_the_file_without_the_chunk() {
 fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
     let map = map_sides(sides);
     let grid = Grid::new(map);
-    let at = |x: f32, y: f32, axes: [i32; 4]| Code {
+    let at = |x: f32, y: f32, colors: [f32; 3]| Code {
         exponent: 2,
-        axes: axes.to_vec(),
+        axes: rounded_axes(colors).to_vec(),
         center: grid.units([x, y]),
         ..Code::default()
     };
     let nodes = || (0..map[1]).flat_map(|y| (0..map[0]).map(move |x| (x, y)));
-    let sign = |x: u32, y: u32| if (x + y).is_multiple_of(2) { 1 } else { -1 };
-    let on_nodes = |axes: &dyn Fn(u32, u32) -> [i32; 4]| -> Vec<Code> {
-        nodes().map(|(x, y)| at(x as f32 + 0.5, y as f32 + 0.5, axes(x, y))).collect()
+    let sign = |x: u32, y: u32| if (x + y).is_multiple_of(2) { 1.0 } else { -1.0 };
+    let on_nodes = |colors: &dyn Fn(u32, u32) -> [f32; 3]| -> Vec<Code> {
+        nodes().map(|(x, y)| at(x as f32 + 0.5, y as f32 + 0.5, colors(x, y))).collect()
     };
     let last = map[0] as f32 - 0.1;
     vec![
         ("as many Gaussians as nodes", {
-            let codes = on_nodes(&|x, y| [9 * sign(x, y), 5, -3 * sign(x, y), 6 * sign(y, 0)]);
+            let codes = on_nodes(&|x, y| [9.0 * sign(x, y), 5.0, 6.0 * sign(y, 0)]);
             Texture { step: 0.3, codes }
         }),
         ("as many at one point", {
-            Texture { step: 0.01, codes: nodes().map(|_| at(2.2, 2.9, [5, 1, -2, 1])).collect() }
+            Texture { step: 0.01, codes: nodes().map(|_| at(2.2, 2.9, [5.0, 2.0, 1.0])).collect() }
         }),
         ("colours at the bound", {
-            let codes = on_nodes(&|x, y| [60 * sign(x, y), 20, -20, 60 * sign(x, 0)]);
+            let codes = on_nodes(&|x, y| [60.0 * sign(x, y), 20.0, 60.0 * sign(x, 0)]);
             Texture { step: 900.0, codes }
         }),
         (
             "the largest step",
             Texture {
                 step: 1024.0,
-                codes: vec![at(1.0, 1.0, [1, 0, -1, 1]), at(last, 2.0, [60_000, -3, 2, -60_000])],
+                codes: vec![
+                    at(1.0, 1.0, [1.0, 0.5, 1.0]),
+                    at(last, 2.0, [40_000.0, -3.0, -40_000.0]),
+                ],
             },
         ),
         (
@@ -181,18 +190,18 @@ fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
             Texture {
                 step: 1.0 / 1_048_576.0,
                 codes: vec![
-                    at(1.0, 1.0, [1, 0, -1, 1]),
-                    at(last, 2.0, [65_000, 60_000, -50_000, 65_000]),
+                    at(1.0, 1.0, [1.0, 0.5, 1.0]),
+                    at(last, 2.0, [50_000.0, 40_000.0, 20_000.0]),
                 ],
             },
         ),
-        ("all negative", Texture { step: 1.0, codes: on_nodes(&|_, _| [-9, 0, 0, 3]) }),
+        ("all negative", Texture { step: 1.0, codes: on_nodes(&|_, _| [-9.0, -9.0, 3.0]) }),
         (
             "around the map",
             Texture {
                 step: 1.0,
                 codes: [[-7.5, -7.5], [map[0] as f32 + 7.0, 1.0], [1.0, map[1] as f32 + 7.0]]
-                    .map(|[x, y]| Code { size: 9, ..at(x, y, [40, 9, 9, 20]) })
+                    .map(|[x, y]| Code { size: 9, ..at(x, y, [40.0, 9.0, 20.0]) })
                     .to_vec(),
             },
         ),
@@ -201,8 +210,8 @@ fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
             Texture {
                 step: 1.0,
                 codes: vec![
-                    Code { size: 400, ..at(1.0, 1.0, [9, 0, 0, 0]) },
-                    Code { size: -400, ..at(2.0, 1.0, [9, 0, 0, 0]) },
+                    Code { size: 400, ..at(1.0, 1.0, [9.0, 9.0, 0.0]) },
+                    Code { size: -400, ..at(2.0, 1.0, [9.0, 9.0, 0.0]) },
                 ],
             },
         ),
@@ -215,7 +224,7 @@ fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
                         size: 5,
                         ratio: 3,
                         slant: 9 * slant,
-                        ..at(4.0, 3.0, [30, 8, 9, 4])
+                        ..at(4.0, 3.0, [30.0, 8.0, 4.0])
                     })
                     .collect(),
             },
@@ -243,39 +252,52 @@ fn extreme_maps_match_the_oracle() {
 /// T of an octave in f64, from the sums of the map.
 fn exact(sums: &[Vec<f32>], sides: [u32; 2], octave: usize, [x, y]: [i64; 2]) -> f64 {
     let mut texture = 0.0;
-    if octave < 2 {
+    if octave == 0 {
         let parents =
             |at: i64| [(at.div_euclid(2), 0.75), ((at - 1).div_euclid(2) + at.rem_euclid(2), 0.25)];
         for (column, of_column) in parents(x) {
             for (row, of_row) in parents(y) {
-                texture += of_column * of_row * exact(sums, sides, octave + 1, [column, row]);
+                texture += of_column * of_row * exact(sums, sides, 1, [column, row]);
             }
         }
     }
-    let gain = |pattern: usize, [column, row]: [i64; 2]| {
+    let gain_of_node = |pattern: usize, [column, row]: [i64; 2]| {
         let [width, height] = sides.map(i64::from);
         let node = (row.clamp(0, height - 1) * width + column.clamp(0, width - 1)) as usize;
-        let [amplitude, direction] = [octave, 3].map(|m| f64::from(sums[m][node]));
+        let [amplitude, direction] = [octave, 2].map(|m| f64::from(sums[m][node]));
         let d = 4.0 * direction - 2.0;
-        let streaks = (d.abs() - 0.125).clamp(0.0, 1.0);
+        let streaks = (d.abs() - 0.375).clamp(0.0, 1.0);
         let part = match pattern {
-            0 => (1.0 - streaks * streaks).sqrt() * [1.0, 1.82, 2.1][octave],
-            _ if (d > 0.0) == (pattern == 1) => streaks * [1.23, 1.72, 1.86][octave],
+            0 => (1.0 - streaks * streaks).sqrt() * [1.0, 1.82][octave],
+            _ if (d > 0.0) == (pattern == 1) => streaks * [1.23, 1.72][octave],
             _ => 0.0,
         };
         ((amplitude - 1.0 / 128.0) / 2.0).clamp(0.0, 1.0) * part / 1024.0
     };
-    let n = 8 >> octave;
-    let [column, row] = [x, y].map(|at| at.div_euclid(n));
-    let [right, below] = [x, y].map(|at| (at.rem_euclid(n) as f64 + 0.5) / n as f64);
-    for pattern in 0..3 {
+    let gain = |pattern: usize, [x, y]: [i64; 2]| {
+        let n = blocks_between_nodes(octave, pattern);
+        let [column, row] = [x, y].map(|at| at.div_euclid(n));
+        let [e, f] = place_in_block(pattern).map(f64::from);
+        let right = (x.rem_euclid(n) as f64 + e) / n as f64;
+        let below = (y.rem_euclid(n) as f64 + f) / n as f64;
         let mut mean = 0.0;
         for (column, of_column) in [(column, 1.0 - right), (column + 1, right)] {
             for (row, of_row) in [(row, 1.0 - below), (row + 1, below)] {
-                mean += of_column * of_row * gain(pattern, [column, row]);
+                mean += of_column * of_row * gain_of_node(pattern, [column, row]);
             }
         }
-        texture += mean * f64::from(noise(octave, pattern, x, y));
+        mean
+    };
+    for pattern in 0..3 {
+        let Place { block, value, next, part } = Place::new(pattern, x, y);
+        let part = f64::from(part);
+        let weights = if next.is_some() { [1.0 - part, part] } else { [1.0, 0.0] };
+        for (block @ [x, y], weight) in [block, next.unwrap_or(block)].into_iter().zip(weights) {
+            let signs = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]][value];
+            let numbers = Block::new(octave, pattern, x, y).numbers;
+            let number: i32 = signs.iter().zip(numbers).map(|(sign, number)| sign * number).sum();
+            texture += weight * gain(pattern, block) * f64::from(number);
+        }
     }
     texture
 }
@@ -353,22 +375,22 @@ fn texture_that_has_arrived_is_shown() {
     }
 }
 
-/// The texture of a part of a picture of 24 megapixels that has the same of it everywhere, in rows of `SIDE`.
-fn constant(octaves: [f32; 3], direction: f32) -> Vec<f32> {
-    const PICTURE: (u32, u32) = (6000, 4000);
-    let sums = octaves.map(|deviation| 2.0 * deviation + 1.0 / 128.0);
-    let [m0, m1, m2] = sums;
-    let texture = Texture::constant(PICTURE.into(), [m0, m1, m2, direction]);
-    let header =
-        Ghdr { width: PICTURE.0, height: PICTURE.1, base: [32768, 0, 0, 0], ..Ghdr::default() };
-    let payload = texture.payload(header.sides());
-    let file = File::of_floats(header, &[]).with(b"tXTR", &payload);
-    let side = SIDE as u32;
-    let region = (4321, 2345, side, side);
+/// The texture of a part of a picture.
+fn part(texture: &Texture, (width, height): (u32, u32), region: (u32, u32, u32, u32)) -> Vec<f32> {
+    let header = Ghdr { width, height, base: [32768, 0, 0, 0], ..Ghdr::default() };
+    let file = File::of_floats(header, &[]).with(b"tXTR", &texture.payload(header.sides()));
     let request = Request { region, ..Request::whole(&file) };
     let base = 32768.0 / 65535.0;
     let planes = planes(&file, &request, false, Threads::Pool);
     planes.into_iter().map(|bits| f32::from_bits(bits) - base).collect()
+}
+
+/// The texture of a part of a picture of 24 megapixels that has the same of it everywhere, in rows of `SIDE`.
+fn constant(octaves: [f32; 2], direction: f32) -> Vec<f32> {
+    const PICTURE: (u32, u32) = (6000, 4000);
+    let [m0, m1] = octaves.map(|deviation| 2.0 * deviation + 1.0 / 128.0);
+    let texture = Texture::constant(PICTURE.into(), [m0, m1, direction]);
+    part(&texture, PICTURE, (4320, 2344, SIDE as u32, SIDE as u32))
 }
 
 const SIDE: usize = 1024;
@@ -406,10 +428,10 @@ fn product(a: &[f32], b: &[f32]) -> f64 {
 
 #[test]
 fn an_octave_has_the_deviation_that_the_map_says() {
-    for octave in 0..3 {
-        for direction in [ISOTROPIC, HORIZONTAL, VERTICAL, 0.6, 0.4] {
+    for octave in 0..2 {
+        for direction in [ISOTROPIC, HORIZONTAL, VERTICAL, 0.7, 0.3] {
             let wanted = 0.125;
-            let mut octaves = [0.0; 3];
+            let mut octaves = [0.0; 2];
             octaves[octave] = wanted as f32;
             let texture = constant(octaves, direction);
             let average = mean(texture.iter().map(|&value| value.into()));
@@ -418,15 +440,61 @@ fn an_octave_has_the_deviation_that_the_map_says() {
             println!("octave {octave}, {direction}: {average:e}, {deviation}");
             assert!(average.abs() < wanted / 200.0, "octave {octave}, {direction}: mean {average}");
             let error = (deviation / wanted - 1.0).abs();
-            assert!(error < 0.04, "octave {octave}, {direction}: deviation {deviation}");
+            assert!(error < 0.02, "octave {octave}, {direction}: deviation {deviation}");
         }
     }
 }
 
+/// That points of one block have the sum 0, but for rounding.
+#[track_caller]
+fn assert_sums_are_0(sums: impl Iterator<Item = f32>) {
+    let worst = sums.map(f32::abs).max_by(f32::total_cmp).expect("a sum");
+    assert!(worst < 1e-6, "{worst:e}");
+}
+
+#[test]
+fn isotropic_blocks_have_the_sum_0_wherever_their_strength_changes() {
+    let (width, height) = (124, 90);
+    let mut random = Random(17);
+    let mut islands = random_map(&mut random, [width, height], 0.01, 20);
+    // Of octave 0 alone, without direction.
+    for code in &mut islands.codes {
+        code.size = -4 << code.exponent.saturating_sub(1);
+        let strength = random.range(30.0, 90.0);
+        code.axes = rounded_axes([strength, -strength, 0.0]).to_vec();
+    }
+    let texture = part(&islands, (width, height), (0, 0, width, height));
+    let strong = |value: &&f32| value.abs() > 0.05;
+    let none = |value: &&f32| value.abs() < 0.001;
+    assert!(texture.iter().filter(strong).count() > 1000, "hardly any texture");
+    assert!(texture.iter().filter(none).count() > 1000, "texture everywhere");
+    let rows = texture.chunks_exact(width as usize).collect::<Vec<_>>();
+    let of_two =
+        |rows: &[&[f32]], x: usize| -> f32 { rows.iter().map(|row| row[x] + row[x + 1]).sum() };
+    let sums = rows
+        .chunks_exact(2)
+        .flat_map(|rows| (0..width as usize).step_by(2).map(move |x| of_two(rows, x)));
+    assert_sums_are_0(sums);
+}
+
+#[test]
+fn streaks_side_by_side_have_the_sum_0() {
+    // Below 0, octave 1 is not there at all.
+    let octaves = [0.1, -0.1];
+    let texture = constant(octaves, HORIZONTAL);
+    let rows = texture.chunks_exact(4 * SIDE);
+    assert_sums_are_0(
+        rows.flat_map(|rows| (0..SIDE).map(|x| (0..4).map(|y| rows[y * SIDE + x]).sum())),
+    );
+    let texture = constant(octaves, VERTICAL);
+    let (sides, _) = texture.as_chunks::<4>();
+    assert_sums_are_0(sides.iter().map(|side| side.iter().sum()));
+}
+
 #[test]
 fn streaks_are_long_in_their_direction() {
-    for octave in 0..3 {
-        let mut octaves = [0.0; 3];
+    for octave in 0..2 {
+        let mut octaves = [0.0; 2];
         octaves[octave] = 0.1;
         let lag = 2 << octave;
         for (direction, along, across) in
@@ -447,8 +515,8 @@ fn streaks_are_long_in_their_direction() {
 #[test]
 fn texture_does_not_repeat() {
     for direction in [ISOTROPIC, HORIZONTAL, VERTICAL] {
-        for octave in 0..3 {
-            let mut octaves = [0.0; 3];
+        for octave in 0..2 {
+            let mut octaves = [0.0; 2];
             octaves[octave] = 0.1;
             let texture = constant(octaves, direction);
             // Streaks are four points long, and change to the next.
@@ -458,7 +526,7 @@ fn texture_does_not_repeat() {
             let found = lags.map(|lag| (covariance(&texture, lag).abs() / variance, lag));
             let worst = found.max_by(|a, b| a.0.total_cmp(&b.0)).expect("a lag");
             println!("octave {octave}, {direction}: {worst:?}");
-            assert!(worst.0 < 0.06, "octave {octave}, {direction}: {worst:?}");
+            assert!(worst.0 < 0.04, "octave {octave}, {direction}: {worst:?}");
         }
     }
 }

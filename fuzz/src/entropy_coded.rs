@@ -120,7 +120,7 @@ impl Map {
     /// The payload of `tXTR` in a picture with these sides.
     pub fn payload(&self, sides: [u32; 2]) -> Vec<u8> {
         let step = self.step.value();
-        let (_, layer) = self.layer.payload(map_sides(sides), &texture::steps(step), 4);
+        let (_, layer) = self.layer.payload(map_sides(sides), &texture::steps(step), 3);
         [&step.to_le_bytes()[..], &layer].concat()
     }
 

@@ -4,14 +4,14 @@ use core::ops::Range;
 
 use super::oracle::{Request, sums};
 use super::texture::{map_sides, read};
-use super::{File, Ghdr, RGBA};
+use super::{File, Ghdr, RGB};
 
 /// The texture of a file at the size of a request.
 pub(crate) struct Synthesis {
     /// Of the map.
     sides: [u32; 2],
-    /// The nine gains of each node, by octave and pattern.
-    gains: Vec<[[f32; 3]; 3]>,
+    /// The six gains of each node, by octave and pattern.
+    gains: Vec<[[f32; 3]; 2]>,
 }
 
 impl Synthesis {
@@ -22,7 +22,7 @@ impl Synthesis {
         let sums = map_sums(stored, payload);
         let scale = (output.0 as f32 / stored[0] as f32).min(output.1 as f32 / stored[1] as f32);
         let fade = (8.0 * scale - 1.0).clamp(0.0, 1.0);
-        let gains = |node| Node::new([0, 1, 2, 3].map(|m| sums[m][node]), fade).gains();
+        let gains = |node| Node::new([0, 1, 2].map(|m| sums[m][node]), fade).gains();
         let gains = (0..sums[0].len()).map(gains).collect();
         Some(Self { sides: map_sides(stored), gains })
     }
@@ -34,25 +34,77 @@ impl Synthesis {
         self.gains[(row * i64::from(self.sides[0]) + column) as usize][octave][pattern]
     }
 
-    /// What a point of a lattice has.
-    pub(crate) fn gain(&self, x: i64, y: i64, octave: usize, pattern: usize) -> f32 {
-        let n = 8 >> octave;
+    /// What a block has.
+    pub(crate) fn gain(&self, octave: usize, pattern: usize, x: i64, y: i64) -> f32 {
+        let n = blocks_between_nodes(octave, pattern);
+        let [e, f] = place_in_block(pattern);
         let (column, row) = (x.div_euclid(n), y.div_euclid(n));
-        let part = |at: i64| (at.rem_euclid(n) as f32 + 0.5) / n as f32;
+        let part = |at: i64, place: f32| (at.rem_euclid(n) as f32 + place) / n as f32;
         let of_row = |row: i64| {
             let [left, right] = [0, 1].map(|next| self.at(column + next, row, octave, pattern));
-            left + (right - left) * part(x)
+            left + (right - left) * part(x, e)
         };
         let (upper, lower) = (of_row(row), of_row(row + 1));
-        upper + (lower - upper) * part(y)
+        upper + (lower - upper) * part(y, f)
+    }
+
+    /// V0 to V3 of a block.
+    pub(crate) fn values(&self, octave: usize, pattern: usize, x: i64, y: i64) -> [f32; 4] {
+        let gain = self.gain(octave, pattern, x, y);
+        let numbers = Block::new(octave, pattern, x, y).numbers;
+        let [a, b, c] = numbers.map(|number| number as f32 * gain);
+        [a + (b + c), a - (b + c), (b - c) - a, -((b - c) + a)]
+    }
+
+    /// N at a point of a lattice.
+    pub(crate) fn noise(&self, octave: usize, pattern: usize, x: i64, y: i64) -> f32 {
+        let Place { block: [column, row], value, next, part } = Place::new(pattern, x, y);
+        let this = self.values(octave, pattern, column, row)[value];
+        let Some([column, row]) = next else { return this };
+        let next = self.values(octave, pattern, column, row)[value];
+        this + (next - this) * part
     }
 }
 
-/// m0 to m3, of all nodes.
+/// How many blocks there are in a row from one node to the next.
+pub(crate) fn blocks_between_nodes(octave: usize, pattern: usize) -> i64 {
+    [4, 2, 2][pattern] >> octave
+}
+
+/// The place in a block, as parts of its sides, to which its gain belongs.
+pub(crate) fn place_in_block(pattern: usize) -> [f32; 2] {
+    [[0.5, 0.5], [0.0, 0.5], [0.5, 0.0]][pattern]
+}
+
+/// From what a point of a lattice has its value.
+pub(crate) struct Place {
+    pub(crate) block: [i64; 2],
+    /// Which of its four values.
+    pub(crate) value: usize,
+    /// The next block along streaks, and at which part of the way there the point is.
+    pub(crate) next: Option<[i64; 2]>,
+    pub(crate) part: f32,
+}
+
+impl Place {
+    pub(crate) fn new(pattern: usize, x: i64, y: i64) -> Self {
+        let side = if pattern == 0 { 2 } else { 4 };
+        let block @ [column, row] = [x, y].map(|at| at.div_euclid(side));
+        let [r, q] = [x, y].map(|at| at.rem_euclid(side));
+        let (value, next, along) = match pattern {
+            0 => (2 * q + r, None, 0),
+            1 => (q, Some([column + 1, row]), r),
+            _ => (r, Some([column, row + 1]), q),
+        };
+        Self { block, value: value as usize, next, part: (along as f32 + 0.5) / 4.0 }
+    }
+}
+
+/// m0 to m2, of all nodes.
 pub(crate) fn map_sums(stored: [u32; 2], payload: &[u8]) -> Vec<Vec<f32>> {
     let [width, height] = map_sides(stored);
-    let base = [0, 0, 0, 32768];
-    let header = Ghdr { color: RGBA, width, height, base, ..Ghdr::default() };
+    let base = [0, 0, 32768, 0];
+    let header = Ghdr { color: RGB, width, height, base, ..Ghdr::default() };
     let file = File::of_floats(header, &read(stored, payload).expect("a sound texture"));
     sums(&file, &Request::whole(&file), None)
 }
@@ -60,34 +112,29 @@ pub(crate) fn map_sums(stored: [u32; 2], payload: &[u8]) -> Vec<Vec<f32>> {
 /// What the sums of a node say.
 pub(crate) struct Node {
     /// The deviation of each octave.
-    pub(crate) amplitudes: [f32; 3],
+    pub(crate) amplitudes: [f32; 2],
     pub(crate) horizontal: f32,
     pub(crate) vertical: f32,
     pub(crate) isotropic: f32,
 }
 
 impl Node {
-    pub(crate) fn new(sums: [f32; 4], fade: f32) -> Self {
+    pub(crate) fn new(sums: [f32; 3], fade: f32) -> Self {
         let unit = |x: f32| x.clamp(0.0, 1.0);
         let amplitude = |o: usize| unit((sums[o] - 1.0 / 128.0) * 0.5) * fade;
-        let d = sums[3] * 4.0 - 2.0;
-        let (h, v) = (unit(d - 0.125), unit(-0.125 - d));
+        let d = sums[2] * 4.0 - 2.0;
+        let (h, v) = (unit(d - 0.375), unit(-0.375 - d));
         let isotropic = (1.0 - (h + v) * (h + v)).sqrt();
-        Self { amplitudes: [0, 1, 2].map(amplitude), horizontal: h, vertical: v, isotropic }
+        Self { amplitudes: [0, 1].map(amplitude), horizontal: h, vertical: v, isotropic }
     }
 
     /// By octave and pattern.
-    pub(crate) fn gains(&self) -> [[f32; 3]; 3] {
-        let scale = 1.0 / 1024.0;
-        [0, 1, 2].map(|o| {
+    pub(crate) fn gains(&self) -> [[f32; 3]; 2] {
+        [0, 1].map(|o| {
             let a = self.amplitudes[o];
-            let s = [1.0, 1.82, 2.1][o];
-            let t = [1.23, 1.72, 1.86][o];
-            [
-                (a * self.isotropic) * (s * scale),
-                (a * self.horizontal) * (t * scale),
-                (a * self.vertical) * (t * scale),
-            ]
+            let s = [2_f32.powi(-10), 1.82 * 2_f32.powi(-14)][o];
+            let t = [1.23 * 2_f32.powi(-10), 1.72 * 2_f32.powi(-14)][o];
+            [(a * self.isotropic) * s, (a * self.horizontal) * t, (a * self.vertical) * t]
         })
     }
 }
@@ -104,38 +151,19 @@ pub(crate) struct Block {
 
 impl Block {
     pub(crate) fn new(octave: usize, pattern: usize, x: i64, y: i64) -> Self {
-        let k = 4 * pattern as u32 + octave as u32 + 1;
-        let mut s = ((16 * y) as u32).wrapping_add(k);
+        let k = 3 * octave as u32 + pattern as u32 + 1;
+        let mut s = ((8 * y) as u32).wrapping_add(k);
         s = (s ^ (s >> 16)).wrapping_mul(0x21F0_AAAD);
         s = (s ^ (s >> 15)).wrapping_mul(0x735A_2D97);
         s ^= s >> 15;
         let mut r = (x as u32).wrapping_mul(0x9E37_79B1).wrapping_add(s);
         r = (r ^ (r >> 15)).wrapping_mul(0x2C1B_3C6D);
-        let number = |bits: u32| 2 * (bits % 1024) as i32 - 1023;
-        Self { k, s, r, numbers: [number(r >> 2), number(r >> 12), number(r >> 22)] }
+        let number = |first: u32| {
+            let bits = ((r >> first) % 2048) as i32;
+            if bits < 1024 { bits } else { bits - 2048 }
+        };
+        Self { k, s, r, numbers: [21, 10, 0].map(number) }
     }
-
-    /// V0 to V3.
-    fn values(&self) -> [f32; 4] {
-        let [a, b, c] = self.numbers;
-        [a + b + c, a - b - c, -a + b - c, -a - b + c].map(|v| v as f32)
-    }
-}
-
-/// N at a point of a lattice.
-pub(crate) fn noise(octave: usize, pattern: usize, x: i64, y: i64) -> f32 {
-    if pattern == 0 {
-        let (right, below) = (x.rem_euclid(2), y.rem_euclid(2));
-        let block = Block::new(octave, 0, x.div_euclid(2), y.div_euclid(2));
-        return block.values()[(2 * below + right) as usize];
-    }
-    let (column, row) = (x.div_euclid(4), y.div_euclid(4));
-    let (r, q) = (x.rem_euclid(4), y.rem_euclid(4));
-    let (along, across, next) =
-        if pattern == 1 { (r, q, [column + 1, row]) } else { (q, r, [column, row + 1]) };
-    let [this, next] = [[column, row], next]
-        .map(|[x, y]| Block::new(octave, pattern, x, y).values()[across as usize]);
-    this + (next - this) * (along as f32 + 0.5) / 4.0
 }
 
 /// A part of a lattice.
@@ -158,26 +186,40 @@ impl Lattice {
         self.values[((y - self.rows.start) * width + x - self.columns.start) as usize]
     }
 
+    /// Enlarged along x, in a row.
+    pub(crate) fn enlarged_along_x(&self, x: i64, row: i64) -> f32 {
+        let [old, beside] = columns_or_rows(x);
+        3.0 * self.at(old, row) + self.at(beside, row)
+    }
+
     /// E, at a point of the finer lattice.
     pub(crate) fn enlarged(&self, x: i64, y: i64) -> f32 {
-        let beside = |at: i64| at.div_euclid(2) + if at.rem_euclid(2) == 0 { -1 } else { 1 };
-        let of_column = |x: i64| 0.75 * self.at(x, y.div_euclid(2)) + 0.25 * self.at(x, beside(y));
-        0.75 * of_column(x.div_euclid(2)) + 0.25 * of_column(beside(x))
+        let [old, beside] = columns_or_rows(y).map(|row| self.enlarged_along_x(x, row));
+        3.0 * old + beside
     }
+}
+
+/// In whose place one of the finer lattice is, and which is beside it.
+fn columns_or_rows(at: i64) -> [i64; 2] {
+    let old = at.div_euclid(2);
+    [old, if at.rem_euclid(2) == 0 { old - 1 } else { old + 1 }]
 }
 
 impl Synthesis {
     /// T of an octave.
     pub(crate) fn lattice(&self, octave: usize, columns: Range<i64>, rows: Range<i64>) -> Lattice {
+        if octave == 1 {
+            return Lattice::new(columns, rows, |x, y| {
+                let [first, second, third] = [0, 1, 2].map(|p| self.noise(1, p, x, y));
+                (first + second) + third
+            });
+        }
         let halved =
             |range: &Range<i64>| (range.start - 1).div_euclid(2)..range.end.div_euclid(2) + 1;
-        let coarser =
-            (octave < 2).then(|| self.lattice(octave + 1, halved(&columns), halved(&rows)));
+        let coarser = self.lattice(1, halved(&columns), halved(&rows));
         Lattice::new(columns, rows, |x, y| {
-            let start = coarser.as_ref().map_or(0.0, |coarser| coarser.enlarged(x, y));
-            (0..3).fold(start, |sum, pattern| {
-                sum + self.gain(x, y, octave, pattern) * noise(octave, pattern, x, y)
-            })
+            let [first, second, third] = [0, 1, 2].map(|p| self.noise(0, p, x, y));
+            ((coarser.enlarged(x, y) + first) + second) + third
         })
     }
 
@@ -191,7 +233,7 @@ impl Synthesis {
         let columns = Axis::new(stored[0], grid.0, left, width);
         let rows = Axis::new(stored[1], grid.1, top, height);
         let texture = self.lattice(0, columns.range(), rows.range());
-        let pixel = |column: &Place, row: &Place| column.of(|x| row.of(|y| texture.at(x, y)));
+        let pixel = |column: &Position, row: &Position| column.of(|x| row.of(|y| texture.at(x, y)));
         let pixels =
             rows.0.iter().flat_map(|row| columns.0.iter().map(move |column| (column, row)));
         pixels.map(|(column, row)| pixel(column, row)).collect()
@@ -199,9 +241,9 @@ impl Synthesis {
 }
 
 /// Where the pixels of a grid stand among the stored ones along an axis.
-struct Axis(Vec<Place>);
+struct Axis(Vec<Position>);
 
-enum Place {
+enum Position {
     /// On one of them.
     On(i64),
     /// At this part of the way from one to the next.
@@ -210,31 +252,31 @@ enum Place {
 
 impl Axis {
     fn new(stored: u32, grid: u32, start: u32, length: u32) -> Self {
-        let place = |at: u32| {
+        let position = |at: u32| {
             let [stored, grid, at] = [stored, grid, at].map(i64::from);
             if grid <= stored {
-                return Place::On(at);
+                return Position::On(at);
             }
             let place = (2 * at + 1) * stored - grid;
             let part = place.rem_euclid(2 * grid) as f32 / (2 * grid) as f32;
-            Place::Between(place.div_euclid(2 * grid), part)
+            Position::Between(place.div_euclid(2 * grid), part)
         };
-        Self((start..start + length).map(place).collect())
+        Self((start..start + length).map(position).collect())
     }
 
     /// The stored pixels that are asked for.
     fn range(&self) -> Range<i64> {
-        let bounds = |place: &Place| match *place {
-            Place::On(at) => [at, at],
-            Place::Between(at, _) => [at - 1, at + 2],
+        let bounds = |position: &Position| match *position {
+            Position::On(at) => [at, at],
+            Position::Between(at, _) => [at - 1, at + 2],
         };
         let [first, last] =
-            [self.0.first(), self.0.last()].map(|place| bounds(place.expect("pixels")));
+            [self.0.first(), self.0.last()].map(|position| bounds(position.expect("pixels")));
         first[0]..last[1] + 1
     }
 }
 
-impl Place {
+impl Position {
     fn of(&self, texture: impl Fn(i64) -> f32) -> f32 {
         match *self {
             Self::On(at) => texture(at),

@@ -6,7 +6,7 @@ use super::rans::{self, Flaw};
 /// The Gaussians of a map.
 #[derive(Clone, Debug)]
 pub(crate) struct Texture {
-    /// Of the four colour axes.
+    /// Of the three colour axes.
     pub(crate) step: f32,
     pub(crate) codes: Vec<Code>,
 }
@@ -17,27 +17,30 @@ pub(crate) fn map_sides(sides: [u32; 2]) -> [u32; 2] {
 }
 
 /// All steps of the layer in `tXTR`.
-pub(crate) fn steps(step: f32) -> [f32; 8] {
+pub(crate) fn steps(step: f32) -> [f32; 7] {
     let [position, size, ratio, slant] = [1.2_f64, 0.6, 0.75, 3.0].map(|x| x.sqrt() as f32);
-    [position, size, ratio, slant, step, step, step, step]
+    [position, size, ratio, slant, step, step, step]
+}
+
+/// The colour axes of a Gaussian that adds this much to the sums: the columns of the matrix of section 7.5 are
+/// orthonormal.
+pub(crate) fn axes([m0, m1, m2]: [f32; 3]) -> [f32; 3] {
+    let [a, b, c, d] = [0.577_350_26, 0.707_106_77, 0.408_248_3, -0.816_496_6_f32];
+    [a * (m0 + m1 + m2), b * (m0 - m2), c * (m0 + m2) + d * m1]
 }
 
 impl Texture {
-    /// A map with these octaves and this direction at every node: one Gaussian so wide that it is flat.
-    pub(crate) fn constant(sides: [u32; 2], sums: [f32; 4]) -> Self {
+    /// A map with these sums at every node: one Gaussian so wide that it is flat.
+    pub(crate) fn constant(sides: [u32; 2], [m0, m1, m2]: [f32; 3]) -> Self {
         let map = map_sides(sides);
         let center = Grid::new(map).units(map.map(|side| side as f32 / 2.0));
-        let code = Code { exponent: 2, axes: vec![0; 4], size: 60, center, ..Code::default() };
+        let code = Code { exponent: 2, axes: vec![1, 0, 0], size: 60, center, ..Code::default() };
         let mut texture = Self { step: 64.0, codes: vec![code] };
         // What a step of an axis is worth depends on the size of the cell in which the Gaussian ends up.
-        texture.codes[0].axes[3] = 1 << 12;
         let values = read(sides, &texture.payload(sides)).expect("what was just written");
-        let unit = values[0][8] / (1 << 12) as f32;
-        // The columns of the matrix of section 7.5 are orthonormal.
-        let [a, b, c, d] = [0.577_350_26, 0.707_106_77, 0.408_248_3, -0.816_496_6_f32];
-        let [m0, m1, m2, m3] = sums;
-        let axes = [a * (m0 + m1 + m2), b * (m0 - m2), c * (m0 + m2) + d * m1, m3 - 0.5];
-        texture.codes[0].axes = axes.map(|axis| (axis / unit).round() as i32).to_vec();
+        let [unit, ..] = axes([5, 6, 7].map(|color| values[0][color]));
+        let axes = axes([m0, m1, m2 - 0.5]).map(|axis| (axis / unit).round() as i32);
+        texture.codes[0].axes = axes.to_vec();
         texture
     }
 

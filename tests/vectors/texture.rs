@@ -7,10 +7,12 @@ use super::entropy::scattered;
 use super::sound::random_file;
 use super::{Rendering, Vector, header};
 
-/// A Gaussian of step exponent 2 at a point of a map, as large as its cell lets expect, not slanted.
-fn at(header: &Ghdr, point: [f32; 2], axes: [i32; 4]) -> Code {
+/// A Gaussian of step exponent 2 at a point of a map, as large as its cell lets expect, not slanted, with
+/// about this much of each sum.
+fn at(header: &Ghdr, point: [f32; 2], colors: [f32; 3]) -> Code {
     let center = Grid::new(map_sides(header.sides())).units(point);
-    Code { exponent: 2, axes: axes.to_vec(), center, ..Code::default() }
+    let axes = texture::axes(colors).map(|axis| axis.round() as i32).to_vec();
+    Code { exponent: 2, axes, center, ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the map.
@@ -20,9 +22,9 @@ fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
     let one = |_| {
         let point = sides.map(|side| random.range(0.0, side));
         let mut within = |most: i32| (random.next() % (2 * most as u64 + 1)) as i32 - most;
-        let axes = [6, 4, 4, 3].map(&mut within);
+        let colors = [7, 5, 3].map(|most| within(most) as f32);
         let [size, ratio, slant] = [2, 2, 2].map(within);
-        Code { size, ratio, slant, ..at(header, point, axes) }
+        Code { size, ratio, slant, ..at(header, point, colors) }
     };
     (0..count).map(one).collect()
 }
@@ -51,9 +53,9 @@ pub(super) fn valid() -> Vec<Vector> {
     let most = {
         let file = empty(33, 20);
         let code = |[column, row]: [u32; 2]| {
-            let sign = if (column + row).is_multiple_of(2) { 1 } else { -1 };
+            let sign = if (column + row).is_multiple_of(2) { 1.0 } else { -1.0 };
             let point = [column, row].map(|node| node as f32 + 0.5);
-            at(&file.header, point, [9, 5 * sign, -3, 5 * sign])
+            at(&file.header, point, [9.0, 5.0 * sign, 5.0 * sign])
         };
         let codes = nodes(&file.header).map(code).collect();
         with(file.clone(), &Texture { step: 0.3, codes })
@@ -61,27 +63,27 @@ pub(super) fn valid() -> Vec<Vector> {
     let beyond = {
         let file = random_file(201, header(RGB, 40, 24), 8);
         let codes = vec![
-            at(&file.header, [1.0, 1.0], [900, 200, -300, 900]),
-            at(&file.header, [4.5, 3.0], [900, -200, 300, -900]),
-            at(&file.header, [3.0, 1.0], [-500, 0, 0, 0]),
+            at(&file.header, [1.0, 1.0], [900.0, 200.0, 900.0]),
+            at(&file.header, [4.5, 3.0], [900.0, -200.0, -900.0]),
+            at(&file.header, [3.0, 1.0], [-500.0, -500.0, 0.0]),
         ];
         with(file, &Texture { step: 1.0, codes })
     };
-    let steps = |step: f32, axes: [i32; 4]| {
+    let steps = |step: f32, colors: [f32; 3]| {
         let file = empty(24, 16);
-        let codes = vec![at(&file.header, [1.5, 1.5], axes)];
+        let codes = vec![at(&file.header, [1.5, 1.5], colors)];
         with(file, &Texture { step, codes })
     };
     let not_drawn = {
         let file = empty(24, 16);
-        let sound = at(&file.header, [1.5, 1.5], [9, 0, 0, 0]);
+        let sound = at(&file.header, [1.5, 1.5], [9.0, 9.0, 0.0]);
         let codes =
             vec![Code { size: 400, ..sound.clone() }, sound.clone(), Code { size: -400, ..sound }];
         with(file, &Texture { step: 0.3, codes })
     };
     let constant = |name, shows, direction| {
         let file = empty(40, 24);
-        let texture = Texture::constant(file.header.sides(), [0.2, 0.3, 0.4, direction]);
+        let texture = Texture::constant(file.header.sides(), [0.2, 0.3, direction]);
         Vector::valid(name, shows, with(file, &texture)).also(&[
             Rendering::Size(57, 24),
             Rendering::Size(40, 31),
@@ -158,7 +160,7 @@ pub(super) fn valid() -> Vec<Vector> {
         Vector::valid(
             "texture-one-pixel",
             "texture of a picture of one pixel, whose map has four nodes",
-            with(empty(1, 1), &Texture::constant([1, 1], [0.3, 0.2, 0.1, 0.6])),
+            with(empty(1, 1), &Texture::constant([1, 1], [0.3, 0.2, 0.7])),
         )
         .also(&[Rendering::Size(16, 16)]),
         Vector::valid("texture-many", "a map of as many Gaussians as nodes, the most that is allowed", most)
@@ -168,9 +170,9 @@ pub(super) fn valid() -> Vec<Vector> {
         Vector::valid(
             "texture-step-least",
             "the least step of a map, 2^-20",
-            steps(1.0 / 1_048_576.0, [65_000, 9_000, -60_000, 65_000]),
+            steps(1.0 / 1_048_576.0, [50_000.0, 40_000.0, 20_000.0]),
         ),
-        Vector::valid("texture-step-most", "the largest step of a map, 2^10", steps(1024.0, [1, 0, 0, -1])),
+        Vector::valid("texture-step-most", "the largest step of a map, 2^10", steps(1024.0, [1.0, 1.0, -1.0])),
         Vector::valid("texture-not-drawn", "a map of one Gaussian that is drawn and two that are not", not_drawn),
         late,
     ]
