@@ -27,6 +27,11 @@ pub(super) const LEAST_DIRECTION: f32 = 0.375;
 pub(super) const AMPLITUDE: f32 = 0.5;
 /// Direction per sum, and the direction of a sum of zero.
 pub(super) const DIRECTION: (f32, f32) = (4.0, -2.0);
+/// Whether there is an amplitude where the map has this sum.
+pub(crate) fn has_amplitude(sum: f32) -> bool {
+    sum > LEAST_SUM
+}
+
 // Constants: docs/tuning.md, "Texture".
 /// The sum for an amplitude. A small one becomes smaller, so that there is nothing where it is next to invisible.
 #[cfg(feature = "encode")]
@@ -78,7 +83,7 @@ impl NodeMap {
         let mut shows = vec![false; region.height as usize];
         for plane in sums.chunks_exact(region.pixels() as usize).take(OCTAVES) {
             for (shows, row) in shows.iter_mut().zip(plane.chunks_exact(region.width as usize)) {
-                *shows |= row.iter().any(|&sum| sum > LEAST_SUM);
+                *shows |= row.iter().copied().any(has_amplitude);
             }
         }
         Self { region, sums, shows, fade }

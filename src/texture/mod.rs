@@ -19,5 +19,5 @@ pub(crate) use arithmetic::{Arithmetic, Plain};
 pub(crate) use chunk::Texture;
 pub(crate) use map::{CELL, NodeMap};
 #[cfg(feature = "encode")]
-pub(crate) use map::{OCTAVES, amplitude_sum, direction_sum};
+pub(crate) use map::{OCTAVES, amplitude_sum, direction_sum, has_amplitude};
 pub(crate) use synthesis::Synthesis;

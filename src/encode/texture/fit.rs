@@ -22,7 +22,7 @@ use crate::encode::tiled_source::TiledSource;
 use crate::encode::verify::squared_error;
 use crate::limits::Limits;
 use crate::render::Picture;
-use crate::texture::{OCTAVES, Texture, amplitude_sum, direction_sum};
+use crate::texture::{OCTAVES, Texture, amplitude_sum, direction_sum, has_amplitude};
 
 // Constants: docs/tuning.md, "Texture".
 /// The strength at which amplitudes are as was measured to look best.
@@ -54,11 +54,12 @@ pub(crate) fn payload(
     let strengths =
         strengths(&cells, f32::from(job.texture) / f32::from(USUAL_STRENGTH), observer)?;
     drop(cells);
-    let samples: Vec<u16> = strengths.iter().flat_map(samples_of).collect();
-    drop(strengths);
-    if samples.chunks_exact(OCTAVES + 1).all(|node| node[..OCTAVES] == [0; OCTAVES]) {
+    let amplitudes = strengths.iter().flat_map(|strength| strength.amplitudes);
+    if !amplitudes.map(amplitude_sum).any(has_amplitude) {
         return Ok(None);
     }
+    let samples: Vec<u16> = strengths.iter().flat_map(samples_of).collect();
+    drop(strengths);
     let map = Source::new_u16(size[0] as u32, size[1] as u32, ColorModel::Rgb, &samples)
         .expect("the sizes agree");
     observer.silently(|observer| coded(job, &map, picture, step + STEP.log2(), observer))
