@@ -115,8 +115,17 @@ pub(crate) fn planes(file: &[u8]) -> Result<Vec<f32>> {
 
 /// The samples of a file.
 pub(crate) fn decode(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
+    decode_with(file, RenderOptions::new().with_threads(threads))
+}
+
+/// The same without texture.
+pub(crate) fn decode_plain(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
+    decode_with(file, RenderOptions::new().with_threads(threads).with_texture(false))
+}
+
+fn decode_with(file: &[u8], options: RenderOptions) -> Result<Vec<u8>> {
     let mut decoder = Decoder::new(file)?;
-    decoder.set_options(RenderOptions::new().with_threads(threads));
+    decoder.set_options(options);
     let mut samples = vec![0; decoder.output_len()?];
     decoder.decode_into(&mut samples)?;
     Ok(samples)

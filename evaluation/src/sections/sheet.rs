@@ -5,13 +5,13 @@ use std::path::Path;
 
 use anyhow::Result;
 use image::{RgbImage, imageops};
-use image_gip::Target;
+use image_gip::{Target, Threads};
 
 use super::crops::{Crop, extremes};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
-use crate::pictures::{PictureSet, TestPicture};
+use crate::pictures::TestPicture;
 use crate::table::Table;
 use crate::versions::{self, Version};
 use crate::visual;
@@ -27,12 +27,16 @@ const GAP: u32 = 4;
 const SHEET_QUALITY: u8 = 75;
 /// Of the README's picture.
 const README_QUALITY: u8 = 88;
-/// Of the two crops of each picture, in the order of [`Pair`].
-const TITLES: [&str; 2] = [
+/// Our files without their texture.
+const PLAIN: &str = "gip --no-texture";
+/// Of the crops of each picture, in the order of [`Strips`].
+const TITLES: [&str; 3] = [
     "where gip compares worst with AVIF, at equal bytes (codec, bits per pixel: SSIMULACRA2)",
     "where gip compares best with AVIF, at equal bytes",
+    "where gip adds most texture, at equal bytes (codec, bits per pixel: SSIMULACRA2)",
 ];
-/// How many crops of each kind are in the README's picture.
+/// How many of these kinds are in a sheet. All are in the README's picture, so many crops of each.
+const SHEET_KINDS: usize = 2;
 const README_CROPS: usize = 3;
 /// Where the pictures come from.
 const LICENCE: &str = "Photographs: Kodak (released by Eastman Kodak for unrestricted use); gb82 \
@@ -40,8 +44,9 @@ const LICENCE: &str = "Photographs: Kodak (released by Eastman Kodak for unrestr
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut text = format!(
-        "What one sees of the original, of our file at effort {} and {RATE} bits per pixel, and of \
-         {} (as in the section about rate) at the quality whose file is nearest to ours in size. \
+        "What one sees of the original, of our file at effort {} and {RATE} bits per pixel with its \
+         texture and without it, and of {} (as in the section about rate) at the quality whose file \
+         is nearest to ours in size. \
          From each picture the {SIDE} x {SIDE} pixels where we compare worst and those where we \
          compare best with {}, by the map of SSIMULACRA2; pixel by pixel, each with the rate and \
          the SSIMULACRA2 of the whole file. {LICENCE}.\n",
@@ -51,12 +56,13 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     );
     let mut strips = Vec::new();
     for set in bench.sets() {
-        let pairs = pairs(bench, &set)?;
+        let of_set = set.pictures.iter().map(|picture| strips_of(bench, picture));
+        let of_set = of_set.collect::<Result<Vec<_>>>()?;
         let name = format!("sheet-{}.jpg", set.name).to_lowercase();
-        sheet(&pairs).save_jpeg(&bench.path(&name), SHEET_QUALITY)?;
+        sheet(&of_set).save_jpeg(&bench.path(&name), SHEET_QUALITY)?;
         text.push_str(&format!("\n### Sheet: {}\n\n![{0}: crops]({name})\n", set.name));
-        text.push_str(&table(&pairs));
-        strips.extend(pairs);
+        text.push_str(&table(&of_set));
+        strips.extend(of_set);
     }
     if let Some(path) = &bench.readme_picture {
         readme_picture(strips, path)?;
@@ -88,46 +94,47 @@ struct Strip {
     tiles: Vec<(String, RgbImage)>,
 }
 
-/// The strips of a picture where we compare worst and best with the first of the others, and what
-/// all files score.
-struct Pair {
-    strips: [Strip; 2],
+/// The strips of a picture where we compare worst and best with the first of the others, and where we add
+/// most texture, and what all files score.
+struct Strips {
+    strips: [Strip; 3],
     scores: Vec<f64>,
 }
 
-fn pairs(bench: &mut Bench, set: &PictureSet) -> Result<Vec<Pair>> {
-    set.pictures.iter().map(|picture| pair(bench, picture)).collect()
-}
-
-fn pair(bench: &mut Bench, picture: &TestPicture) -> Result<Pair> {
-    let ours = ours(bench, picture)?;
+fn strips_of(bench: &mut Bench, picture: &TestPicture) -> Result<Strips> {
+    let file = ours(bench, picture)?;
+    let ours = Version::of_file(&file, None)?;
+    let plain = Version { samples: gip::decode_plain(&file, Threads::Pool)?, ..ours.clone() };
     let bytes = ours.bytes;
-    let mut shown = vec![Shown::new(gip::NAME, picture, ours)?];
+    let mut shown = vec![Shown::new(gip::NAME, picture, ours)?, Shown::new(PLAIN, picture, plain)?];
     for name in OTHERS {
         let (worker, _) = bench.baselines()?;
         let other = versions::baseline_called(name)?;
         let theirs = Version::baseline(worker, other, picture, bytes)?;
         shown.push(Shown::new(name, picture, theirs)?);
     }
+    let [ours, plain, rival, ..] = &shown[..] else { unreachable!("there are four") };
     let error = |version: &Shown| {
         visual::ssimulacra2_map(&picture.rgb, &version.samples, picture.width, picture.height)
     };
-    let (ours, others) = (error(&shown[0])?, error(&shown[1])?);
-    let ahead: Vec<f64> =
-        ours.iter().zip(&others).map(|(ours, others)| f64::from(others - ours)).collect();
+    let ahead = error(ours)?.into_iter().zip(error(rival)?);
+    let ahead: Vec<f64> = ahead.map(|(ours, others)| f64::from(others - ours)).collect();
+    let pixels = ours.samples.chunks_exact(3).zip(plain.samples.chunks_exact(3));
+    let texture: Vec<f64> =
+        pixels.map(|(ours, plain)| f64::from(ours[1].abs_diff(plain[1]))).collect();
     let side = SIDE.min(picture.width).min(picture.height);
-    let strips = extremes(&ahead, picture.width, side);
-    let strips = strips.map(|crop| strip(picture, &shown, crop, side));
-    Ok(Pair { strips, scores: shown.iter().map(|version| version.ssimulacra2).collect() })
+    let [worst, best] = extremes(&ahead, picture.width, side);
+    let [_, most] = extremes(&texture, picture.width, side);
+    let strips = [worst, best, most].map(|crop| strip(picture, &shown, crop, side));
+    Ok(Strips { strips, scores: shown.iter().map(|version| version.ssimulacra2).collect() })
 }
 
-fn ours(bench: &Bench, picture: &TestPicture) -> Result<Version> {
+fn ours(bench: &Bench, picture: &TestPicture) -> Result<Vec<u8>> {
     let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
-    let file = bench.file(&name, || {
+    bench.file(&name, || {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
         Ok(gip::file(encoder, picture)?.bytes)
-    })?;
-    Version::of_file(&file, None)
+    })
 }
 
 fn strip(picture: &TestPicture, shown: &[Shown], crop: Crop, side: u32) -> Strip {
@@ -145,7 +152,8 @@ fn strip(picture: &TestPicture, shown: &[Shown], crop: Crop, side: u32) -> Strip
 
 /// The size of a strip with its captions and gaps.
 fn strip_size() -> (u32, u32) {
-    let tiles = 2 + OTHERS.len() as u32;
+    // The original, ours with texture and without it, and the others.
+    let tiles = 3 + OTHERS.len() as u32;
     (GAP + tiles * (SIDE + GAP), LINE + SIDE + GAP)
 }
 
@@ -158,15 +166,15 @@ fn draw(canvas: &mut Canvas, strip: &Strip, (x, y): (u32, u32)) {
 }
 
 /// A row for each picture, its worst crop on the left and its best on the right.
-fn sheet(pairs: &[Pair]) -> Canvas {
+fn sheet(pictures: &[Strips]) -> Canvas {
     let (width, height) = strip_size();
     let columns = [0, width + 3 * GAP];
-    let mut canvas = Canvas::new(columns[1] + width, 2 * LINE + pairs.len() as u32 * height);
+    let mut canvas = Canvas::new(columns[1] + width, 2 * LINE + pictures.len() as u32 * height);
     for (title, x) in TITLES.iter().zip(columns) {
         canvas.write(title, (x + GAP, 0));
     }
-    for (index, pair) in pairs.iter().enumerate() {
-        for (strip, x) in pair.strips.iter().zip(columns) {
+    for (index, picture) in pictures.iter().enumerate() {
+        for (strip, x) in picture.strips.iter().zip(columns) {
             draw(&mut canvas, strip, (x, 2 * LINE + index as u32 * height));
         }
     }
@@ -174,15 +182,16 @@ fn sheet(pairs: &[Pair]) -> Canvas {
 }
 
 /// What is in a sheet, in figures.
-fn table(pairs: &[Pair]) -> String {
+fn table(pictures: &[Strips]) -> String {
     let mut columns = vec!["picture".to_owned(), format!("SSIMULACRA2 of {}", gip::NAME)];
+    columns.push(format!("of {PLAIN}"));
     columns.extend(OTHERS.map(|name| format!("of {name}")));
     columns.extend(["worst crop: x, y", "by", "best crop: x, y", "by"].map(str::to_owned));
     let mut table = Table::new(&columns);
-    for Pair { strips, scores } in pairs {
+    for Strips { strips, scores } in pictures {
         let mut cells = vec![strips[0].picture.clone()];
         cells.extend(scores.iter().map(|score| format!("{score:.1}")));
-        for Strip { crop, .. } in strips {
+        for Strip { crop, .. } in &strips[..SHEET_KINDS] {
             cells.push(format!("{}, {}", crop.x, crop.y));
             cells.push(format!("{:+.1}", crop.mean));
         }
@@ -196,22 +205,26 @@ fn table(pairs: &[Pair]) -> String {
     )
 }
 
-/// The README's picture: the crops of all pictures in which we compare best and worst.
-fn readme_picture(pairs: Vec<Pair>, path: &Path) -> Result<()> {
-    let (mut worst, mut best): (Vec<Strip>, Vec<Strip>) =
-        pairs.into_iter().map(|Pair { strips: [worst, best], .. }| (worst, best)).unzip();
+/// The README's picture: of all pictures the crops with most texture, and those in which we compare worst and best.
+fn readme_picture(pictures: Vec<Strips>, path: &Path) -> Result<()> {
+    let [mut worst, mut best, mut textured] = [const { Vec::new() }; 3];
+    for Strips { strips, .. } in pictures {
+        let strips = [&mut worst, &mut best, &mut textured].into_iter().zip(strips);
+        strips.for_each(|(kind, strip)| kind.push(strip));
+    }
     worst.sort_by(|a, b| a.crop.mean.total_cmp(&b.crop.mean));
     best.sort_by(|a, b| b.crop.mean.total_cmp(&a.crop.mean));
+    textured.sort_by(|a, b| b.crop.mean.total_cmp(&a.crop.mean));
     let (width, height) = strip_size();
-    worst.truncate(README_CROPS);
-    best.truncate(README_CROPS);
-    let rows = (worst.len() + best.len()) as u32;
-    let mut canvas = Canvas::new(width, rows * height + 2 * 2 * LINE + LINE);
+    let kinds = [(TITLES[2], textured), (TITLES[0], worst), (TITLES[1], best)];
+    let rows: usize = kinds.iter().map(|(_, strips)| strips.len().min(README_CROPS)).sum();
+    let lines = 2 * kinds.len() as u32 + 1;
+    let mut canvas = Canvas::new(width, rows as u32 * height + lines * LINE);
     let mut y = 0;
-    for (title, strips) in TITLES.iter().zip([worst, best]) {
+    for (title, strips) in kinds {
         canvas.write(title, (GAP, y));
         y += 2 * LINE;
-        for strip in &strips {
+        for strip in strips.iter().take(README_CROPS) {
             draw(&mut canvas, strip, (0, y));
             y += height;
         }
