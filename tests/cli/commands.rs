@@ -143,7 +143,14 @@ fn the_texture_of_a_file_is_told() {
         assert_eq!(info["texture"][field], report[format!("texture_{field}")], "{info}");
     }
     assert!(room.ok(&["info", "a.gip"]).contains("\ntexture  "));
-    assert!(room.ok(&encode).contains(", texture "));
+    assert!(room.ok(&encode).contains(" without its texture of "));
+    // Figures are those without texture, and what is encoded again has none.
+    let difference = room.json(&["compare", "a.png", "a.gip", "--json"]);
+    let [encoded, compared] = [&report, &difference].map(|json| json["psnr"].as_f64());
+    assert!((encoded.expect("a PSNR") - compared.expect("a PSNR")).abs() < 0.01, "{difference}");
+    let again = room.json(&["encode", "a.gip", "b.gip", "--effort", "1", "--json"]);
+    assert_eq!(again["texture_bytes"], 0, "{again}");
+    assert!(again["warnings"].to_string().contains("its texture is left out"), "{again}");
     let report = room.json(&[&encode[..], &["--texture", "0", "--json"]].concat());
     assert_eq!(report["texture_bytes"], 0);
     assert!(room.json(&["info", "a.gip", "--json"])["texture"].is_null());

@@ -141,7 +141,7 @@ impl JsonReport {
         let Self { width, height, gaussians, bytes, bpp, quality, seconds, .. } = self;
         let texture = match self.texture_bytes {
             0 => String::new(),
-            bytes => format!(", texture {bytes} bytes"),
+            bytes => format!(" without its texture of {bytes} bytes"),
         };
         let mut line = format!(
             "{}: {width}x{height}, {gaussians} Gaussians, {bytes} bytes, {bpp:.3} bpp, \

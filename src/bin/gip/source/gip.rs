@@ -1,4 +1,5 @@
-//! Reading .gip files as sources.
+//! Reading .gip files as sources, without their texture: it is noise, which would take many bytes as detail, and
+//! figures of quality leave it out.
 
 use anyhow::Result;
 use image_gip::{Decoder, Header, Limits, Metadata, RenderOptions};
@@ -23,9 +24,11 @@ fn whole(file: &[u8], limits: &Limits) -> Result<StillImage> {
     let mut decoder = Decoder::new_with_limits(file, limits.clone())?;
     let metadata = decoder.metadata().clone();
     let image = wanted(decoder.header()).decode(&mut decoder)?;
-    Ok(StillImage { image, metadata, warnings: Vec::new() })
+    let has_texture = decoder.picture()?.texture_map().is_some();
+    let warnings = has_texture.then(|| "its texture is left out".to_owned());
+    Ok(StillImage { image, metadata, warnings: warnings.into_iter().collect() })
 }
 
 fn wanted(header: &Header) -> Wanted {
-    Wanted::as_stored(RenderOptions::new(), header)
+    Wanted::as_stored(RenderOptions::new().with_texture(false), header)
 }
