@@ -32,6 +32,9 @@ pub(super) struct Content {
     pub(super) slopes: [f32; 2],
     /// The mean square of each band.
     pub(super) energies: [f32; OCTAVES],
+    /// The share of the pixels that are the same as one of the two before them in their row: most of them in what is
+    /// drawn or dithered, and few in what is random.
+    pub(super) repeated: f32,
 }
 
 impl Content {
@@ -39,8 +42,8 @@ impl Content {
     /// everywhere, and counts what some cells alone have still less.
     pub(super) fn inverted(&self) -> Self {
         let inverse = |root: f32| 1.0 / root.max(LEAST_ROOT);
-        let Self { magnitudes, slopes, energies } = *self;
-        Self { magnitudes: magnitudes.map(inverse), slopes: slopes.map(inverse), energies }
+        let Self { magnitudes, slopes, .. } = *self;
+        Self { magnitudes: magnitudes.map(inverse), slopes: slopes.map(inverse), ..*self }
     }
 
     /// Adds `weight` times that of another one.
@@ -53,6 +56,7 @@ impl Content {
         for axis in 0..2 {
             self.slopes[axis] += weight * other.slopes[axis];
         }
+        self.repeated += weight * other.repeated;
     }
 }
 
@@ -96,6 +100,7 @@ impl Block {
         blur(once, half, twice, 1);
         add_band(once, twice, 1, size, &mut cells);
         add_slopes(luma, twice, size, &mut cells);
+        add_repeated(luma, size, &mut cells);
         cells
     }
 }
@@ -164,6 +169,23 @@ fn add_slopes(fine: &Plane, coarse: &Plane, size: [usize; 2], cells: &mut BlockC
             }
         },
         |content, slopes| content.slopes = slopes.map(f32::sqrt),
+    );
+}
+
+/// Takes in how many pixels are repeated.
+#[inline(always)]
+fn add_repeated(luma: &Plane, size: [usize; 2], cells: &mut BlockCells) {
+    by_cells(
+        size,
+        cells,
+        |row, [repeated, _]| {
+            let [near, one, two] = [0, 1, 2].map(|left| columns(luma, row, left));
+            for x in 0..COLUMNS {
+                let is_repeated = (near[x] == one[x]) | (near[x] == two[x]);
+                repeated[x] += f32::from(u8::from(is_repeated));
+            }
+        },
+        |content, [repeated, _]| content.repeated = repeated,
     );
 }
 

@@ -179,7 +179,7 @@ mod tests {
     use crate::testing::simd_levels;
 
     /// The content of each cell, directly from the definition.
-    fn plain(luma: &[f64], [width, height]: [usize; 2]) -> Vec<[f64; 6]> {
+    fn plain(luma: &[f64], [width, height]: [usize; 2]) -> Vec<[f64; 7]> {
         let mirrored = |at: isize, length: usize| {
             let last = length as isize - 1;
             (if at > last { 2 * last - at } else { at.abs() }) as usize
@@ -221,8 +221,12 @@ mod tests {
             let slopes = [[1, 0], [0, 1]]
                 .map(|[dx, dy]| mean(&|x, y| (detail(x, y) - detail(x - dx, y - dy)).abs()).sqrt());
             let energies = [0, 1].map(|octave| mean(&|x, y| band(octave)(x, y).powi(2)));
-            let all = [&magnitudes[..], &slopes, &energies].concat();
-            cells.push(all.try_into().expect("there are six"));
+            let repeated = mean(&|x, y| {
+                let same = |left| at(0, x, y) == at(0, x - left, y);
+                f64::from(u8::from(same(1) || same(2)))
+            });
+            let all = [&magnitudes[..], &slopes, &energies, &[repeated]].concat();
+            cells.push(all.try_into().expect("there are seven"));
         }
         cells
     }
@@ -252,7 +256,10 @@ mod tests {
         ] {
             let [width, height] = size;
             let (pixels, channels) = (width * height, model.channels());
-            let samples: Vec<u16> = (0..pixels * channels).map(|_| rng.u16(..)).collect();
+            // Some of the gray pixels are repeated.
+            let step = if model == ColorModel::Gray { 10_000 } else { 1 };
+            let samples = (0..pixels * channels).map(|_| rng.u16(..) / step * step);
+            let samples: Vec<u16> = samples.collect();
             let planes: Vec<f32> = (0..pixels * channels).map(|_| rng.f32() * 1.4 - 0.2).collect();
             let source = Source::new_u16(width as u32, height as u32, model, &samples);
             let source = source.expect("the sizes agree");
@@ -268,9 +275,9 @@ mod tests {
             let first = found(&source, &planes, 32, Level::new());
             assert_eq!(first.columns * first.rows, expected[0].len());
             for (at, content) in first.content.iter().enumerate() {
-                for (which, Content { magnitudes, slopes, energies }) in content.iter().enumerate()
-                {
-                    let found = [&magnitudes[..], slopes, energies].concat();
+                for (which, content) in content.iter().enumerate() {
+                    let Content { magnitudes, slopes, energies, repeated } = content;
+                    let found = [&magnitudes[..], slopes, energies, &[*repeated]].concat();
                     for (found, expected) in found.iter().zip(expected[which][at]) {
                         let error = (f64::from(*found) - expected).abs();
                         assert!(error < 1e-5, "{model:?}, cell {at}: {found}, {expected}");

@@ -31,6 +31,9 @@ const SHARES: [f32; OCTAVES] = [1.6, 1.2];
 /// The most energy of a band that is added, as a multiple of what is missing: of grains such as those of film, which
 /// have no structure at all, there shall be about as many as there are.
 const MOST_ENERGY: f32 = 1.3;
+/// The share of repeated pixels from which on a picture is drawn or dithered, and has no texture; up to half of it,
+/// what is there is random.
+const MOST_REPEATED: f32 = 0.5;
 /// The direction for an excess of one slope over the other, as a share of both.
 const DIRECTION: f32 = 1.5;
 /// A variance of slopes that has no direction.
@@ -115,11 +118,13 @@ fn found_in_row(cells: &Cells, row: usize) -> Vec<Strength> {
 /// What was found around a node, given the content of the source and of the rendering.
 fn found(source: Content, rendering: Content) -> Strength {
     let variance = |root: f32| (root * root / MEAN_MAGNITUDE).powi(2);
+    // Up to a deviation of a level of 255, noise has as many equal pixels as what is drawn; it does not show.
+    let random = ((MOST_REPEATED - source.repeated) / (0.5 * MOST_REPEATED)).clamp(0.0, 1.0);
     let missing: [f32; OCTAVES] = array::from_fn(|octave| {
         let there = variance(source.magnitudes[octave]);
         let missing = (there - variance(rendering.magnitudes[octave])).max(0.0);
         // Where edges are, the robust variance is less than the variance: structure is no texture.
-        let texture = (there / (source.energies[octave] + NOTHING)).min(1.0);
+        let texture = (there / (source.energies[octave] + NOTHING)).min(1.0) * random;
         // What the rendering has for the greater part, it has at the right places.
         let share = missing / (there + NOTHING);
         let all = (source.energies[octave] - rendering.energies[octave]).max(0.0);
@@ -209,6 +214,7 @@ mod tests {
             magnitudes: deviations.map(root),
             slopes: [root(deviations[0]); 2],
             energies: deviations.map(|deviation| deviation * deviation),
+            repeated: 0.0,
         }
     }
 
@@ -305,6 +311,17 @@ mod tests {
         let found = halves([noisy, nothing], [edges, nothing]);
         let (of_noise, of_edges) = (found[0].amplitudes[0], found[12].amplitudes[0]);
         assert!(of_edges < 0.4 * of_noise, "{of_edges}, {of_noise}");
+    }
+
+    #[test]
+    fn what_is_drawn_or_dithered_gets_none() {
+        let repeated = |repeated: f32| Content { repeated, ..grains([0.05, 0.03]) };
+        let nothing = noise([0.0; 2]);
+        let amplitudes =
+            |share| halves([repeated(share), nothing], [repeated(share), nothing])[20].amplitudes;
+        assert_eq!(amplitudes(0.2), amplitudes(0.0));
+        assert_eq!(amplitudes(0.5), [0.0; 2]);
+        assert!(amplitudes(0.4)[0] < 0.7 * amplitudes(0.0)[0]);
     }
 
     #[test]
