@@ -28,7 +28,7 @@ const SHEET_QUALITY: u8 = 75;
 /// Of the README's picture.
 const README_QUALITY: u8 = 88;
 /// Our files without their texture.
-const PLAIN: &str = "gip --no-texture";
+const PLAIN: &str = "no texture";
 /// Of the crops of each picture, in the order of [`Strips`].
 const TITLES: [&str; 3] = [
     "where gip compares worst with AVIF, at equal bytes (codec, bits per pixel: SSIMULACRA2)",
