@@ -15,7 +15,7 @@ use crate::canvas::{Canvas, LINE};
 use crate::table::Table;
 
 /// Of sheets as JPEG.
-const SHEET_QUALITY: u8 = 80;
+const SHEET_QUALITY: u8 = 55;
 
 /// Prints what viewers chose, and gathers the triplets in which texture lost.
 ///
