@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 pub(crate) type Lanes = [f32; 16];
 
 /// Columns before a row that are no part of it; there are at least as many after it.
-const MARGIN: usize = 16;
+pub(crate) const MARGIN: usize = 16;
 
 /// What is taken to be around a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

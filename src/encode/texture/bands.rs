@@ -9,8 +9,8 @@ use crate::texture::{CELL, OCTAVES};
 /// Columns and rows of a block.
 pub(super) const COLUMNS: usize = SPAN;
 pub(super) const ROWS: usize = 32;
-/// Columns and rows around a block that are known, more than its bands need.
-pub(super) const HALO: usize = 16;
+/// Columns and rows around a block that are known, of which its bands need all but one.
+pub(super) const HALO: usize = 8;
 /// Columns and rows of a block with what is around it.
 pub(super) const STRIDE: usize = COLUMNS + 2 * HALO;
 pub(super) const HEIGHT: usize = ROWS + 2 * HALO;

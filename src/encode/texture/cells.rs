@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::bands::{Block, BlockCells, COLUMNS, Content, HALO, HEIGHT, ROWS, STRIDE};
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
-use crate::encode::rows::{Border, Rows};
+use crate::encode::rows::{Border, MARGIN, Rows};
 use crate::encode::source::{SPAN, Source};
 use crate::encode::strips;
 use crate::region::Region;
@@ -123,10 +123,10 @@ impl<'a> Comparison<'a> {
 #[inline(always)]
 fn cells_of(rows: &Rows, which: usize, [x, y]: [usize; 2], block: &mut Block) -> BlockCells {
     for row in 0..HEIGHT {
-        // Rows begin with a margin of as many columns as the halo has.
         let line = rows.row((y + row) as isize - HALO as isize)[which].as_flattened();
-        let count = STRIDE.min(line.len() - x);
-        block.row(row)[..count].copy_from_slice(&line[x..][..count]);
+        let line = &line[x + MARGIN - HALO..];
+        let count = STRIDE.min(line.len());
+        block.row(row)[..count].copy_from_slice(&line[..count]);
     }
     block.cells([COLUMNS.min(rows.width - x), ROWS.min(rows.height - y)])
 }
