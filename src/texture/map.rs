@@ -27,6 +27,7 @@ pub(super) const LEAST_DIRECTION: f32 = 0.375;
 pub(super) const AMPLITUDE: f32 = 0.5;
 /// Direction per sum, and the direction of a sum of zero.
 pub(super) const DIRECTION: (f32, f32) = (4.0, -2.0);
+
 /// Whether there is an amplitude where the map has this sum.
 pub(crate) fn has_amplitude(sum: f32) -> bool {
     sum > LEAST_SUM

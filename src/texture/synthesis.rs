@@ -137,7 +137,7 @@ impl Synthesis {
         let first = row * PAIRS as i32;
         if has_coarse {
             for number in first / 2 - 1..first / 2 - 1 + COARSE_PAIRS as i32 {
-                let made = &mut coarse[number.rem_euclid(COARSE_PAIRS as i32) as usize];
+                let made = &mut coarse[coarse_place(number)];
                 if made.number.replace(number) == Some(number) {
                     continue;
                 }
@@ -182,11 +182,16 @@ impl CoarsePair {
     }
 }
 
+/// The place of a pair of rows of the coarser lattice.
+fn coarse_place(number: i32) -> usize {
+    number.rem_euclid(COARSE_PAIRS as i32) as usize
+}
+
 /// Rows of the coarser lattice, and what they are made of: the one that has the number of the pair of rows, and its
 /// neighbours.
 fn coarse_rows(number: i32, pairs: &[CoarsePair; COARSE_PAIRS]) -> [&[f32]; 3] {
     [number - 1, number, number + 1].map(|row| {
-        let values = &pairs[(row >> 1).rem_euclid(COARSE_PAIRS as i32) as usize].values;
+        let values = &pairs[coarse_place(row >> 1)].values;
         let (upper, lower) = values.split_at(values.len() / 2);
         if row & 1 == 0 { upper } else { lower }
     })
