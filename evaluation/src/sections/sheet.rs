@@ -104,8 +104,9 @@ struct Strips {
 fn strips_of(bench: &mut Bench, picture: &TestPicture) -> Result<Strips> {
     let file = ours(bench, picture)?;
     let ours = Version::of_file(&file, None)?;
-    let plain = Version { samples: gip::decode_plain(&file, Threads::Pool)?, ..ours.clone() };
     let bytes = ours.bytes;
+    let samples = gip::decode_plain(&file, Threads::Pool)?;
+    let plain = Version { bytes, samples, report: None };
     let mut shown = vec![Shown::new(gip::NAME, picture, ours)?, Shown::new(PLAIN, picture, plain)?];
     for name in OTHERS {
         let (worker, _) = bench.baselines()?;
