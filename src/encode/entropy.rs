@@ -51,7 +51,7 @@ struct Fitted {
 
 /// Size in bytes of a file without Gaussians.
 pub(crate) fn least_length(layout: &FileLayout<'_>, observer: &mut Observer<'_>) -> Result<u64> {
-    let quantization = rate_model::quantization(0.0, layout.header().color);
+    let quantization = rate_model::quantization(0.0, &[1.0; 4][..layout.header().color.channels()]);
     let empty = QuantizedCodes { quantization, codes: Vec::new() };
     Ok(layout.write_entropy(&layout.coded(empty, observer)?, observer)?.len() as u64)
 }

@@ -7,7 +7,7 @@
 //! times the square root of its area l11 l22: its square, the *energy*, is proportional to the sum of
 //! the squares that it adds to the picture.
 
-use super::loss::Distortion;
+use super::loss::{ColorCurvature, Distortion};
 use super::options::Tune;
 use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, to_axes};
 use crate::color::ColorModel;
@@ -40,7 +40,7 @@ const SLANT_STEP: f32 = 1.732;
 /// precise ones if they are strong, more and coarser ones if they are weak.
 pub(crate) fn bits_per_gaussian(tune: Tune, component_bits: f64) -> f64 {
     let usual = match tune {
-        Tune::Visual => 30.0,
+        Tune::Visual => 28.0,
         Tune::Psnr => 27.0,
     };
     usual * (BITS_BY_COMPONENT * (component_bits - USUAL_COMPONENT_BITS)).exp2()
@@ -90,13 +90,12 @@ pub(crate) fn distortion_per_gaussian(step: f64) -> Distortion {
     Distortion((2.0 * step).exp2() / SQUARED_STEP)
 }
 
-/// The quantization grid for a step of colour, given by its base-2 logarithm.
-pub(crate) fn quantization(step: f64, model: ColorModel) -> Quantization {
+/// The quantization grid for a step of colour, given by its base-2 logarithm, and multiples of it for each colour
+/// axis, of which the first is 1.
+pub(crate) fn quantization(step: f64, axis_steps: &[f32]) -> Quantization {
     let step = color_step(step) as f32;
-    Quantization::new(
-        [POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP],
-        vec![step; model.channels()],
-    )
+    let color = axis_steps.iter().map(|multiple| multiple * step);
+    Quantization::new([POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP], color.collect())
 }
 
 /// The Lagrange multiplier lambda for a quantization grid: squared error per bit.
@@ -104,16 +103,17 @@ pub(crate) fn lambda(quantization: &Quantization) -> f32 {
     LAMBDA * quantization.color[0] * quantization.color[0]
 }
 
-/// The step exponent for a Gaussian where squared errors count `perceptual weight` times: the base-2
-/// logarithm of its norm in steps of colour, rounded and clamped to 0 to [`MAX_EXPONENT`].
+/// The step exponent for a Gaussian where errors count `perceptual weight` times: the base-2 logarithm of its norm
+/// in steps of colour, with the curvature of the distortion, rounded and clamped to 0 to [`MAX_EXPONENT`].
 pub(crate) fn step_exponent(
     gaussian: &Gaussian,
     perceptual_weight: f32,
+    curvature: &ColorCurvature,
     quantization: &Quantization,
     model: ColorModel,
 ) -> u32 {
     let [l11, _, l22] = gaussian.cholesky;
-    let squared = to_axes(gaussian.color, model).iter().map(|c| c * c).sum::<f32>();
+    let squared = curvature.of(to_axes(gaussian.color, model));
     let steps = (squared * l11 * l22 * perceptual_weight).sqrt() / quantization.color[0];
     steps.max(1.0).log2().round().min(MAX_EXPONENT as f32) as u32
 }
@@ -142,11 +142,12 @@ mod tests {
 
     #[test]
     fn each_exponent_is_for_twice_the_norm() {
-        let quantization = quantization(0.0, ColorModel::Gray);
+        let quantization = quantization(0.0, &[1.0]);
+        let curvature = ColorCurvature::of_squared_error(ColorModel::Gray);
         let exponent = |color: f32| {
             let cholesky = [4.0, 1.0, 1.0];
             let gaussian = Gaussian { center: [0.0; 2], cholesky, color: [color, 0.0, 0.0, 0.0] };
-            step_exponent(&gaussian, 1.0, &quantization, ColorModel::Gray)
+            step_exponent(&gaussian, 1.0, &curvature, &quantization, ColorModel::Gray)
         };
         assert_eq!(
             [0.0, 0.1, 0.5, 1.0, 2.0, 4.0, 1e6].map(exponent),

@@ -62,6 +62,11 @@ impl TiledSource {
         Ok(Self { width, height, channels, loss, mean, planes, scratch_memory })
     }
 
+    /// The same, with channels that are no colours.
+    pub(crate) fn without_colors(self) -> Self {
+        Self { loss: self.loss.without_colors(), ..self }
+    }
+
     /// All channels of a tile.
     pub(crate) fn tile<const CHANNELS: usize>(&self, tile: usize) -> SampleTile<'_, CHANNELS> {
         match &self.planes {

@@ -125,13 +125,12 @@ fn divide_by_position<'a>(
 mod tests {
     use super::*;
     use crate::coding::entropy::CenterGrid;
-    use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
     use crate::encode::rate_model;
 
     #[test]
     fn about_half_of_the_gaussians_are_in_the_largest_layer_but_not_too_many() {
-        let quantization = rate_model::quantization(0.0, ColorModel::Rgb);
+        let quantization = rate_model::quantization(0.0, &[1.0; 3]);
         let coder = LayerCoder {
             quantization: &quantization,
             grid: CenterGrid::new(640, 480),

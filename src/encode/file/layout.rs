@@ -228,7 +228,7 @@ mod tests {
             center: grid.units(SIDES.map(|side| random.f32() * (side as f32 + 60.0) - 30.0)),
         };
         let codes = (0..count).map(|_| code()).collect();
-        let quantization = rate_model::quantization(0.0, ColorModel::Gray);
+        let quantization = rate_model::quantization(0.0, &[1.0]);
         unobserved(|observer| {
             let coded = layout.coded(QuantizedCodes { quantization, codes }, observer)?;
             layout.write_entropy(&coded, observer)

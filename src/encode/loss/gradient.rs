@@ -1,12 +1,13 @@
 //! The distortion of a tile, and its gradient.
 //!
-//! With the residual r of a sample, and the means m of luma over the blocks of each coarser scale,
-//! the distortion is the sum over all samples of w r^2, plus the sum over all pixels and coarser
-//! scales of w m^2, where w is the perceptual weight on the scale. Blocks are whole: outside the picture,
-//! residuals are 0. The distortion is quadratic in the residuals.
+//! The distortion is the sum over all pixels and scales of w ((1 - c) l^2 + c |r|^2), where r are the means
+//! of the residuals of the colour channels over the pixel's block on the scale, l that of luma, w the
+//! perceptual weight on the scale, and c the share of colour ([`COLOR`]). Blocks are whole: outside the
+//! picture, residuals are 0. Residuals of alpha are not averaged. The distortion is quadratic in the
+//! residuals.
 
 use super::error::Distortion;
-use super::perceptual_weights::{BLOCK, PerceptualWeights, SCALES};
+use super::perceptual_weights::{BLOCK, COLOR, PerceptualWeights, SCALES};
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
@@ -48,39 +49,46 @@ pub(super) fn differentiate<const CHANNELS: usize>(
                 }
             }
         }
-        // Half the gradients of the means' terms: sums over 2 x 2 and 4 x 4 pixels, in every column of
-        // their blocks.
-        let (mut pairs, mut by_luma) = ([[0.0; TILE_WIDTH]; 2], [[0.0; TILE_WIDTH]; 2]);
-        let (mut half, mut sums) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
-        for pair in 0..2 {
+        // Half the gradient by luma.
+        let mut by_luma = [[0.0; TILE_WIDTH]; BLOCK];
+        let (pairs, whole) = block_means(&lines);
+        for row in 0..BLOCK {
             for x in 0..TILE_WIDTH {
-                sums[x] = lines[2 * pair][x] + lines[2 * pair + 1][x];
-            }
-            for x in 0..TILE_WIDTH {
-                pairs[pair][x] = sums[x] + sums[x ^ 1];
+                let by_means = coarse[x] * (1.0 - COLOR[2]) * whole[x]
+                    + medium[x] * (1.0 - COLOR[1]) * pairs[row / 2][x];
+                let by_pixel = fine[x] * (1.0 - COLOR[0]) * lines[row][x];
+                by_luma[row][x] = (by_means + by_pixel) * inside[x];
             }
         }
+        let (mut by_sample, mut flat) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
         for x in 0..TILE_WIDTH {
-            half[x] = pairs[0][x] + pairs[1][x];
-        }
-        for pair in 0..2 {
-            for x in 0..TILE_WIDTH {
-                let by_coarse = coarse[x] * ((half[x] + half[x ^ 2]) * (1.0 / 16.0));
-                by_luma[pair][x] = (by_coarse + medium[x] * (pairs[pair][x] * 0.25)) * inside[x];
-            }
-        }
-        let mut flat = [0.0; TILE_WIDTH];
-        for x in 0..TILE_WIDTH {
+            by_sample[x] = fine[x] * COLOR[0];
             flat[x] = fine[x] + medium[x] + coarse[x];
         }
         for channel in 0..CHANNELS {
+            let is_color = channel < colors;
             // All of the weight of alpha is that of its single pixels.
-            let by_sample = if channel < colors { &fine } else { &flat };
+            let by_sample = if is_color { &by_sample } else { &flat };
+            let mut by_mean = [[0.0; TILE_WIDTH]; 2];
+            if is_color {
+                for row in 0..BLOCK {
+                    lines[row] = planes[channel][first + row];
+                }
+                let (pairs, whole) = block_means(&lines);
+                for pair in 0..2 {
+                    for x in 0..TILE_WIDTH {
+                        let by_means =
+                            coarse[x] * COLOR[2] * whole[x] + medium[x] * COLOR[1] * pairs[pair][x];
+                        by_mean[pair][x] = by_means * inside[x];
+                    }
+                }
+            }
             for row in 0..BLOCK.min(rows - first) {
                 let residuals = &mut planes[channel][first + row];
                 for x in 0..TILE_WIDTH {
-                    let gradient =
-                        by_sample[x] * residuals[x] + luma[channel] * by_luma[row / 2][x];
+                    let gradient = by_sample[x] * residuals[x]
+                        + by_mean[row / 2][x]
+                        + luma[channel] * by_luma[row][x];
                     total[x] += gradient * residuals[x];
                     residuals[x] = gradient;
                 }
@@ -88,6 +96,29 @@ pub(super) fn differentiate<const CHANNELS: usize>(
         }
     }
     Distortion(total.iter().map(|&sum| f64::from(sum)).sum())
+}
+
+/// The means over 2 x 2 pixels, of both pairs of rows, and over 4 x 4 pixels, in every column of their blocks.
+#[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "see above")]
+fn block_means(lines: &[[f32; TILE_WIDTH]; BLOCK]) -> ([[f32; TILE_WIDTH]; 2], [f32; TILE_WIDTH]) {
+    let (mut pairs, mut whole) = ([[0.0; TILE_WIDTH]; 2], [0.0; TILE_WIDTH]);
+    let (mut half, mut sums) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
+    for pair in 0..2 {
+        for x in 0..TILE_WIDTH {
+            sums[x] = lines[2 * pair][x] + lines[2 * pair + 1][x];
+        }
+        for x in 0..TILE_WIDTH {
+            pairs[pair][x] = 0.25 * (sums[x] + sums[x ^ 1]);
+        }
+    }
+    for x in 0..TILE_WIDTH {
+        half[x] = 0.25 * (pairs[0][x] + pairs[1][x]);
+    }
+    for x in 0..TILE_WIDTH {
+        whole[x] = half[x] + half[x ^ 2];
+    }
+    (pairs, whole)
 }
 
 /// The distortion of a picture's residuals, in interleaved order, directly from its definition.
@@ -104,26 +135,26 @@ pub(crate) fn plain_distortion(
         for x in 0..width.next_multiple_of(BLOCK) {
             let by_scale = weights.row(y / BLOCK)[x / BLOCK].map(f64::from);
             if x < width && y < height {
-                for (channel, residual) in residuals[at(x, y)..][..channels].iter().enumerate() {
-                    let is_alpha = channel >= weights.colors;
-                    let count = if is_alpha { by_scale.iter().sum() } else { by_scale[0] };
-                    distortion += count * residual * residual;
-                }
+                let alpha = &residuals[at(x, y)..][weights.colors..channels];
+                let squares: f64 = alpha.iter().map(|residual| residual * residual).sum();
+                distortion += by_scale.iter().sum::<f64>() * squares;
             }
-            for (scale, weight_of_mean) in by_scale.iter().enumerate().skip(1) {
+            for (scale, weight) in by_scale.into_iter().enumerate() {
                 let side = 1 << scale;
-                let mut mean = 0.0;
+                let mut means = [0.0; 3];
                 for y in (y / side * side..height).take(side) {
                     for x in (x / side * side..width).take(side) {
-                        let pixel = residuals[at(x, y)..][..channels].iter();
-                        let luma: f64 = pixel
-                            .zip(weights.luma)
-                            .map(|(residual, share)| residual * f64::from(share))
-                            .sum();
-                        mean += luma / (side * side) as f64;
+                        let pixel = &residuals[at(x, y)..][..weights.colors];
+                        for (mean, residual) in means.iter_mut().zip(pixel) {
+                            *mean += residual / (side * side) as f64;
+                        }
                     }
                 }
-                distortion += weight_of_mean * mean * mean;
+                let shares = weights.luma.map(f64::from);
+                let luma: f64 = means.iter().zip(shares).map(|(mean, share)| mean * share).sum();
+                let squares: f64 = means.iter().map(|mean| mean * mean).sum();
+                let color = f64::from(COLOR[scale]);
+                distortion += weight * ((1.0 - color) * luma * luma + color * squares);
             }
         }
     }

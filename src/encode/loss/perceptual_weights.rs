@@ -13,7 +13,7 @@ use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
 use crate::encode::source::Source;
 
-/// Scales on which errors count: single pixels, and means of luma over 2 x 2 and 4 x 4 pixels.
+/// Scales on which errors count: single pixels, and means over 2 x 2 and 4 x 4 pixels.
 pub(crate) const SCALES: usize = 3;
 /// Side in pixels of the blocks that have weights, which is that of the coarsest scale.
 pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
@@ -24,12 +24,14 @@ pub(crate) type BlockWeights = [f32; SCALES];
 // Constants: docs/tuning.md, "What a person sees".
 /// The mean weight on each scale; they add up to 1.
 const BY_SCALE: [f64; SCALES] = [0.4, 0.35, 0.25];
+/// The share of all colour channels in the errors on each scale; the rest is that of luma.
+pub(super) const COLOR: [f32; SCALES] = [0.85, 0.1, 0.5];
 /// The weight is the variance to the power of minus this.
 const MASKING: f64 = 0.4;
 /// What is added to a variance: the square of a few quantization steps of 8 bits.
-const LEAST_VARIANCE: f64 = (6.0 / 255.0) * (6.0 / 255.0);
+const LEAST_VARIANCE: f64 = (4.0 / 255.0) * (4.0 / 255.0);
 /// The variances are those in square boxes with these radii in pixels.
-const RADII: [usize; 3] = [2, 7, 20];
+const RADII: [usize; 3] = [2, 5, 14];
 /// The largest and the least weight on a scale, as a factor on its geometric mean.
 const MOST: f64 = 8.0;
 /// How often an error counts in a gradient without noise, where people see blotches and bands that measures
@@ -145,6 +147,11 @@ fn normalized(logarithms: &[f32]) -> (impl Iterator<Item = f64>, f64) {
     (logarithms.iter().map(move |value| clamped(value) / mean), mean * middle.exp())
 }
 
+/// A radius in pixels of a scale, rounded.
+fn scaled(radius: usize, scale: usize) -> usize {
+    ((radius + (1 << scale) / 2) >> scale).max(1)
+}
+
 /// Sums over the rectangles from the first row and column of a part of the picture's luma.
 struct LumaBand {
     scale: usize,
@@ -166,7 +173,7 @@ impl LumaBand {
         background: Option<f32>,
     ) -> Self {
         let side = 1 << scale;
-        let most = RADII[RADII.len() - 1] / side;
+        let most = scaled(RADII[RADII.len() - 1], scale);
         let size = source.size();
         let [width, height] = size.map(|length| length.div_ceil(side));
         let channels = source.color().channels();
@@ -232,7 +239,7 @@ impl LumaBand {
 
     /// The variance in the box around a value, plus the least variance.
     fn variance(&self, x: usize, y: usize, radius: usize) -> f64 {
-        let radius = ((radius + (1 << self.scale) / 2) >> self.scale).max(1);
+        let radius = scaled(radius, self.scale);
         let (left, right) = (x.saturating_sub(radius), (x + radius + 1).min(self.width));
         let (top, bottom) = (y.saturating_sub(radius), (y + radius + 1).min(self.height));
         let stride = self.width + 1;

@@ -2,9 +2,11 @@
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
+use super::color_curvature::ColorCurvature;
 use super::error::{Distortion, RenderingError, SquaredError};
 use super::gradient;
 use super::perceptual_weights::PerceptualWeights;
+use crate::color::ColorModel;
 use crate::encode::error::Result;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::options::Tune;
@@ -12,6 +14,10 @@ use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{FULL_SCALE, SampleTile, TilePlane, centers};
 use crate::encode::source::Source;
 use crate::render::tile_grid::TILE_HEIGHT;
+
+// Constants: docs/tuning.md, "What a person sees".
+/// Coarser steps of both chroma axes, whose errors count less than those of luma.
+const VISUAL_AXIS_STEPS: [f32; 4] = [1.0, 1.6, 1.6, 1.0];
 
 /// How much errors count in a picture.
 #[derive(Debug)]
@@ -21,6 +27,9 @@ pub(crate) struct PictureLoss {
     pub(super) half_step: f32,
     /// `None` if all errors count the same.
     weights: Option<PerceptualWeights>,
+    color: ColorModel,
+    /// Whether its channels are what the colour model says.
+    has_colors: bool,
 }
 
 impl PictureLoss {
@@ -34,7 +43,35 @@ impl PictureLoss {
             Tune::Visual => Some(PerceptualWeights::new(source, observer)?),
             Tune::Psnr => None,
         };
-        Ok(Self { size: source.size(), half_step, weights })
+        Ok(Self {
+            size: source.size(),
+            half_step,
+            weights,
+            color: source.color(),
+            has_colors: true,
+        })
+    }
+
+    /// The loss of a picture whose channels are no colours.
+    pub(crate) fn without_colors(self) -> Self {
+        Self { has_colors: false, ..self }
+    }
+
+    /// How the distortion curves with the colour of a Gaussian.
+    pub(crate) fn color_curvature(&self) -> ColorCurvature {
+        match &self.weights {
+            Some(weights) if self.has_colors => {
+                ColorCurvature::of_distortion(weights.luma, self.color)
+            }
+            _ => ColorCurvature::of_squared_error(self.color),
+        }
+    }
+
+    /// The quantization steps of the colour axes, as multiples of the step of colour.
+    pub(crate) fn axis_steps(&self) -> &'static [f32] {
+        let is_visual = self.weights.is_some() && self.has_colors;
+        let steps = if is_visual { &VISUAL_AXIS_STEPS } else { &[1.0; 4] };
+        &steps[..self.color.channels()]
     }
 
     /// The perceptual weights, unless all errors count the same.

@@ -74,12 +74,14 @@ impl<'a> CodeOptimizer<'a> {
         step: f64,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers> {
-        let quantization = rate_model::quantization(step, self.model);
+        let loss = &self.tiled.loss;
+        let quantization = rate_model::quantization(step, loss.axis_steps());
+        let curvature = loss.color_curvature();
         let codes = observer.map(gaussians.iter(), |gaussian| {
             let Gaussian { center, cholesky, .. } = *gaussian;
-            let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
+            let weight = loss.weight_under(center, cholesky);
             let exponent =
-                rate_model::step_exponent(gaussian, perceptual_weight, &quantization, self.model);
+                rate_model::step_exponent(gaussian, weight, &curvature, &quantization, self.model);
             quantization.code(gaussian, exponent, &self.grid, self.model)
         })?;
         self.layout.coded(QuantizedCodes { quantization, codes }, observer)

@@ -12,6 +12,7 @@ use super::window::{ErrorChange, ErrorGradient, Window};
 use crate::coding::entropy::{Code, LayerCoder, MAX_EXPONENT, SymbolCosts};
 use crate::color::ColorModel;
 use crate::encode::error::Result;
+use crate::encode::loss::ColorCurvature;
 use crate::encode::own_frame::{self, GeometryChange};
 use crate::encode::progress::Observer;
 use crate::gaussian::Gaussian;
@@ -205,7 +206,10 @@ impl CoordinateDescent<'_> {
         let gradient = window.without(band, &gaussian, self.model)?;
         let mut best =
             Candidate { code, error: gradient.change.error, bits: self.bits(&code, context) };
-        let candidates = self.candidates(&gradient, code, &gaussian, context, self.cost(&best));
+        let present_cost = self.cost(&best);
+        let curvature = band.curvature();
+        let candidates =
+            self.candidates(&gradient, curvature, code, &gaussian, context, present_cost);
         for candidate in candidates.codes() {
             if let Some(other) = self.evaluated(window, band, candidate, context)
                 && self.cost(&other) < self.cost(&best)
@@ -226,6 +230,7 @@ impl CoordinateDescent<'_> {
     fn candidates(
         &self,
         gradient: &ErrorGradient,
+        curvature: &ColorCurvature,
         code: Code,
         gaussian: &Gaussian,
         context: CodeContext<'_>,
@@ -233,12 +238,17 @@ impl CoordinateDescent<'_> {
     ) -> Cheapest {
         let (quantization, model) = (self.coder.quantization, self.model);
         let slant = gaussian.cholesky[1] / gaussian.cholesky[2];
-        let amplitudes = code.color.iter().zip(&quantization.color);
-        let energy: f32 = amplitudes.map(|(&code, step)| (code as f32 * step).powi(2)).sum();
-        let energy = energy * gradient.perceptual_weight;
-        let recolored = self.with_best_colors(&gradient.change, code, context.costs);
-        let error =
-            gradient.change.with_color(recolored.color, quantization.color_units(&recolored));
+        let mut amplitudes = [0.0; 4];
+        for ((amplitude, code), step) in
+            amplitudes.iter_mut().zip(code.color).zip(&quantization.color)
+        {
+            *amplitude = code as f32 * step;
+        }
+        let energy = curvature.of(amplitudes) * gradient.perceptual_weight;
+        let change = &gradient.change;
+        let recolored = self.with_best_colors(change, curvature, code, context.costs);
+        let units = quantization.color_units(&recolored);
+        let error = change.with_color(recolored.color, units, curvature);
         let mut found = Cheapest::below(present_cost);
         let color_bits = self.coder.color_cost(&recolored, context.costs);
         if recolored != code {
@@ -291,23 +301,34 @@ impl CoordinateDescent<'_> {
         if change.squared_weights <= 0.0 {
             return None;
         }
-        let code = self.with_best_colors(&change, code, context.costs);
-        let error = change.with_color(code.color, self.coder.quantization.color_units(&code));
+        let curvature = band.curvature();
+        let code = self.with_best_colors(&change, curvature, code, context.costs);
+        let units = self.coder.quantization.color_units(&code);
+        let error = change.with_color(code.color, units, curvature);
         Some(Candidate { code, error, bits: self.bits(&code, context) })
     }
 
     /// A code with the colours of least cost for its geometry, chosen for one colour axis after the
     /// other.
-    fn with_best_colors(&self, change: &ErrorChange, mut code: Code, costs: &SymbolCosts) -> Code {
+    fn with_best_colors(
+        &self,
+        change: &ErrorChange,
+        curvature: &ColorCurvature,
+        mut code: Code,
+        costs: &SymbolCosts,
+    ) -> Code {
         let units = self.coder.quantization.color_units(&code);
+        // Half of the derivatives of the error by each amplitude.
+        let mut by_axis = change.by_axis;
         for (axis, &unit) in units.iter().enumerate().take(self.coder.channels) {
             // The increase of the error when the code is 1 away from its minimum.
-            let curvature = change.squared_weights * unit * unit;
-            if curvature <= 0.0 {
+            let by_others = curvature.by_axis()[axis].map(|entry| entry * change.squared_weights);
+            let by_itself = by_others[axis] * unit * unit;
+            if by_itself <= 0.0 {
                 continue;
             }
             let present = code.color[axis];
-            let best = present as f32 - change.by_axis[axis] * unit / curvature;
+            let best = present as f32 - by_axis[axis] * unit / by_itself;
             let best = best.clamp(-30_000.0, 30_000.0);
             let rounded = best.round() as i32;
             let towards_zero = rounded - rounded.signum();
@@ -320,12 +341,16 @@ impl CoordinateDescent<'_> {
                 code.color[axis] = candidate;
                 let distance = candidate as f32 - best;
                 let bits = self.coder.color_cost(&code, costs);
-                let cost = curvature * distance * distance + self.lambda * bits;
+                let cost = by_itself * distance * distance + self.lambda * bits;
                 if cost < least {
                     (least, cheapest) = (cost, candidate);
                 }
             }
             code.color[axis] = cheapest;
+            let added = (cheapest - present) as f32 * unit;
+            for (derivative, entry) in by_axis.iter_mut().zip(by_others) {
+                *derivative += entry * added;
+            }
         }
         code
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::kernel_weights::{KernelWeights, Lanes};
 use crate::color::with_channels;
 use crate::encode::error::Result;
-use crate::encode::loss::{BLOCK, PictureLoss, residual};
+use crate::encode::loss::{BLOCK, ColorCurvature, PictureLoss, residual};
 use crate::encode::mul_add::MulAdd;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{FULL_SCALE, SampleLine, TILE_WIDTH};
@@ -44,9 +44,10 @@ pub(crate) type StoredLanes = [i16; LANES];
 /// error, nor one above white where the source is white. Changes of the rendering are not clamped: they
 /// count as errors there, although the output would hide them, so the descent avoids them.
 ///
-/// The descent minimizes the sum of squared residuals, each times the perceptual weight of its pixel. The
-/// distortion counts the means of blocks too: [`Residuals::shift`] moves the residuals such that the
-/// gradient of that sum is the gradient of the distortion.
+/// What the descent minimizes, the *error*, is as simple as a sum of squared residuals, each times the
+/// perceptual weight of its pixel. The distortion counts the means of blocks too: [`Residuals::shift`] moves
+/// the residuals such that, times their perceptual weights, they are half of its gradient. What a colour that
+/// is added changes of it is the [`ColorCurvature`] times the colour.
 #[derive(Debug)]
 pub(crate) struct Residuals {
     width: usize,
@@ -58,6 +59,7 @@ pub(crate) struct Residuals {
     /// The perceptual weights of pixels, padded by 0 as `residuals`: one line for each row of blocks, or a
     /// single one where all rows are the same.
     perceptual_weights: Vec<f32>,
+    curvature: ColorCurvature,
     stride: usize,
     level: Level,
 }
@@ -76,7 +78,17 @@ impl Residuals {
         })?;
         let residuals = vec![0; stride * height * channels];
         let level = Level::new();
-        Ok(Self { width, height, channels, residuals, perceptual_weights, stride, level })
+        let curvature = tiled.loss.color_curvature();
+        Ok(Self {
+            width,
+            height,
+            channels,
+            residuals,
+            perceptual_weights,
+            curvature,
+            stride,
+            level,
+        })
     }
 
     /// Sets the residuals of the rows from `first` on, from a rendering of them, plane after plane.
@@ -160,14 +172,14 @@ impl Residuals {
     /// All rows in bands: `first` ones, and then `height` at a time.
     pub(crate) fn bands(&mut self, first: usize, height: usize) -> impl Iterator<Item = Band<'_>> {
         let (size, channels, stride, level) = (self.size(), self.channels, self.stride, self.level);
-        let perceptual_weights = &self.perceptual_weights[..];
+        let (perceptual_weights, curvature) = (&self.perceptual_weights[..], &self.curvature);
         let line = channels * stride;
         let (start, rest) = self.residuals.split_at_mut(first.min(size[1]) * line);
         let mut row = 0;
         core::iter::once(start).chain(rest.chunks_mut(height * line)).map(move |residuals| {
             let rows = row..row + residuals.len() / line;
             row = rows.end;
-            Band { size, channels, stride, level, rows, residuals, perceptual_weights }
+            Band { size, channels, stride, level, rows, residuals, perceptual_weights, curvature }
         })
     }
 
@@ -189,6 +201,7 @@ pub(crate) struct Band<'a> {
     rows: Range<usize>,
     residuals: &'a mut [i16],
     perceptual_weights: &'a [f32],
+    curvature: &'a ColorCurvature,
 }
 
 impl Band<'_> {
@@ -209,6 +222,11 @@ impl Band<'_> {
         self.level
     }
 
+    /// How the error curves with the colour of a Gaussian.
+    pub(crate) fn curvature(&self) -> &ColorCurvature {
+        self.curvature
+    }
+
     /// Adds a Gaussian times a factor to the rendering in some of the band's rows.
     pub(crate) fn add(&mut self, gaussian: &Gaussian, factor: f32, within: Range<usize>) {
         let Some([columns, rows]) = self.window(gaussian) else { return };
@@ -218,7 +236,8 @@ impl Band<'_> {
             return;
         }
         let (level, stride, line) = (self.level, self.stride, self.channels * self.stride);
-        let color = &gaussian.color.map(|color| color * factor)[..self.channels];
+        let color = self.curvature.times(gaussian.color).map(|color| color * factor);
+        let color = &color[..self.channels];
         let weights = KernelWeights::new(gaussian);
         let residuals = &mut self.residuals[(first - self.rows.start) * line..];
         let residuals = &mut residuals[..(end - first) * line];

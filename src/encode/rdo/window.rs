@@ -1,6 +1,7 @@
 //! The residuals around one Gaussian, and how the error, the sum of their squares times their
 //! perceptual weights, depends on it.
 
+use core::array;
 use core::ops::Range;
 
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
@@ -10,6 +11,7 @@ use super::kernel_weights::{KernelWeights, kernel_root};
 use super::residuals::{Band, ROWS_PER_TASK, StoredLanes, is_shared, load, store, window};
 use crate::coding::entropy::to_axes;
 use crate::color::{ColorModel, with_channels};
+use crate::encode::loss::ColorCurvature;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::own_frame::{GeometryChange, GeometrySums};
 use crate::encode::tiled_source::TiledSource;
@@ -60,6 +62,7 @@ struct Without {
 #[derive(Clone, Copy, Debug)]
 struct Removed {
     weights: KernelWeights,
+    /// What it adds to the residuals, for a weight of 1.
     color: [f32; 4],
 }
 
@@ -70,8 +73,8 @@ pub(crate) struct ErrorChange {
     pub(crate) error: f32,
     /// Half of the derivative of `error` by the amplitude along each colour axis.
     pub(crate) by_axis: [f32; 4],
-    /// The sum of squared weights times perceptual weights, which is half of the second derivative by each
-    /// amplitude.
+    /// The sum of squared weights times perceptual weights: times the [`ColorCurvature`], it is half of the
+    /// second derivatives by the amplitudes.
     pub(crate) squared_weights: f32,
     /// The Gaussian's amplitudes along the colour axes.
     amplitudes: [f32; 4],
@@ -79,15 +82,21 @@ pub(crate) struct ErrorChange {
 
 impl ErrorChange {
     /// The change of error for other amplitudes, `codes` times `units`, where nothing is clamped.
-    pub(crate) fn with_color(&self, codes: [i32; 4], units: [f32; 4]) -> f32 {
-        let axes = codes.iter().zip(units).zip(self.by_axis).zip(self.amplitudes);
-        axes.map(|(((&code, unit), by_axis), present)| {
-            let amplitude = code as f32 * unit;
-            // Half of the derivative at amplitude 0.
-            let at_zero = by_axis - present * self.squared_weights;
-            amplitude * (amplitude * self.squared_weights + 2.0 * at_zero)
-        })
-        .sum()
+    pub(crate) fn with_color(
+        &self,
+        codes: [i32; 4],
+        units: [f32; 4],
+        curvature: &ColorCurvature,
+    ) -> f32 {
+        let amplitudes = array::from_fn(|axis| codes[axis] as f32 * units[axis]);
+        let mut error = self.squared_weights * curvature.of(amplitudes);
+        for (axis, row) in curvature.by_axis().iter().enumerate() {
+            let present: f32 = row.iter().zip(self.amplitudes).map(|(a, b)| a * b).sum();
+            // Half of the derivative where all amplitudes are 0.
+            let at_zero = self.by_axis[axis] - self.squared_weights * present;
+            error += 2.0 * amplitudes[axis] * at_zero;
+        }
+        error
     }
 }
 
@@ -139,7 +148,7 @@ impl Window {
         let perceptual_weight =
             if sums.weights > 0.0 { sums.change.squares / sums.weights } else { 1.0 };
         Some(ErrorGradient {
-            change: sums.change.with_present(gaussian, model),
+            change: sums.change.with_present(gaussian, model, band.curvature()),
             by_geometry: sums.by_geometry(gaussian),
             perceptual_weight,
         })
@@ -158,7 +167,8 @@ impl Window {
         let Without { kept, removed } = &mut self.without;
         // Old values are overwritten, so that they need not be cleared.
         kept.resize(if is_kept { vectors * rows * CHANNELS } else { 0 }, [0; LANES]);
-        *removed = (!is_kept).then_some(Removed { weights, color: gaussian.color });
+        *removed = (!is_kept)
+            .then_some(Removed { weights, color: band.curvature().times(gaussian.color) });
         let kept = kept.as_chunks_mut::<CHANNELS>().0;
         let of_rows = |(rows, kept)| frame.gradient_of_rows(gaussian, &weights, rows, kept);
         if !self.place.is_shared() {
@@ -179,7 +189,7 @@ impl Window {
     ) -> ErrorChange {
         let sums =
             with_channels!(CHANNELS = band.channels(), self.change_of::<CHANNELS>(band, gaussian));
-        sums.with_absent(gaussian, model)
+        sums.with_absent(gaussian, model, band.curvature())
     }
 
     /// [`Window::change`] for a number of channels.
@@ -294,6 +304,7 @@ impl Frame<'_> {
     ) -> GradientSums {
         let Place { corner: [left, top], size: [vectors, _] } = self.place;
         let zero = f32x16::splat(simd, 0.0);
+        let removed = self.band.curvature().times(gaussian.color);
         let (mut squares, mut products, mut all) = (zero, [zero; CHANNELS], zero);
         let (mut first, mut second) = ([zero; 2], [zero; 3]);
         for row in rows.clone() {
@@ -317,7 +328,7 @@ impl Frame<'_> {
                         let (residual, color) = (residuals[channel], gaussian.color[channel]);
                         products[channel] = counted.fused_mul_add(residual, products[channel]);
                         along = residual.fused_mul_add(color, along);
-                        residuals[channel] = weight.fused_mul_add(-color, residual);
+                        residuals[channel] = weight.fused_mul_add(-removed[channel], residual);
                     }
                     // dweight/dq = -root / 2, and q = u^2 + v^2.
                     let slope = along * perceptual_weight * root;
@@ -405,41 +416,49 @@ struct ChangeSums {
 
 impl ChangeSums {
     fn plus(self, other: Self) -> Self {
-        let products =
-            core::array::from_fn(|channel| self.products[channel] + other.products[channel]);
+        let products = array::from_fn(|channel| self.products[channel] + other.products[channel]);
         Self { squares: self.squares + other.squares, products }
     }
 
     /// The change of error, where the residuals are those with the Gaussian.
-    fn with_present(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
-        let error = |color: f32, product: f32| color * (2.0 * product - color * self.squares);
-        self.change(gaussian, model, error, self.products)
+    fn with_present(
+        &self,
+        gaussian: &Gaussian,
+        model: ColorModel,
+        curvature: &ColorCurvature,
+    ) -> ErrorChange {
+        self.change(gaussian, model, curvature, self.products, -1.0)
     }
 
     /// The change of error, where the residuals are those without the Gaussian.
-    fn with_absent(&self, gaussian: &Gaussian, model: ColorModel) -> ErrorChange {
-        let error = |color: f32, product: f32| color * (color * self.squares + 2.0 * product);
-        let colors = gaussian.color.iter().zip(self.products);
-        let mut by_channel = [0.0; 4];
-        for (by_channel, (color, product)) in by_channel.iter_mut().zip(colors) {
-            *by_channel = color * self.squares + product;
-        }
-        self.change(gaussian, model, error, by_channel)
+    fn with_absent(
+        &self,
+        gaussian: &Gaussian,
+        model: ColorModel,
+        curvature: &ColorCurvature,
+    ) -> ErrorChange {
+        let added = curvature.times(gaussian.color).map(|color| color * self.squares);
+        let by_channel = array::from_fn(|channel| self.products[channel] + added[channel]);
+        self.change(gaussian, model, curvature, by_channel, 1.0)
     }
 
+    /// The change of error, given half of its derivatives; its quadratic part is added or subtracted.
     fn change(
         &self,
         gaussian: &Gaussian,
         model: ColorModel,
-        error: impl Fn(f32, f32) -> f32,
+        curvature: &ColorCurvature,
         by_channel: [f32; 4],
+        sign: f32,
     ) -> ErrorChange {
+        let amplitudes = to_axes(gaussian.color, model);
         let channels = gaussian.color.iter().zip(self.products).take(model.channels());
+        let linear: f32 = channels.map(|(&color, product)| color * product).sum();
         ErrorChange {
-            error: channels.map(|(&color, product)| error(color, product)).sum(),
+            error: 2.0 * linear + sign * self.squares * curvature.of(amplitudes),
             by_axis: to_axes(by_channel, model),
             squared_weights: self.squares,
-            amplitudes: to_axes(gaussian.color, model),
+            amplitudes,
         }
     }
 }

@@ -95,7 +95,7 @@ fn coded(
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let base = [0.0, 0.0, direction_sum(0.0), 0.0];
     let layout = FileLayout::new(map, base, kernel, parameterization, &metadata);
-    let tiled = TiledSource::new(map, job.tune, observer)?;
+    let tiled = TiledSource::new(map, job.tune, observer)?.without_colors();
     let budget = Budget::DistortionPerGaussian(rate_model::distortion_per_gaussian(step));
     let (precision, work) = (Precision::Entropy, Work::default());
     let mut fit = Fit::new(&tiled, &training, budget, precision, layout.base(), job.seed, work);

@@ -64,15 +64,16 @@ fn plain_weight(gaussian: &Gaussian, pixel: usize) -> f64 {
     testing::weight(gaussian, [pixel % WIDTH, pixel / WIDTH].map(|at| at as f64 + 0.5))
 }
 
-/// The residuals in f64 with a Gaussian, times `factor`, added to the rendering after it was clamped, in
-/// interleaved order.
+/// The residuals in f64 with a Gaussian, times `factor`, added after the rendering was clamped: its colour times
+/// the curvature. In interleaved order.
 fn plain_residuals(scene: &Scene, gaussian: &Gaussian, factor: f64) -> Vec<f64> {
     let channels = scene.model.channels();
+    let color = scene.tiled.loss.color_curvature().times(gaussian.color);
     let samples = scene.source.iter().enumerate();
     let residuals = samples.map(|(at, &sample)| {
         let (pixel, channel) = (at / channels, at % channels);
         let clamped = residual(scene.rendering[channel * WIDTH * HEIGHT + pixel], sample);
-        clamped + factor * plain_weight(gaussian, pixel) * f64::from(gaussian.color[channel])
+        clamped + factor * plain_weight(gaussian, pixel) * f64::from(color[channel])
     });
     residuals.collect()
 }
@@ -82,13 +83,45 @@ fn plain_error(scene: &Scene, gaussian: &Gaussian, factor: f64) -> f64 {
     weighted_error(scene, plain_residuals(scene, gaussian, factor).into_iter())
 }
 
+/// The sum of r C^-1 r times perceptual weights, where C is the curvature: half of its gradient by what is added
+/// in front of C is r.
 fn weighted_error(scene: &Scene, residuals: impl Iterator<Item = f64>) -> f64 {
-    let terms = residuals.enumerate().map(|(at, residual)| {
-        let pixel = at / scene.model.channels();
+    let inverse = inverse_curvature(scene);
+    let residuals: Vec<f64> = residuals.collect();
+    let pixels = residuals.chunks(scene.model.channels()).enumerate();
+    let terms = pixels.map(|(pixel, residuals)| {
         let perceptual_weight = scene.tiled.loss.weight_at(pixel % WIDTH, pixel / WIDTH);
-        f64::from(perceptual_weight) * residual * residual
+        let rows = residuals.iter().zip(&inverse).map(|(residual, row)| {
+            residual * row.iter().zip(residuals).map(|(entry, other)| entry * other).sum::<f64>()
+        });
+        f64::from(perceptual_weight) * rows.sum::<f64>()
     });
     terms.sum()
+}
+
+/// The inverse of the curvature by channel, by Gauss-Jordan elimination.
+fn inverse_curvature(scene: &Scene) -> [[f64; 4]; 4] {
+    let curvature = scene.tiled.loss.color_curvature();
+    let unit = |at: usize| array::from_fn(|index| if index == at { 1.0 } else { 0.0 });
+    let mut left: [[f64; 4]; 4] = array::from_fn(|row| curvature.times(unit(row)).map(f64::from));
+    let mut right: [[f64; 4]; 4] = array::from_fn(|row| unit(row).map(f64::from));
+    let channels = scene.model.channels();
+    for pivot in 0..channels {
+        let scale = 1.0 / left[pivot][pivot];
+        for matrix in [&mut left, &mut right] {
+            matrix[pivot] = matrix[pivot].map(|entry| entry * scale);
+        }
+        let (of_left, of_right) = (left[pivot], right[pivot]);
+        for row in (0..channels).filter(|&row| row != pivot) {
+            let factor = left[row][pivot];
+            for (matrix, of_pivot) in [(&mut left, of_left), (&mut right, of_right)] {
+                for (entry, of_pivot) in matrix[row].iter_mut().zip(of_pivot) {
+                    *entry -= factor * of_pivot;
+                }
+            }
+        }
+    }
+    right
 }
 
 fn residuals(scene: &Scene) -> Residuals {
@@ -169,9 +202,10 @@ fn derivative(scene: &Scene, gaussian: &Gaussian, direction: &GeometryChange) ->
     let kept = plain_residuals(scene, gaussian, -1.0);
     let ends = [STEP, -STEP].map(|step| {
         let changed = at(step);
+        let color = scene.tiled.loss.color_curvature().times(changed.color);
         let residuals = kept.iter().enumerate().map(|(at, residual)| {
             let (pixel, channel) = (at / scene.model.channels(), at % scene.model.channels());
-            residual + plain_weight(&changed, pixel) * f64::from(changed.color[channel])
+            residual + plain_weight(&changed, pixel) * f64::from(color[channel])
         });
         weighted_error(scene, residuals)
     });
