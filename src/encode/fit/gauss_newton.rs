@@ -18,6 +18,8 @@ use super::parameterization::MIN_DEVIATION;
 use super::pass::SplatGradient;
 use super::rate_term::RateTerm;
 use super::training::GaussNewton;
+use crate::encode::loss::{ColorCurvature, Matrix};
+use crate::encode::mul_add::MulAdd;
 use crate::encode::own_frame::{
     CENTER_CURVATURE, COLOR_CURVATURE, GeometrySums, RATIO_CURVATURE, SHEAR_CURVATURE,
     SIZE_CURVATURE,
@@ -75,6 +77,8 @@ pub(super) struct Step<'a> {
     /// The factor on the learning rate.
     pub(super) factor: f32,
     pub(super) rate_term: Option<RateTerm>,
+    /// How the distortion curves with the colour, as a share of that by gray.
+    pub(super) curvature: ColorCurvature,
 }
 
 /// A gradient of the loss, without the rate term, from which that in the own frame follows.
@@ -247,11 +251,17 @@ impl Step<'_> {
                 gradient.color[channel] += rate_by_color * color[channel];
             }
         }
+        gradient.color = product(simd, self.curvature.inverse(), gradient.color);
         let gradient = gradient.to_array();
 
         let area = area * perceptual_weight;
         let damping = self.options.damping * self.options.damping;
-        let by_energy = one / ((squared_color + damping) * area);
+        let curved = product(simd, self.curvature.by_channel(), color);
+        let mut energy = zero;
+        for channel in 0..color.len() {
+            energy = color[channel].fused_mul_add(curved[channel], energy);
+        }
+        let by_energy = one / ((energy + damping) * area);
         let by_area = one / area;
         let parts = Components::by_attribute(by_energy, by_energy, by_area).to_array();
         let mut reciprocals = [zero; MAX_COMPONENTS];
@@ -350,6 +360,19 @@ impl Step<'_> {
             new.color[channel] = new.color[channel].max(-MOST_COLOR).min(MOST_COLOR);
         }
     }
+}
+
+/// The product of a matrix and sixteen vectors.
+#[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+fn product<S: Simd>(simd: S, matrix: &Matrix, vectors: [f32x16<S>; 4]) -> [f32x16<S>; 4] {
+    let mut products = [f32x16::splat(simd, 0.0); 4];
+    for row in 0..products.len() {
+        for column in 0..vectors.len() {
+            products[row] = vectors[column].fused_mul_add(matrix[row][column], products[row]);
+        }
+    }
+    products
 }
 
 /// The inverses of Cholesky factors, as [`crate::gaussian::inverse_cholesky`] has them.

@@ -110,7 +110,8 @@ impl Parameters {
                 })?
             }
             States::GaussNewton(options, states) => {
-                let step = gauss_newton::Step { options, bounds, factor, rate_term };
+                let curvature = backward.tiled.loss.relative_curvature();
+                let step = gauss_newton::Step { options, bounds, factor, rate_term, curvature };
                 let level = Level::new();
                 let chunks = chunks(values, states, splats);
                 observer.map(chunks, |(first, values, states, splats)| {

@@ -3,13 +3,18 @@
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 use crate::encode::loss::Distortion;
+use crate::encode::options::Tune;
 use crate::encode::rate_model::{LAMBDA, step_for};
 use crate::gaussian::component_count;
 
 // Constants: docs/tuning.md, "Steps of training".
-/// The weight of the term, as a share of lambda: at full weight, training loses more quality than it saves
-/// bits.
-const WEIGHT: f32 = 0.55;
+/// The weight of the term, as a share of lambda: with more, training loses more quality than it saves bits.
+fn weight(tune: Tune) -> f32 {
+    match tune {
+        Tune::Visual => 0.75,
+        Tune::Psnr => 0.55,
+    }
+}
 
 /// The rate term. A Gaussian of norm s, in steps of colour, with the Cholesky factor L and the area
 /// A = l11 l22 is taken to cost these bits, up to a constant:
@@ -32,12 +37,12 @@ pub(super) struct RateTerm {
 
 impl RateTerm {
     /// The term for `count` Gaussians whose picture has this distortion.
-    pub(super) fn new(distortion: Distortion, count: usize, channels: usize) -> Self {
+    pub(super) fn new(tune: Tune, distortion: Distortion, count: usize, channels: usize) -> Self {
         let squared_step = (2.0 * step_for(distortion, count)).exp2() as f32;
         Self {
             squared_step,
             components: component_count(channels) as f32,
-            weight: 0.5 * WEIGHT * LAMBDA * squared_step * core::f32::consts::LOG2_E,
+            weight: 0.5 * weight(tune) * LAMBDA * squared_step * core::f32::consts::LOG2_E,
         }
     }
 
@@ -82,7 +87,7 @@ mod tests {
     fn the_gradient_is_that_of_the_bits() {
         let (distortion, count) = (Distortion(3.0), 20);
         let squared_step = (2.0 * step_for(distortion, count)).exp2();
-        let rate_term = RateTerm::new(distortion, count, 3);
+        let rate_term = RateTerm::new(Tune::Psnr, distortion, count, 3);
         for (cholesky, color) in [
             ([2.0, 0.3, 1.5], [0.3, -0.1, 0.2]),
             ([0.5, -4.0, 3.0], [0.0, 2.0, -0.01]),
@@ -96,7 +101,7 @@ mod tests {
                 let by_color = rate_term.by_color(wide(l11 * l22), wide(squared));
                 (by_shape.map(|lanes| lanes.to_array()[3]), by_color.to_array()[3])
             });
-            let lambda = f64::from(WEIGHT * LAMBDA) * squared_step;
+            let lambda = f64::from(weight(Tune::Psnr) * LAMBDA) * squared_step;
             let at =
                 |shape: [f64; 3], color: [f64; 3]| 0.5 * lambda * bits(shape, color, squared_step);
             let along = |direction: usize, by: f64| match direction {

@@ -203,9 +203,9 @@ impl<'a> Fit<'a> {
         next: Next,
         observer: &mut Observer<'_>,
     ) -> Result<()> {
-        let channels = self.tiled.channels;
+        let TiledSource { channels, loss, .. } = self.tiled;
         let rate_term = (self.precision == Precision::Entropy)
-            .then(|| RateTerm::new(self.error.distortion, self.len(), channels));
+            .then(|| RateTerm::new(loss.tune(), self.error.distortion, self.len(), *channels));
         let backward = Backward {
             pass: &self.pass,
             tiled: self.tiled,

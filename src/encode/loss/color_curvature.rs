@@ -13,46 +13,75 @@ const OF_CHANNELS: f32 = 0.32;
 const OF_LUMA: f32 = 0.42;
 
 /// A symmetric matrix, 0 in the rows and columns of channels that are absent.
-type Matrix = [[f32; 4]; 4];
+pub(crate) type Matrix = [[f32; 4]; 4];
 
 /// Half of the second derivatives of the distortion by the colour of a usual Gaussian, as a share of the
 /// sum of its squared weights times perceptual weights.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ColorCurvature {
     by_channel: Matrix,
+    inverse: Matrix,
     by_axis: Matrix,
 }
 
 impl ColorCurvature {
     /// That of the squared error.
     pub(crate) fn of_squared_error(model: ColorModel) -> Self {
-        Self::new(model, |row, column| if row == column { 1.0 } else { 0.0 })
+        Self::new(model, [1.0; 4], [0.0; 4])
     }
 
-    /// That of the perceptual distortion, given the share of each channel in luma.
+    /// That of the perceptual distortion, given the share of each channel in luma (0 for alpha).
     pub(super) fn of_distortion(luma: [f32; 4], model: ColorModel) -> Self {
-        let colors = model.channels() - usize::from(model.has_alpha());
-        Self::new(model, |row, column| {
-            let own = if row < colors { OF_CHANNELS } else { 1.0 };
-            // Alpha is no part of luma.
-            OF_LUMA * luma[row] * luma[column] + if row == column { own } else { 0.0 }
-        })
+        Self::scaled(luma, model, 1.0)
     }
 
-    /// That with these second derivatives by pairs of channels.
-    fn new(model: ColorModel, entry: impl Fn(usize, usize) -> f32) -> Self {
-        let channels = model.channels();
-        let mut by_channel = [[0.0; 4]; 4];
-        for (row, entries) in by_channel.iter_mut().enumerate().take(channels) {
-            for (column, value) in entries.iter_mut().enumerate().take(channels) {
-                *value = entry(row, column);
-            }
-        }
-        // The axes are orthonormal. Both matrices are symmetric.
+    /// The same as a share of that by gray.
+    pub(super) fn relative_to_gray(luma: [f32; 4], model: ColorModel) -> Self {
+        Self::scaled(luma, model, 1.0 / (OF_CHANNELS + OF_LUMA))
+    }
+
+    /// That of the perceptual distortion, times a scale for all but alpha.
+    fn scaled(luma: [f32; 4], model: ColorModel, scale: f32) -> Self {
+        let colors = model.channels() - usize::from(model.has_alpha());
+        let own = array::from_fn(|at| if at < colors { scale * OF_CHANNELS } else { 1.0 });
+        Self::new(model, own, luma.map(|share| (scale * OF_LUMA).sqrt() * share))
+    }
+
+    /// The diagonal matrix of `own`, plus the outer product of `luma` with itself.
+    fn new(model: ColorModel, own: [f32; 4], luma: [f32; 4]) -> Self {
+        let present = model.channels();
+        let matrix = |entry: &dyn Fn(usize, usize) -> f32| -> Matrix {
+            array::from_fn(|row| {
+                array::from_fn(|column| match row.max(column) < present {
+                    true => entry(row, column),
+                    false => 0.0,
+                })
+            })
+        };
+        let diagonal = |row, column, value| if row == column { value } else { 0.0 };
+        let by_channel =
+            matrix(&|row, column| diagonal(row, column, own[row]) + luma[row] * luma[column]);
+        // Sherman and Morrison's formula.
+        let shares: [f32; 4] = array::from_fn(|at| luma[at] / own[at]);
+        let scale = 1.0 / (1.0 + dot(shares, luma));
+        let inverse = matrix(&|row, column| {
+            diagonal(row, column, 1.0 / own[row]) - scale * shares[row] * shares[column]
+        });
+        // The axes are orthonormal. All matrices are symmetric.
         let halfway = by_channel.map(|row| to_axes(row, model));
         let columns = array::from_fn(|at| halfway.map(|row| row[at]));
         let by_axis = columns.map(|column: [f32; 4]| to_axes(column, model));
-        Self { by_channel, by_axis }
+        Self { by_channel, inverse, by_axis }
+    }
+
+    /// By pairs of channels.
+    pub(crate) fn by_channel(&self) -> &Matrix {
+        &self.by_channel
+    }
+
+    /// The inverse of that by pairs of channels.
+    pub(crate) fn inverse(&self) -> &Matrix {
+        &self.inverse
     }
 
     /// By pairs of colour axes.
@@ -92,6 +121,7 @@ mod tests {
             for curvature in [
                 ColorCurvature::of_squared_error(model),
                 ColorCurvature::of_distortion(luma, model),
+                ColorCurvature::relative_to_gray(luma, model),
             ] {
                 let mut color = [0.0; 4];
                 color[..model.channels()].fill_with(|| rng.f32() - 0.5);
@@ -102,6 +132,10 @@ mod tests {
                     "{model:?}: {by_axes}, {by_channels}"
                 );
                 assert!(by_axes > 0.0);
+                let back = curvature.inverse().map(|row| dot(row, curvature.times(color)));
+                for (found, expected) in back.into_iter().zip(color) {
+                    assert!((found - expected).abs() < 1e-5, "{model:?}: {found}, {expected}");
+                }
             }
         }
     }

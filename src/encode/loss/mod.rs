@@ -8,7 +8,7 @@ mod perceptual_weights;
 mod picture_loss;
 mod placement;
 
-pub(crate) use color_curvature::ColorCurvature;
+pub(crate) use color_curvature::{ColorCurvature, Matrix};
 pub(crate) use error::{Distortion, RenderingError, SquaredError};
 #[cfg(test)]
 pub(crate) use gradient::plain_distortion;

@@ -59,12 +59,24 @@ impl PictureLoss {
 
     /// How the distortion curves with the colour of a Gaussian.
     pub(crate) fn color_curvature(&self) -> ColorCurvature {
+        self.curvature(ColorCurvature::of_distortion)
+    }
+
+    /// The same as a share of that by gray, for which the learning rate of training is meant.
+    pub(crate) fn relative_curvature(&self) -> ColorCurvature {
+        self.curvature(ColorCurvature::relative_to_gray)
+    }
+
+    fn curvature(&self, visual: impl Fn([f32; 4], ColorModel) -> ColorCurvature) -> ColorCurvature {
         match &self.weights {
-            Some(weights) if self.has_colors => {
-                ColorCurvature::of_distortion(weights.luma, self.color)
-            }
+            Some(weights) if self.has_colors => visual(weights.luma, self.color),
             _ => ColorCurvature::of_squared_error(self.color),
         }
+    }
+
+    /// What it is tuned for.
+    pub(crate) fn tune(&self) -> Tune {
+        if self.weights.is_some() { Tune::Visual } else { Tune::Psnr }
     }
 
     /// The quantization steps of the colour axes, as multiples of the step of colour.

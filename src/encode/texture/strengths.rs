@@ -27,7 +27,7 @@ const NOTHING: f32 = 1e-9;
 
 // Constants: docs/tuning.md, "Texture".
 /// The amplitude of each octave, from the finest, as a multiple of what was found, at strength 50.
-const SHARES: [f32; OCTAVES] = [1.75, 1.3];
+const SHARES: [f32; OCTAVES] = [1.65, 1.25];
 /// The most energy of a band that is added, as a multiple of what is missing: of grains such as those of film, which
 /// have no structure at all, there shall be about as many as there are.
 const MOST_ENERGY: f32 = 1.15;

@@ -1,8 +1,10 @@
 //! Tests of the steps.
 
 use super::*;
+use crate::color::ColorModel;
 use crate::encode::fit::parameterization::OwnFrame;
 use crate::encode::loss::Distortion;
+use crate::encode::options::Tune;
 use crate::encode::testing::weight;
 use crate::gaussian::{Gaussian, component_count};
 use crate::testing::simd_levels;
@@ -15,7 +17,9 @@ const PARAMETERIZATIONS: [Parameterization; 2] =
 
 fn step_in(parameterization: Parameterization, size: [u32; 2], channels: usize) -> Step<'static> {
     let bounds = Bounds::new(parameterization, channels, size);
-    Step { options: &OPTIONS, bounds, factor: 0.8, rate_term: None }
+    let color = [ColorModel::Gray, ColorModel::GrayAlpha, ColorModel::Rgb, ColorModel::Rgba];
+    let curvature = ColorCurvature::of_squared_error(color[channels - 1]);
+    Step { options: &OPTIONS, bounds, factor: 0.8, rate_term: None, curvature }
 }
 
 /// Gaussians of all shapes, a part of which the step clamps.
@@ -70,7 +74,7 @@ fn gradients_by_splats_and_by_values_give_the_same_steps() {
     for (parameterization, channels) in
         PARAMETERIZATIONS.into_iter().flat_map(|p| [1, 3, 4].map(|channels| (p, channels)))
     {
-        for rate_term in [None, Some(RateTerm::new(Distortion(0.3), 40, channels))] {
+        for rate_term in [None, Some(RateTerm::new(Tune::Visual, Distortion(0.3), 40, channels))] {
             // Two blocks and a part of one.
             let count = 2 * LANES + 5;
             let step = Step { rate_term, ..step_in(parameterization, [90, 60], channels) };
@@ -141,7 +145,7 @@ fn every_simd_level_gives_the_same_bits() {
     let run = |level| {
         let mut rng = fastrand::Rng::with_seed(7);
         let count = 3 * LANES + 1;
-        let rate_term = Some(RateTerm::new(Distortion(0.3), 40, 3));
+        let rate_term = Some(RateTerm::new(Tune::Visual, Distortion(0.3), 40, 3));
         let step = Step { rate_term, ..step_in(Parameterization::Cholesky, [90, 60], 3) };
         let mut values = values(count, Parameterization::Cholesky, 3, &mut rng);
         let mut states = vec![State::NEW; count];
