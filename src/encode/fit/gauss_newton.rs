@@ -364,7 +364,6 @@ impl Step<'_> {
 
 /// The product of a matrix and sixteen vectors.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "see the top of the file")]
 fn product<S: Simd>(simd: S, matrix: &Matrix, vectors: [f32x16<S>; 4]) -> [f32x16<S>; 4] {
     let mut products = [f32x16::splat(simd, 0.0); 4];
     for row in 0..products.len() {

@@ -71,9 +71,7 @@ pub(super) fn differentiate<const CHANNELS: usize>(
             let by_sample = if is_color { &by_sample } else { &flat };
             let mut by_mean = [[0.0; TILE_WIDTH]; 2];
             if is_color {
-                for row in 0..BLOCK {
-                    lines[row] = planes[channel][first + row];
-                }
+                lines.copy_from_slice(&planes[channel][first..first + BLOCK]);
                 let (pairs, whole) = block_means(&lines);
                 for pair in 0..2 {
                     for x in 0..TILE_WIDTH {
@@ -100,7 +98,6 @@ pub(super) fn differentiate<const CHANNELS: usize>(
 
 /// The means over 2 x 2 pixels, of both pairs of rows, and over 4 x 4 pixels, in every column of their blocks.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "see above")]
 fn block_means(lines: &[[f32; TILE_WIDTH]; BLOCK]) -> ([[f32; TILE_WIDTH]; 2], [f32; TILE_WIDTH]) {
     let (mut pairs, mut whole) = ([[0.0; TILE_WIDTH]; 2], [0.0; TILE_WIDTH]);
     let (mut half, mut sums) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
