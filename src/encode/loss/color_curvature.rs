@@ -6,9 +6,8 @@ use crate::coding::entropy::to_axes;
 use crate::color::ColorModel;
 
 // Constants: docs/tuning.md, "What a person sees".
-/// The curvature by each colour channel, and by luma. Those of a Gaussian that is wide against all scales of
-/// the perceptual weights follow from these, 0.415 and 0.585; most Gaussians are small, and count less in the
-/// means of blocks.
+/// The curvature by each colour channel, and by luma. With the mean weights, those of a Gaussian that is wide
+/// against the blocks of all scales are 0.5 and 0.5; most are small, and count less in the means of blocks.
 const OF_CHANNELS: f32 = 0.32;
 const OF_LUMA: f32 = 0.42;
 
