@@ -89,13 +89,13 @@ impl ColorCurvature {
     }
 
     /// Half the derivatives by each channel, of a colour that is added.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn times(&self, color: [f32; 4]) -> [f32; 4] {
         self.by_channel.map(|row| dot(row, color))
     }
 
     /// The increase of the distortion with these amplitudes along the colour axes, where it is least without.
-    #[inline]
+    #[inline(never)]
     pub(crate) fn of(&self, amplitudes: [f32; 4]) -> f32 {
         dot(self.by_axis.map(|row| dot(row, amplitudes)), amplitudes)
     }
