@@ -67,10 +67,15 @@ impl PictureLoss {
         self.curvature(ColorCurvature::relative_to_gray)
     }
 
+    /// The perceptual weights, if they are of colours.
+    fn color_weights(&self) -> Option<&PerceptualWeights> {
+        self.weights.as_ref().filter(|_| self.has_colors)
+    }
+
     fn curvature(&self, visual: impl Fn([f32; 4], ColorModel) -> ColorCurvature) -> ColorCurvature {
-        match &self.weights {
-            Some(weights) if self.has_colors => visual(weights.luma, self.color),
-            _ => ColorCurvature::of_squared_error(self.color),
+        match self.color_weights() {
+            Some(weights) => visual(weights.luma, self.color),
+            None => ColorCurvature::of_squared_error(self.color),
         }
     }
 
@@ -81,8 +86,10 @@ impl PictureLoss {
 
     /// The quantization steps of the colour axes, as multiples of the step of colour.
     pub(crate) fn axis_steps(&self) -> &'static [f32] {
-        let is_visual = self.weights.is_some() && self.has_colors;
-        let steps = if is_visual { &VISUAL_AXIS_STEPS } else { &[1.0; 4] };
+        let steps = match self.color_weights() {
+            Some(_) => &VISUAL_AXIS_STEPS,
+            None => &[1.0; 4],
+        };
         &steps[..self.color.channels()]
     }
 

@@ -27,9 +27,9 @@ pub(crate) struct Info {
 /// Measures how much two pictures differ.
 ///
 /// Each may be a .gip file, which is shown without its texture, or any picture that `gip encode` reads. They are
-/// compared upright, and must have the same size. An alpha channel that is opaque everywhere is ignored. Both are converted to a colour model with the
-/// channels of both, and to the greater depth: gray becomes RGB, missing alpha becomes opaque, 8
-/// bits become 16. Colours count as they show, times their alpha. PSNR and the largest error are over
+/// compared upright, and must have the same size. An alpha channel that is opaque everywhere is ignored. Both are
+/// converted to a colour model with the channels of both, and to the greater depth: gray becomes RGB, missing
+/// alpha becomes opaque, 8 bits become 16. Colours count as they show, times their alpha. PSNR and the largest error are over
 /// all samples of all channels. MS-SSIM is the mean over the channels, on up to five scales, as the
 /// size allows.
 #[derive(Debug, clap::Args)]
