@@ -66,14 +66,13 @@ impl ColorModel {
         self.channels() as u8 - 1
     }
 
-    /// The colour model with this code in the header.
-    pub(crate) const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Gray),
-            1 => Some(Self::GrayAlpha),
-            2 => Some(Self::Rgb),
-            3 => Some(Self::Rgba),
-            _ => None,
+    /// The colour model with the code in the lowest two bits of the header's first byte.
+    pub(crate) const fn from_code(byte: u8) -> Self {
+        match byte & 3 {
+            0 => Self::Gray,
+            1 => Self::GrayAlpha,
+            2 => Self::Rgb,
+            _ => Self::Rgba,
         }
     }
 }
@@ -110,15 +109,6 @@ impl SampleDepth {
         match self {
             Self::Eight => 0xff,
             Self::Sixteen => 0xffff,
-        }
-    }
-
-    /// The depth with this number of bits per sample.
-    pub(crate) const fn from_bits(bits: u8) -> Option<Self> {
-        match bits {
-            8 => Some(Self::Eight),
-            16 => Some(Self::Sixteen),
-            _ => None,
         }
     }
 }

@@ -29,7 +29,7 @@ pub enum DecodeError {
         reason: Reason,
     },
     /// The file may be valid, but requires something that this decoder does not have: a later
-    /// version, another coding, an unknown critical chunk.
+    /// version, another quantizer, an unknown critical chunk.
     #[error("chunk {chunk}: unsupported: {what}")]
     Unsupported {
         /// The chunk that requires it.
@@ -43,8 +43,8 @@ pub enum DecodeError {
         None => String::from("the signature or between two chunks"),
     })]
     UnexpectedEnd {
-        /// The chunk that is incomplete; `None` if the file ends between two chunks, in the length
-        /// and type of a chunk, or in the signature.
+        /// The chunk that is incomplete; `None` if the file ends between two chunks, in the type of a chunk, or in
+        /// the signature.
         chunk: Option<ChunkType>,
     },
     /// The file or the request requires more than one of the [`Limits`](crate::Limits) allows.

@@ -13,7 +13,7 @@ use ::image::error::{
 use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
 use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
 
-use crate::chunk::SIGNATURE;
+use crate::chunk::MAGIC;
 use crate::color::{ColorModel, SampleDepth};
 use crate::decode::Decoder;
 use crate::error::{DecodeError, LimitKind};
@@ -58,7 +58,7 @@ pub fn register() -> bool {
             }),
         );
         if registered {
-            register_format_detection_hook(EXTENSION.into(), &SIGNATURE, None);
+            register_format_detection_hook(EXTENSION.into(), &MAGIC, None);
         }
         registered
     })

@@ -75,26 +75,11 @@ impl Kernel {
         }
     }
 
-    /// The code in the header.
-    #[cfg(feature = "encode")]
-    pub(crate) const fn code(self) -> u8 {
-        match self {
-            Self::Exponential { .. } => 0,
-            Self::Quartic => 1,
+    /// The exponential kernel with a cut-off that a file declares.
+    pub(crate) fn exponential(cutoff: f32) -> Result<Self, DecodeError> {
+        if cutoff > 0.0 && cutoff <= MAX_CUTOFF {
+            return Ok(Self::Exponential { cutoff });
         }
-    }
-
-    /// The kernel with this code and cut-off in the header.
-    pub(crate) fn parse(code: u8, cutoff: f32) -> Result<Self, DecodeError> {
-        const CHUNK: ChunkType = ChunkType::GHDR;
-        match code {
-            0 if cutoff > 0.0 && cutoff <= MAX_CUTOFF => Ok(Self::Exponential { cutoff }),
-            1 if cutoff == QUARTIC_CUTOFF => Ok(Self::Quartic),
-            0 => Err(DecodeError::malformed(CHUNK, "a cut-off that is not in (0, 64]")),
-            1 => {
-                Err(DecodeError::malformed(CHUNK, "a cut-off of the quartic kernel that is not 4"))
-            }
-            _ => Err(DecodeError::unsupported(CHUNK, "kernel", code.into())),
-        }
+        Err(DecodeError::malformed(ChunkType::HEADER, "a cut-off that is not in (0, 64]"))
     }
 }

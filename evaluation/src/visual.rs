@@ -60,7 +60,7 @@ pub(crate) fn cvvdp(source: &[u8], decoded: &[u8], width: u32, height: u32) -> R
         let samples = samples.iter().map(|&sample| f32::from(sample) / 255.0).collect();
         Image::new(width as usize, height as usize, 3, samples)
     };
-    let metric = Cvvdp::new(DisplayModel::from_name(DISPLAY)?, Options::default())?;
+    let metric = Cvvdp::new(DisplayModel::from_name(DISPLAY)?, Options::default().with_memory_limit_bytes(4 << 30))?;
     let prediction = metric.predict_image(&image(decoded)?, &image(source)?, Color::Srgb)?;
     Ok(prediction.jod.into())
 }

@@ -2,4 +2,5 @@
 //! sections 6 and 7).
 
 pub(crate) mod entropy;
+pub(crate) mod layer_count;
 pub(crate) mod packed;

@@ -1,20 +1,31 @@
-//! The header, the chunk `GHDR`: all that a decoder must know before it allocates memory (spec,
-//! section 5.1).
+//! The header, the chunk `H`: all that a decoder must know before it allocates memory, and what turns the codes
+//! of Gaussians into values (spec, section 5.1).
 
-use byteorder::{ByteOrder, LittleEndian};
+use alloc::vec::Vec;
 
-use crate::chunk::ChunkType;
+use super::fields::Fields;
+#[cfg(feature = "encode")]
+use super::varint;
+use crate::chunk::{ChunkType, VERSION};
+use crate::coding::entropy::Quantization;
+use crate::coding::packed::Quantizer;
 use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
 use crate::gaussian::{Parameterization, component_count};
 use crate::kernel::Kernel;
 
-/// The version that this crate reads and writes.
-pub(crate) const VERSION: u8 = 1;
 /// Largest width and height of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;
-/// Bytes in the payload of `GHDR`.
-pub(crate) const HEADER_LENGTH: usize = 36;
+
+/// The fields of the first byte of the header, from the lowest bit on.
+const COLOR_MODEL: u8 = 0b0000_0011;
+const SIXTEEN_BITS: u8 = 0b0000_0100;
+const ENTROPY: u8 = 0b0000_1000;
+const QUARTIC: u8 = 0b0001_0000;
+/// The parameterization with the packed coding; with the entropy coding, whether steps of geometry follow.
+const FORM_SHIFT: u32 = 5;
+const FORM: u8 = 0b0110_0000;
+const RESERVED: u8 = 0b1000_0000;
 
 /// How a file stores its Gaussians (spec, section 7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,24 +37,6 @@ pub enum Coding {
     /// The entropy coding: the Gaussians of each layer are stored as a set, in the order of a tree
     /// of cells. Each has a step exponent, and every attribute is entropy coded.
     Entropy,
-}
-
-impl Coding {
-    #[cfg(feature = "encode")]
-    const fn code(self) -> u8 {
-        match self {
-            Self::Packed => 0,
-            Self::Entropy => 1,
-        }
-    }
-
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Packed),
-            1 => Some(Self::Entropy),
-            _ => None,
-        }
-    }
 }
 
 /// The header of a file: what it says of its picture before the first Gaussian (spec, section 5.1).
@@ -64,75 +57,64 @@ pub struct Header {
     pub depth: SampleDepth,
     /// Number of Gaussians in all layers.
     pub gaussians: u32,
-    /// Number of layers, which are `GAUS` chunks: 0 if there are no Gaussians, else 1 to their
-    /// number.
+    /// Number of layers: 0 if there are no Gaussians, else 1 to their number.
     pub layers: u16,
     /// The kernel and its cut-off.
     pub kernel: Kernel,
     /// What the three stored components of a shape mean.
     pub parameterization: Parameterization,
     /// The colour that the Gaussians are added to: one value per channel, in 1/65535 of a full
-    /// sample; 0 in channels that the colour model lacks.
+    /// sample, and a multiple of 257 if samples have 8 bits; 0 in channels that the colour model lacks.
     pub base_color: [u16; 4],
 }
 
+/// What turns the codes of a file's Gaussians into values.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Dequantizer {
+    /// The quantizers of the packed coding, one per component.
+    Packed(Vec<Quantizer>),
+    /// The quantization grid of the entropy coding.
+    Entropy(Quantization),
+}
+
 impl Header {
-    /// Reads the payload of `GHDR`.
-    pub(crate) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
-        const CHUNK: ChunkType = ChunkType::GHDR;
-        // The version is checked first: a later version may change all that follows.
-        if let Some(&version) = payload.first()
-            && version != VERSION
-        {
-            return Err(DecodeError::unsupported(CHUNK, "version", version.into()));
+    /// Reads the payload of the header. There is nothing to turn codes into values if there are no Gaussians.
+    pub(crate) fn parse(payload: &[u8]) -> Result<(Self, Option<Dequantizer>), DecodeError> {
+        let unsupported =
+            |what, code: u8| DecodeError::unsupported(ChunkType::HEADER, what, code.into());
+        let mut fields = Fields::new(ChunkType::HEADER, payload);
+        let format = fields.u8()?;
+        if format & RESERVED != 0 {
+            return Err(unsupported("format", format));
         }
-        let payload: &[u8; HEADER_LENGTH] = payload
-            .try_into()
-            .map_err(|_| DecodeError::malformed(CHUNK, "the length is not 36 bytes"))?;
-        let coding = Coding::from_code(payload[1])
-            .ok_or_else(|| DecodeError::unsupported(CHUNK, "coding", payload[1].into()))?;
-        let color = ColorModel::from_code(payload[2])
-            .ok_or_else(|| DecodeError::unsupported(CHUNK, "colour model", payload[2].into()))?;
-        let depth = SampleDepth::from_bits(payload[3])
-            .ok_or_else(|| DecodeError::unsupported(CHUNK, "sample depth", payload[3].into()))?;
-        let side = |at: usize, name: &'static str| match LittleEndian::read_u32(&payload[at..]) {
-            0 => Err(DecodeError::malformed(CHUNK, alloc::format!("the {name} is zero"))),
-            side if side > MAX_SIDE => {
-                Err(DecodeError::malformed(CHUNK, alloc::format!("the {name} is over 2^20")))
-            }
-            side => Ok(side),
+        let coding = if format & ENTROPY == 0 { Coding::Packed } else { Coding::Entropy };
+        let form = (format & FORM) >> FORM_SHIFT;
+        let (parameterization, has_geometry) = match (coding, Parameterization::from_code(form)) {
+            (Coding::Packed, Some(parameterization)) => (parameterization, false),
+            (Coding::Packed, None) => return Err(unsupported("parameterization", form)),
+            (Coding::Entropy, _) if form < 2 => (Parameterization::Cholesky, form == 1),
+            (Coding::Entropy, _) => return Err(unsupported("form of steps", form)),
         };
-        let (width, height) = (side(4, "width")?, side(8, "height")?);
-        let gaussians = LittleEndian::read_u32(&payload[12..]);
-        let layers = LittleEndian::read_u16(&payload[16..]);
-        if u32::from(layers) > gaussians {
-            return Err(DecodeError::malformed(CHUNK, "more layers than Gaussians"));
-        }
-        if layers == 0 && gaussians != 0 {
-            return Err(DecodeError::malformed(CHUNK, "Gaussians, but no layer"));
-        }
-        let kernel = Kernel::parse(payload[18], LittleEndian::read_f32(&payload[20..]))?;
-        let parameterization = Parameterization::from_code(payload[19]).ok_or_else(|| {
-            DecodeError::unsupported(CHUNK, "parameterization", payload[19].into())
-        })?;
-        if coding == Coding::Entropy && parameterization != Parameterization::Cholesky {
-            return Err(DecodeError::malformed(
-                CHUNK,
-                "a parameterization that this coding does not have",
-            ));
-        }
-        if payload[24] != 0 {
-            return Err(DecodeError::unsupported(CHUNK, "colour transform", payload[24].into()));
-        }
-        if payload[25..28] != [0; 3] {
-            return Err(DecodeError::malformed(CHUNK, "a reserved byte is not zero"));
-        }
+        let color = ColorModel::from_code(format & COLOR_MODEL);
+        let depth =
+            if format & SIXTEEN_BITS == 0 { SampleDepth::Eight } else { SampleDepth::Sixteen };
+        let (width, height) = (fields.side("width")?, fields.side("height")?);
+        let gaussians = fields.varint()?;
+        let layers = if gaussians == 0 { 0 } else { fields.layers(gaussians)? };
         let mut base_color = [0; 4];
-        LittleEndian::read_u16_into(&payload[28..], &mut base_color);
-        if base_color[color.channels()..].iter().any(|&value| value != 0) {
-            return Err(DecodeError::malformed(CHUNK, "base colour in an absent channel"));
+        for channel in &mut base_color[..color.channels()] {
+            *channel = match depth {
+                // 255 becomes 65535.
+                SampleDepth::Eight => u16::from(fields.u8()?) * 257,
+                SampleDepth::Sixteen => fields.u16()?,
+            };
         }
-        Ok(Self {
+        let kernel = if format & QUARTIC == 0 {
+            Kernel::exponential(fields.f32()?)?
+        } else {
+            Kernel::Quartic
+        };
+        let header = Self {
             version: VERSION,
             coding,
             width,
@@ -144,25 +126,63 @@ impl Header {
             kernel,
             parameterization,
             base_color,
-        })
+        };
+        let dequantizer = match coding {
+            _ if gaussians == 0 => None,
+            Coding::Packed => {
+                let quantizers = (0..header.components()).map(|_| Quantizer::parse(&mut fields));
+                Some(Dequantizer::Packed(quantizers.collect::<Result<_, _>>()?))
+            }
+            Coding::Entropy => {
+                let channels = color.channels();
+                Some(Dequantizer::Entropy(Quantization::parse(
+                    &mut fields,
+                    channels,
+                    has_geometry,
+                )?))
+            }
+        };
+        fields.finish()?;
+        Ok((header, dequantizer))
     }
 
-    /// The payload of `GHDR`.
+    /// The payload of the header. The dequantizer is that of its coding, and is left out if there are no Gaussians.
     #[cfg(feature = "encode")]
-    pub(crate) fn to_payload(&self) -> [u8; HEADER_LENGTH] {
-        let mut payload = [0; HEADER_LENGTH];
-        payload[0] = self.version;
-        payload[1] = self.coding.code();
-        payload[2] = self.color.code();
-        payload[3] = self.depth.bits();
-        LittleEndian::write_u32(&mut payload[4..], self.width);
-        LittleEndian::write_u32(&mut payload[8..], self.height);
-        LittleEndian::write_u32(&mut payload[12..], self.gaussians);
-        LittleEndian::write_u16(&mut payload[16..], self.layers);
-        payload[18] = self.kernel.code();
-        payload[19] = self.parameterization.code();
-        LittleEndian::write_f32(&mut payload[20..], self.kernel.cutoff());
-        LittleEndian::write_u16_into(&self.base_color, &mut payload[28..]);
+    pub(crate) fn to_payload(&self, dequantizer: &Dequantizer) -> Vec<u8> {
+        let form = match dequantizer {
+            Dequantizer::Packed(_) => self.parameterization.code(),
+            Dequantizer::Entropy(quantization) => u8::from(!quantization.has_usual_geometry()),
+        };
+        let mut format = self.color.code() | form << FORM_SHIFT;
+        let flags = [
+            (self.depth == SampleDepth::Sixteen, SIXTEEN_BITS),
+            (matches!(dequantizer, Dequantizer::Entropy(_)), ENTROPY),
+            (self.kernel == Kernel::Quartic, QUARTIC),
+        ];
+        format |= flags.iter().filter(|(holds, _)| *holds).map(|(_, flag)| flag).sum::<u8>();
+        let mut payload = vec![format];
+        for number in [self.width, self.height, self.gaussians] {
+            varint::write(number, &mut payload);
+        }
+        if self.gaussians > 0 {
+            varint::write(self.layers.into(), &mut payload);
+        }
+        for &channel in &self.base_color[..self.color.channels()] {
+            match self.depth {
+                SampleDepth::Eight => payload.push((channel / 257) as u8),
+                SampleDepth::Sixteen => payload.extend(channel.to_le_bytes()),
+            }
+        }
+        if let Kernel::Exponential { cutoff } = self.kernel {
+            payload.extend(cutoff.to_le_bytes());
+        }
+        match dequantizer {
+            _ if self.gaussians == 0 => {}
+            Dequantizer::Packed(quantizers) => {
+                quantizers.iter().for_each(|quantizer| quantizer.write(&mut payload));
+            }
+            Dequantizer::Entropy(quantization) => quantization.write(&mut payload),
+        }
         payload
     }
 
@@ -176,5 +196,27 @@ impl Header {
     #[must_use]
     pub fn components(&self) -> usize {
         component_count(self.color.channels())
+    }
+}
+
+impl Fields<'_> {
+    /// The width or height of a picture.
+    fn side(&mut self, name: &'static str) -> Result<u32, DecodeError> {
+        match self.varint()? {
+            0 => Err(self.malformed(alloc::format!("the {name} is zero"))),
+            side if side > MAX_SIDE => {
+                Err(self.malformed(alloc::format!("the {name} is over 2^20")))
+            }
+            side => Ok(side),
+        }
+    }
+
+    /// The number of layers of so many Gaussians.
+    fn layers(&mut self, gaussians: u32) -> Result<u16, DecodeError> {
+        match self.varint()? {
+            0 => Err(self.malformed("Gaussians, but no layer")),
+            layers if layers > gaussians => Err(self.malformed("more layers than Gaussians")),
+            layers => u16::try_from(layers).map_err(|_| self.malformed("more than 65535 layers")),
+        }
     }
 }

@@ -1,17 +1,21 @@
 //! The container of a file: signature, chunks, header and metadata (spec, sections 4 and 5).
 
 mod exif;
+mod fields;
 mod header;
 mod metadata;
 mod parser;
+pub(crate) mod varint;
 #[cfg(feature = "encode")]
 mod writer;
 
 #[cfg(feature = "metadata")]
 pub(crate) use exif::{ByteOrder, Directory, Entry};
-pub use header::{Coding, Header};
+pub(crate) use fields::Fields;
+pub(crate) use header::Dequantizer;
 #[cfg(feature = "encode")]
-pub(crate) use header::{MAX_SIDE, VERSION};
+pub(crate) use header::MAX_SIDE;
+pub use header::{Coding, Header};
 #[cfg(feature = "encode")]
 pub use metadata::MetadataError;
 pub use metadata::{Metadata, Text};

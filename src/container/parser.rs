@@ -3,13 +3,11 @@
 
 use byteorder::{ByteOrder, LittleEndian};
 
+use super::varint;
 #[cfg(feature = "std")]
-use crate::chunk::FRAMING;
-use crate::chunk::{ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
+use crate::chunk::LEAST_CHUNK;
+use crate::chunk::{CRC_LENGTH, ChunkType, MAGIC, MAX_CHUNK_LENGTH, SIGNATURE, VERSION};
 use crate::error::DecodeError;
-
-/// Bytes of a CRC.
-const CRC_LENGTH: usize = 4;
 
 /// What the parser has found.
 #[derive(Debug)]
@@ -20,16 +18,18 @@ pub(crate) enum Event<'a> {
     Begin(ChunkType, u32),
     /// The next bytes of the payload of the current chunk.
     Payload(&'a [u8]),
-    /// The end of a chunk with this many bytes of payload and the right CRC.
-    Complete(ChunkType, u32),
+    /// The end of a chunk with the right CRC, and how many bytes it has: type, length, payload and CRC.
+    Complete(ChunkType, u64),
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Collecting the eight bytes of the signature.
+    /// Collecting the bytes of the signature.
     Signature,
-    /// Collecting length and type.
-    ChunkHeader,
+    /// Collecting the letters of a type.
+    Type,
+    /// Collecting the bytes of the length.
+    Length(ChunkType, varint::Arriving),
     /// Passing payload on, of which this many bytes are missing.
     Payload(ChunkType, u32),
     /// Collecting the CRC.
@@ -40,13 +40,13 @@ enum State {
 #[derive(Debug)]
 pub(crate) struct Parser {
     state: State,
-    /// The bytes of the signature, of length and type, or of a CRC that have arrived.
+    /// The bytes of the signature, of a type, or of a CRC that have arrived.
     word: [u8; 8],
     /// The number of these bytes.
     collected: usize,
     crc: crc32fast::Hasher,
-    /// Bytes of payload that the current chunk declares.
-    length: u32,
+    /// Bytes of the current chunk, as its type and length say.
+    bytes: u64,
 }
 
 impl Parser {
@@ -56,7 +56,7 @@ impl Parser {
             word: [0; 8],
             collected: 0,
             crc: crc32fast::Hasher::new(),
-            length: 0,
+            bytes: 0,
         }
     }
 
@@ -64,10 +64,13 @@ impl Parser {
     /// then.
     #[cfg(feature = "std")]
     pub(crate) fn safe_to_read(&self) -> usize {
-        let chunk_after = |chunk| if chunk == ChunkType::GEND { 0 } else { FRAMING };
+        let chunk_after = |chunk| if chunk == ChunkType::END { 0 } else { LEAST_CHUNK };
         match self.state {
-            State::Signature => SIGNATURE.len() - self.collected + FRAMING,
-            State::ChunkHeader => FRAMING - self.collected,
+            State::Signature => SIGNATURE.len() - self.collected + LEAST_CHUNK,
+            // The first letter may be that of the end.
+            State::Type if self.collected == 0 => LEAST_CHUNK,
+            State::Type => 4 - self.collected + 1 + CRC_LENGTH + LEAST_CHUNK,
+            State::Length(chunk, _) => 1 + CRC_LENGTH + chunk_after(chunk),
             State::Payload(chunk, missing) => {
                 (missing as usize).saturating_add(CRC_LENGTH + chunk_after(chunk))
             }
@@ -75,11 +78,11 @@ impl Parser {
         }
     }
 
-    /// The chunk whose payload or CRC is incomplete.
+    /// The chunk whose length, payload or CRC is incomplete.
     pub(crate) fn current(&self) -> Option<ChunkType> {
         match self.state {
-            State::Payload(chunk, _) | State::Crc(chunk) => Some(chunk),
-            State::Signature | State::ChunkHeader => None,
+            State::Length(chunk, _) | State::Payload(chunk, _) | State::Crc(chunk) => Some(chunk),
+            State::Signature | State::Type => None,
         }
     }
 
@@ -90,30 +93,42 @@ impl Parser {
             match self.state {
                 State::Signature => {
                     let ready = self.collect(input, SIGNATURE.len());
-                    // Other data is refused at its first wrong byte, not after eight bytes.
-                    if self.word[..self.collected] != SIGNATURE[..self.collected] {
-                        return Err(DecodeError::Signature);
-                    }
+                    self.check_signature()?;
                     if !ready {
                         return Ok(Event::NeedMore);
                     }
-                    self.enter(State::ChunkHeader);
+                    self.enter(State::Type);
                 }
-                State::ChunkHeader => {
-                    if !self.collect(input, 8) {
+                State::Type => {
+                    if !self.collect(input, 1) {
                         return Ok(Event::NeedMore);
                     }
-                    let length = LittleEndian::read_u32(&self.word);
-                    let chunk = ChunkType([self.word[4], self.word[5], self.word[6], self.word[7]]);
-                    if !chunk.is_well_formed() {
-                        return Err(DecodeError::malformed(chunk, "the type is not four letters"));
+                    let length = ChunkType::length_from(self.word[0]);
+                    if !self.collect(input, length) {
+                        return Ok(Event::NeedMore);
                     }
-                    if length > MAX_CHUNK_LENGTH {
-                        return Err(DecodeError::malformed(chunk, "the length is over 2^31 - 1"));
+                    let chunk = ChunkType::from_bytes(&self.word[..length]);
+                    if !chunk.is_well_formed() {
+                        return Err(DecodeError::malformed(chunk, "the type is not of letters"));
                     }
                     self.crc = crc32fast::Hasher::new();
-                    self.crc.update(&chunk.0);
-                    self.length = length;
+                    self.crc.update(chunk.bytes());
+                    self.enter(State::Length(chunk, varint::Arriving::default()));
+                }
+                State::Length(chunk, mut arriving) => {
+                    let before = *input;
+                    let length = arriving.read(input);
+                    self.crc.update(&before[..before.len() - input.len()]);
+                    self.state = State::Length(chunk, arriving);
+                    let malformed = |reason| DecodeError::malformed(chunk, reason);
+                    let Some(length) = length.map_err(|flaw| malformed(flaw.reason()))? else {
+                        return Ok(Event::NeedMore);
+                    };
+                    if length > MAX_CHUNK_LENGTH {
+                        return Err(malformed("the length is over 2^31 - 1"));
+                    }
+                    let framing = chunk.bytes().len() + arriving.bytes() as usize + CRC_LENGTH;
+                    self.bytes = framing as u64 + u64::from(length);
                     self.enter(State::Payload(chunk, length));
                     return Ok(Event::Begin(chunk, length));
                 }
@@ -139,10 +154,26 @@ impl Parser {
                     if stored != computed && !cfg!(fuzzing) {
                         return Err(DecodeError::malformed(chunk, "the CRC does not match"));
                     }
-                    self.enter(State::ChunkHeader);
-                    return Ok(Event::Complete(chunk, self.length));
+                    self.enter(State::Type);
+                    return Ok(Event::Complete(chunk, self.bytes));
                 }
             }
+        }
+    }
+
+    /// Refuses other data at its first wrong byte, not after eight of them.
+    fn check_signature(&self) -> Result<(), DecodeError> {
+        let found = &self.word[..self.collected];
+        if found == &SIGNATURE[..found.len()] {
+            return Ok(());
+        }
+        // Another version may differ from this one in all that follows its number.
+        match found.strip_prefix(&MAGIC) {
+            Some([version, ..]) if *version != VERSION => {
+                let version = u32::from(*version);
+                Err(DecodeError::unsupported(ChunkType::HEADER, "version", version))
+            }
+            _ => Err(DecodeError::Signature),
         }
     }
 

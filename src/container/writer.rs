@@ -1,11 +1,12 @@
-//! Writes the signature and the framing of chunks: length, type, payload, CRC-32 (spec, sections
+//! Writes the signature and the framing of chunks: type, length, payload, CRC-32 (spec, sections
 //! 4.1 and 4.2).
 
 use alloc::vec::Vec;
 
 use byteorder::{ByteOrder, LittleEndian};
 
-use crate::chunk::{ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
+use super::varint;
+use crate::chunk::{CRC_LENGTH, ChunkType, MAX_CHUNK_LENGTH, SIGNATURE};
 
 /// Writes a file chunk by chunk.
 #[derive(Debug)]
@@ -19,19 +20,17 @@ impl ChunkWriter {
         Self { file: SIGNATURE.to_vec() }
     }
 
-    /// Appends a chunk, whose payload must have at most [`MAX_CHUNK_LENGTH`] bytes.
-    pub(crate) fn chunk(&mut self, kind: ChunkType, payload: &[u8]) {
-        assert!(payload.len() <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
-        let mut word = [0; 4];
-        LittleEndian::write_u32(&mut word, payload.len() as u32);
-        self.file.extend_from_slice(&word);
-        self.file.extend_from_slice(&kind.0);
-        self.file.extend_from_slice(payload);
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(&kind.0);
-        crc.update(payload);
-        LittleEndian::write_u32(&mut word, crc.finalize());
-        self.file.extend_from_slice(&word);
+    /// Appends a chunk, whose payload is these parts and has at most [`MAX_CHUNK_LENGTH`] bytes.
+    pub(crate) fn chunk(&mut self, kind: ChunkType, payload: &[&[u8]]) {
+        let length = payload.iter().map(|part| part.len()).sum::<usize>();
+        assert!(length <= MAX_CHUNK_LENGTH as usize, "the caller splits layers");
+        let start = self.file.len();
+        self.file.extend_from_slice(kind.bytes());
+        varint::write(length as u32, &mut self.file);
+        payload.iter().for_each(|part| self.file.extend_from_slice(part));
+        let mut crc = [0; CRC_LENGTH];
+        LittleEndian::write_u32(&mut crc, crc32fast::hash(&self.file[start..]));
+        self.file.extend_from_slice(&crc);
     }
 
     /// The file so far.
@@ -39,9 +38,9 @@ impl ChunkWriter {
         self.file
     }
 
-    /// Appends `GEND`, and returns the file.
+    /// Appends the end, and returns the file.
     pub(crate) fn finish(mut self) -> Vec<u8> {
-        self.chunk(ChunkType::GEND, &[]);
+        self.chunk(ChunkType::END, &[]);
         self.file
     }
 }

@@ -7,20 +7,21 @@ use super::memory::{peak_memory, reserve};
 use super::pending::PendingLayers;
 use crate::chunk::ChunkType;
 use crate::coding::entropy::{AttributeBits, Quantization};
+use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{PackedLayerReader, Quantizer};
-use crate::container::{Coding, Header, Metadata};
+use crate::container::{Dequantizer, Header, Metadata};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::layers::bounds::LayerBounds;
 use crate::limits::Limits;
+use crate::orientation::Orientation;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
 use crate::texture::Texture;
 use crate::threads::Threads;
 
-/// Most bytes in the payload of `GHDR` and of `QNTZ`: nine quantizers of twelve bytes (spec,
-/// section 4.5).
-const MAX_SMALL_CHUNK: u32 = 108;
+/// Most bytes in the payload of the header (spec, section 5.1).
+const MAX_HEADER: u32 = 255;
 
 /// What the chunks of a file contain, as far as they have arrived.
 #[derive(Debug, Default)]
@@ -64,7 +65,7 @@ enum Stage {
     /// The payload is a layer of the packed coding, whose Gaussians are decoded as they arrive. The
     /// number is that of the Gaussians before it.
     Layer(PackedLayerReader, usize),
-    /// `GEND` was read.
+    /// The end was read.
     Complete,
     /// There was an error.
     Failed,
@@ -78,7 +79,7 @@ impl Stage {
 }
 
 impl ChunkDecoder {
-    /// Whether `GEND` was read.
+    /// Whether the end of the file was read.
     pub(super) fn is_complete(&self) -> bool {
         matches!(self.stage, Stage::Complete)
     }
@@ -96,12 +97,11 @@ impl ChunkDecoder {
         self.stage = Stage::Failed;
     }
 
-    /// Whether a layer or `GEND` has arrived, at least in part: header and metadata are complete
-    /// then.
+    /// Whether a layer or the end of the file has arrived, at least in part.
     pub(super) fn has_reached_layers(&self, current: Option<ChunkType>) -> bool {
         matches!(self.stage, Stage::Layer(..) | Stage::Complete)
             || !self.layers.is_empty()
-            || current == Some(ChunkType::GAUS)
+            || current == Some(ChunkType::LAYER)
     }
 
     /// The number of Gaussians that have arrived, those of pending layers included.
@@ -113,11 +113,11 @@ impl ChunkDecoder {
     pub(super) fn memory(&self) -> u64 {
         let gaussians = self.gaussians.capacity() as u64 * size_of::<Gaussian>() as u64;
         let layers = self.layers.capacity() as u64 * size_of::<u32>() as u64;
-        self.preamble_memory() + self.pending.memory() + gaussians + layers
+        self.ancillary_memory() + self.pending.memory() + gaussians + layers
     }
 
-    /// The memory of what stands before the layers, in bytes: metadata, bounds and texture.
-    fn preamble_memory(&self) -> u64 {
+    /// The memory of what is no layer, in bytes: metadata, bounds and texture.
+    fn ancillary_memory(&self) -> u64 {
         let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<LayerBounds>();
         let texture = self.texture.as_ref().map_or(0, Texture::memory);
         self.metadata.memory() + bounds as u64 + texture
@@ -127,7 +127,14 @@ impl ChunkDecoder {
     pub(super) fn check_header(&self, header: &Header) -> Result<(), DecodeError> {
         self.limits.check_size(header.width, header.height)?;
         self.limits.check_gaussians(header.gaussians)?;
-        self.limits.check_memory(self.preamble_memory() + Self::memory_of_layers(header))
+        self.limits.check_memory(self.ancillary_memory() + Self::memory_of_layers(header))
+    }
+
+    /// Checks that there is memory for this much besides what has arrived and all Gaussians.
+    fn check_memory(&self, bytes: u64) -> Result<(), DecodeError> {
+        let layers = self.header.as_ref().map_or(0, Self::memory_of_layers);
+        let held = self.ancillary_memory() + self.pending.memory() + layers;
+        self.limits.check_memory(held + bytes)
     }
 
     /// The most memory of what the layers of a picture become, in bytes.
@@ -151,54 +158,43 @@ impl ChunkDecoder {
     /// Checks that a chunk may stand here, and decides what becomes of its payload.
     fn stage_of(&self, chunk: ChunkType, length: u32) -> Result<Stage, DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
-        if self.header.is_none() && chunk != ChunkType::GHDR {
-            return malformed("stands before the header");
-        }
+        let Some(header) = &self.header else {
+            return match chunk {
+                ChunkType::HEADER if length > MAX_HEADER => malformed("is too long"),
+                ChunkType::HEADER => Ok(Stage::collect(length)),
+                _ => malformed("stands before the header"),
+            };
+        };
         match chunk {
-            ChunkType::GHDR if self.header.is_some() => malformed("appears twice"),
-            ChunkType::QNTZ if self.has_quantizers() => malformed("appears twice"),
-            ChunkType::GHDR | ChunkType::QNTZ if length > MAX_SMALL_CHUNK => {
-                malformed("is too long")
-            }
-            ChunkType::GAUS if !self.has_quantizers() => malformed("stands before QNTZ"),
-            ChunkType::GAUS if self.layers.len() == self.declared_layers() => {
+            ChunkType::HEADER => malformed("appears twice"),
+            ChunkType::BNDS if self.bounds.is_some() => malformed("appears twice"),
+            ChunkType::TXTR if self.texture.is_some() => malformed("appears twice"),
+            ChunkType::LAYER if self.layers.len() == usize::from(header.layers) => {
                 malformed("more layers than the header declares")
             }
-            ChunkType::GAUS if self.quantization.is_some() => self.collect_within_limits(length),
-            ChunkType::GAUS => {
-                Ok(Stage::Layer(PackedLayerReader::new(length), self.gaussians.len()))
+            ChunkType::LAYER if self.quantization.is_some() => self.collect_within_limits(length),
+            ChunkType::LAYER => {
+                let layer = PackedLayerReader::new(length, self.next_count(header));
+                Ok(Stage::Layer(layer, self.gaussians.len()))
             }
-            ChunkType::GEND if length != 0 => malformed("is not empty"),
-            ChunkType::BNDS if self.layers.is_empty() && self.bounds.is_some() => {
-                malformed("appears twice")
-            }
-            ChunkType::TXTR if self.layers.is_empty() && self.texture.is_some() => {
-                malformed("appears twice")
-            }
-            // After the first layer, these have no meaning in version 1.
-            ChunkType::BNDS | ChunkType::TXTR if self.layers.is_empty() => {
-                self.collect_within_limits(length)
-            }
-            _ if Metadata::includes(chunk) && self.layers.is_empty() => {
-                self.collect_within_limits(length)
-            }
-            ChunkType::GHDR | ChunkType::QNTZ => Ok(Stage::collect(length)),
-            ChunkType::GEND => Ok(Stage::Skip),
+            ChunkType::END if length != 0 => malformed("is not empty"),
+            ChunkType::END => Ok(Stage::Skip),
+            ChunkType::BNDS | ChunkType::TXTR => self.collect_within_limits(length),
+            _ if Metadata::includes(chunk) => self.collect_within_limits(length),
             _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
             _ => Ok(Stage::Skip),
         }
     }
 
-    /// Whether `QNTZ` was read.
-    fn has_quantizers(&self) -> bool {
-        self.quantization.is_some() || !self.quantizers.is_empty()
+    /// What is known of the number of Gaussians in the next layer.
+    fn next_count(&self, header: &Header) -> LayerCount {
+        let left = header.gaussians - self.arrived() as u32;
+        LayerCount::new(left, usize::from(header.layers) - self.layers.len() - 1)
     }
 
     /// Collects a payload, if there is memory for it and for all Gaussians.
     fn collect_within_limits(&self, length: u32) -> Result<Stage, DecodeError> {
-        let layers = self.header.as_ref().map_or(0, Self::memory_of_layers);
-        let declared = layers + peak_memory::<u8>(length);
-        self.limits.check_memory(self.preamble_memory() + self.pending.memory() + declared)?;
+        self.check_memory(peak_memory::<u8>(length))?;
         Ok(Stage::collect(length))
     }
 
@@ -211,8 +207,7 @@ impl ChunkDecoder {
             }
             Stage::Layer(layer, _) => {
                 let Some(header) = &self.header else { return Ok(()) };
-                let allowed = header.gaussians - self.gaussians.len() as u32;
-                if layer.count(&mut bytes, &self.quantizers, allowed)?.is_none() {
+                if layer.count(&mut bytes, &self.quantizers)?.is_none() {
                     return Ok(());
                 }
                 while let Some(values) = layer.next(&mut bytes, &self.quantizers)? {
@@ -229,30 +224,21 @@ impl ChunkDecoder {
     /// Ends the current chunk, whose CRC is right.
     pub(super) fn complete(&mut self, chunk: ChunkType) -> Result<(), DecodeError> {
         match (chunk, &mut self.stage) {
-            (ChunkType::GHDR, Stage::Collect { payload, .. }) => {
-                let header = Header::parse(payload)?;
+            (ChunkType::HEADER, Stage::Collect { payload, .. }) => {
+                let (header, dequantizer) = Header::parse(payload)?;
                 self.check_header(&header)?;
                 self.header = Some(header);
-            }
-            (ChunkType::QNTZ, Stage::Collect { payload, .. }) => {
-                let Some(header) = &self.header else { return Ok(()) };
-                match header.coding {
-                    Coding::Packed => {
-                        self.quantizers = Quantizer::parse_all(payload, header.components())?;
-                    }
-                    Coding::Entropy => {
-                        let quantization = Quantization::parse(payload, header.color.channels())?;
-                        self.quantization = Some(quantization);
-                    }
+                match dequantizer {
+                    Some(Dequantizer::Packed(quantizers)) => self.quantizers = quantizers,
+                    Some(Dequantizer::Entropy(steps)) => self.quantization = Some(steps),
+                    None => {}
                 }
             }
-            (ChunkType::GAUS, Stage::Collect { payload, .. }) => {
+            (ChunkType::LAYER, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
-                let declared = self.header.as_ref().map_or(0, |header| header.gaussians);
-                let allowed = declared - self.arrived() as u32;
-                let number = self.layers.len();
-                let bounds = self.bounds.as_ref().and_then(|bounds| bounds.get(number).copied());
-                let count = self.pending.push(payload, bounds, allowed)?;
+                let Some(header) = &self.header else { return Ok(()) };
+                let declared = self.next_count(header);
+                let count = self.pending.push(payload, declared, self.layers.len())?;
                 self.count_layer(count);
             }
             (ChunkType::BNDS, Stage::Collect { payload, .. }) => {
@@ -266,16 +252,22 @@ impl ChunkDecoder {
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
                 self.metadata.insert(chunk, payload)?;
+                // What has been shown is not turned afterwards.
+                let turns = self.metadata.orientation() != Orientation::NoTransforms;
+                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turns {
+                    let reason = "an orientation after the first layer";
+                    return Err(DecodeError::malformed(chunk, reason));
+                }
             }
             (_, Stage::Layer(layer, before)) => {
                 layer.finish()?;
                 let count = self.gaussians.len() - *before;
-                self.count_layer(count);
+                self.count_layer(count as u32);
             }
-            (ChunkType::GEND, _) => {
-                let declared = self.header.as_ref().map_or(0, |header| header.gaussians as usize);
-                if (self.layers.len(), self.arrived()) != (self.declared_layers(), declared) {
-                    let reason = "fewer layers or Gaussians than the header declares";
+            (ChunkType::END, _) => {
+                let declared = self.header.as_ref().map_or(0, |header| header.layers.into());
+                if self.layers.len() != declared {
+                    let reason = "fewer layers than the header declares";
                     return Err(DecodeError::malformed(chunk, reason));
                 }
                 self.stage = Stage::Complete;
@@ -287,16 +279,11 @@ impl ChunkDecoder {
         Ok(())
     }
 
-    /// The number of layers that the header declares.
-    fn declared_layers(&self) -> usize {
-        self.header.as_ref().map_or(0, |header| header.layers.into())
-    }
-
     /// Notes that a layer with `count` Gaussians has arrived.
-    fn count_layer(&mut self, count: usize) {
-        let declared = self.declared_layers();
+    fn count_layer(&mut self, count: u32) {
+        let declared = self.header.as_ref().map_or(0, |header| header.layers.into());
         reserve(&mut self.layers, 1, declared);
-        self.layers.push(count as u32);
+        self.layers.push(count);
     }
 
     /// Decodes the texture, if there is memory for it and for all Gaussians.
@@ -304,9 +291,8 @@ impl ChunkDecoder {
         let Some(header) = &self.header else { return Ok(()) };
         let texture = Texture::parse(payload, header, |count| {
             self.limits.check_gaussians(count)?;
-            let texture = payload.len() as u64 + u64::from(count) * size_of::<Gaussian>() as u64;
-            let layers = Self::memory_of_layers(header);
-            self.limits.check_memory(self.preamble_memory() + layers + texture)
+            let gaussians = u64::from(count) * size_of::<Gaussian>() as u64;
+            self.check_memory(payload.len() as u64 + gaussians)
         })?;
         self.texture = Some(texture);
         Ok(())
@@ -337,8 +323,8 @@ impl ChunkDecoder {
     pub(super) fn visible_gaussians(&self, options: &RenderOptions) -> Option<Vec<Gaussian>> {
         let (header, quantization) = (self.header.as_ref()?, self.quantization.as_ref()?);
         let view = options.view(header, &self.limits).ok()?;
-        let may_show = |bounds: LayerBounds| bounds.may_show_in(&view, header);
-        let layers = self.pending.select(|bounds| bounds.is_none_or(may_show));
+        let bounds = self.bounds.as_ref()?;
+        let layers = self.pending.select(|number| bounds[number].may_show_in(&view, header));
         if layers.count() == self.pending.count() || options.prefix.is_some() {
             return None;
         }

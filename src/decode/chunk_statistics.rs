@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::chunk::{ChunkType, FRAMING};
+use crate::chunk::ChunkType;
 
 /// Most types that are counted. A file may have any number of unknown types, and they are not to
 /// take memory.
@@ -16,7 +16,7 @@ pub struct ChunkStatistics {
     pub kind: ChunkType,
     /// The number of chunks.
     pub count: u32,
-    /// The bytes of all these chunks, length, type and CRC included.
+    /// The bytes of all these chunks, type, length and CRC included.
     pub bytes: u64,
 }
 
@@ -27,9 +27,8 @@ pub(super) struct ChunkCounter {
 }
 
 impl ChunkCounter {
-    /// Counts a chunk with a payload of `length` bytes.
-    pub(super) fn add(&mut self, kind: ChunkType, length: u32) {
-        let bytes = u64::from(length) + FRAMING as u64;
+    /// Counts a chunk of `bytes` bytes.
+    pub(super) fn add(&mut self, kind: ChunkType, bytes: u64) {
         if let Some(known) = self.types.iter_mut().find(|known| known.kind == kind) {
             known.count = known.count.saturating_add(1);
             known.bytes += bytes;

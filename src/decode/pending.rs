@@ -4,12 +4,13 @@
 
 use alloc::vec::Vec;
 
-use crate::coding::entropy::{AttributeBits, LAYER_PREFIX, LayerCoder, Quantization};
+use crate::chunk::ChunkType;
+use crate::coding::entropy::{AttributeBits, LayerCoder, Quantization};
+use crate::coding::layer_count::LayerCount;
 use crate::color::ColorModel;
-use crate::container::Header;
+use crate::container::{Header, varint};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
-use crate::layers::bounds::LayerBounds;
 use crate::threads::{self, Threads};
 
 /// Bytes that a layer takes besides its payload: its entries in lists, and its result.
@@ -29,8 +30,10 @@ struct PendingLayer {
     /// The number of its Gaussians.
     count: usize,
     payload: Vec<u8>,
-    /// Where it shows, if the file has bounds.
-    bounds: Option<LayerBounds>,
+    /// Where the coded Gaussians begin in the payload.
+    start: usize,
+    /// The number of layers before it.
+    number: usize,
 }
 
 impl PendingLayer {
@@ -42,22 +45,28 @@ impl PendingLayer {
         statistics: Option<&mut AttributeBits>,
         out: &mut [Gaussian],
     ) -> Result<(), DecodeError> {
-        coder.read_gaussians(&self.payload[LAYER_PREFIX..], statistics, model, out)
+        coder.read_gaussians(&self.payload[self.start..], statistics, model, out)
     }
 }
 
 impl PendingLayers {
-    /// Adds a layer, which must have 1 to `allowed` Gaussians. Returns their number.
+    /// Adds a layer, before which there are `number` layers in the file. Returns how many Gaussians it has.
     pub(crate) fn push(
         &mut self,
         payload: Vec<u8>,
-        bounds: Option<LayerBounds>,
-        allowed: u32,
-    ) -> Result<usize, DecodeError> {
-        let (count, _) = LayerCoder::read_count(&payload, allowed)?;
-        self.count += count;
+        declared: LayerCount,
+        number: usize,
+    ) -> Result<u32, DecodeError> {
+        let mut bytes = &payload[..];
+        let Some(count) = declared.read(&mut varint::Arriving::default(), &mut bytes)? else {
+            let reason = "too short for a number of Gaussians";
+            return Err(DecodeError::malformed(ChunkType::LAYER, reason));
+        };
+        LayerCoder::check_count(count, bytes)?;
+        let start = payload.len() - bytes.len();
+        self.count += count as usize;
         self.memory += payload.len() as u64 + BYTES_PER_LAYER;
-        self.layers.push(PendingLayer { count, payload, bounds });
+        self.layers.push(PendingLayer { count: count as usize, payload, start, number });
         Ok(count)
     }
 
@@ -71,13 +80,10 @@ impl PendingLayers {
         self.memory
     }
 
-    /// The layers whose bounds fulfil a condition.
-    pub(crate) fn select(
-        &self,
-        condition: impl Fn(Option<LayerBounds>) -> bool,
-    ) -> SelectedLayers<'_> {
+    /// The layers whose numbers fulfil a condition.
+    pub(crate) fn select(&self, condition: impl Fn(usize) -> bool) -> SelectedLayers<'_> {
         let mut layers = Vec::with_capacity(self.layers.len());
-        layers.extend(self.layers.iter().filter(|layer| condition(layer.bounds)));
+        layers.extend(self.layers.iter().filter(|layer| condition(layer.number)));
         let count = layers.iter().map(|layer: &&PendingLayer| layer.count).sum();
         SelectedLayers { layers, count }
     }

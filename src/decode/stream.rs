@@ -158,12 +158,12 @@ impl StreamDecoder {
                 Event::NeedMore => return Ok(()),
                 Event::Begin(chunk, length) => self.chunks.begin(chunk, length)?,
                 Event::Payload(payload) => self.chunks.payload(payload)?,
-                Event::Complete(chunk, length) => {
+                Event::Complete(chunk, bytes) => {
                     self.chunks.complete(chunk)?;
                     if !defer {
                         self.decode_pending(Threads::One)?;
                     }
-                    self.counter.add(chunk, length);
+                    self.counter.add(chunk, bytes);
                 }
             }
         }

@@ -15,7 +15,7 @@ use super::rdo::{SearchWork, TargetSearch};
 use super::tiled_source::TiledSource;
 use super::workload::TEXTURE;
 use super::{rate_model, texture};
-use crate::chunk::FRAMING;
+use crate::chunk::ChunkType;
 use crate::coding::entropy::QuantizedCodes;
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
@@ -112,7 +112,7 @@ pub(crate) fn finish(
 /// Whether a file has room for a texture with this payload: a small one needs its bytes for Gaussians.
 fn has_room(aim: Aim, payload: &[u8]) -> bool {
     let Aim::File(FileAim::Size(bytes)) = aim else { return true };
-    (payload.len() + FRAMING) as f64 <= MOST_OF_SIZE * bytes as f64
+    ChunkType::TXTR.framed(payload.len()) as f64 <= MOST_OF_SIZE * bytes as f64
 }
 
 /// Extends a fit until its squared error is at most `error`, or nothing helps.

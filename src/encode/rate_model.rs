@@ -9,7 +9,7 @@
 
 use super::loss::{ColorCurvature, Distortion};
 use super::options::Tune;
-use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, to_axes};
+use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, steps, to_axes};
 use crate::color::ColorModel;
 use crate::gaussian::Gaussian;
 
@@ -28,12 +28,6 @@ const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
 /// The Lagrange multiplier lambda, in squared steps of colour per bit: with it, making all steps a
 /// little finer lowers the distortion by as much as lambda times the bits that it adds.
 pub(crate) const LAMBDA: f32 = 0.322;
-/// Steps of geometry whose quantization adds as much distortion as that of a step of colour, for a
-/// Gaussian of norm 1: from integrals of the quartic kernel's derivatives.
-const POSITION_STEP: f32 = 1.095;
-const SIZE_STEP: f32 = 0.775;
-const RATIO_STEP: f32 = 0.866;
-const SLANT_STEP: f32 = 1.732;
 
 /// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
 /// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
@@ -91,11 +85,11 @@ pub(crate) fn distortion_per_gaussian(step: f64) -> Distortion {
 }
 
 /// The quantization grid for a step of colour, given by its base-2 logarithm, and multiples of it for each colour
-/// axis, of which the first is 1.
+/// axis, of which the first is 1: the nearest one that a file can have.
 pub(crate) fn quantization(step: f64, axis_steps: &[f32]) -> Quantization {
-    let step = color_step(step) as f32;
-    let color = axis_steps.iter().map(|multiple| multiple * step);
-    Quantization::new([POSITION_STEP, SIZE_STEP, RATIO_STEP, SLANT_STEP], color.collect())
+    let step = steps::rounded(color_step(step) as f32);
+    let color = axis_steps.iter().map(|multiple| step * steps::rounded_ratio(*multiple));
+    Quantization::new(steps::USUAL_GEOMETRY, color.collect())
 }
 
 /// The Lagrange multiplier lambda for a quantization grid: squared error per bit.

@@ -7,13 +7,12 @@ use super::map;
 use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
 use crate::coding::entropy::Code;
-use crate::coding::entropy::{LayerCoder, Quantization};
-use crate::container::Header;
+use crate::coding::entropy::{LayerCoder, Quantization, steps};
+#[cfg(feature = "encode")]
+use crate::container::varint;
+use crate::container::{Fields, Header};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
-
-/// The steps of position, size, ratio and slant.
-const GEOMETRY: [f32; 4] = [1.095_445_1, 0.774_596_7, 0.866_025_4, 1.732_050_8];
 
 /// The texture of a picture: the Gaussians of its map.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,30 +32,37 @@ impl Texture {
         picture: &Header,
         check: impl FnOnce(u32) -> Result<(), DecodeError>,
     ) -> Result<Self, DecodeError> {
-        let malformed = |reason| DecodeError::malformed(ChunkType::TXTR, reason);
-        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
-        let Some((step, layer)) = payload.split_first_chunk() else {
-            return Err(malformed("too short for a step"));
-        };
         let header = map::header(picture);
-        let (count, bytes) = LayerCoder::read_count(layer, u32::MAX).map_err(named)?;
-        if count as u64 > u64::from(header.width) * u64::from(header.height) {
-            return Err(malformed("more Gaussians than nodes"));
+        let mut fields = Fields::new(ChunkType::TXTR, payload);
+        let quantization = quantization(steps::read(&mut fields)?);
+        let count = fields.varint()?;
+        if count == 0 {
+            return Err(fields.malformed("no Gaussians"));
         }
-        check(count as u32)?;
-        let quantization = quantization(f32::from_le_bytes(*step)).map_err(named)?;
+        if u64::from(count) > u64::from(header.width) * u64::from(header.height) {
+            return Err(fields.malformed("more Gaussians than nodes"));
+        }
+        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
+        let bytes = fields.rest();
+        LayerCoder::check_count(count, bytes).map_err(named)?;
+        check(count)?;
         let coder = LayerCoder::new(&quantization, &header);
-        let mut gaussians = vec![Gaussian::NOTHING; count];
+        let mut gaussians = vec![Gaussian::NOTHING; count as usize];
         coder.read_gaussians(bytes, None, header.color, &mut gaussians).map_err(named)?;
         Ok(Self { header, gaussians })
     }
 
-    /// The payload of a map with these codes, which it sorts into the order of the file.
+    /// The payload of a map with these codes, which it sorts into the order of the file, and a step that a file can
+    /// have.
     #[cfg(feature = "encode")]
     pub(crate) fn to_payload(codes: &mut [Code], step: f32, picture: &Header) -> Vec<u8> {
-        let quantization = quantization(step).expect("a valid step");
+        let quantization = quantization(step);
         let layer = LayerCoder::new(&quantization, &map::header(picture)).write(codes);
-        [&step.to_le_bytes(), &layer.payload[..]].concat()
+        let mut payload = Vec::new();
+        steps::write(step, &mut payload);
+        varint::write(codes.len() as u32, &mut payload);
+        payload.extend(layer.bytes);
+        payload
     }
 
     /// The header of the map.
@@ -76,6 +82,6 @@ impl Texture {
 }
 
 /// The quantization grid of a map with this colour step.
-fn quantization(step: f32) -> Result<Quantization, DecodeError> {
-    Quantization::checked(GEOMETRY, vec![step; map::CHANNELS])
+fn quantization(step: f32) -> Quantization {
+    Quantization::new(steps::USUAL_GEOMETRY, vec![step; map::CHANNELS])
 }

@@ -133,7 +133,7 @@ impl FileInfo {
         let channels = header.color.channels();
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
-        let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::GAUS);
+        let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::LAYER);
         let texture = chunks.iter().find(|chunk| chunk.kind == ChunkType::TXTR).map(|chunk| {
             let map = stream.picture().and_then(|picture| picture.texture_map());
             let gaussians = map.map_or(0, |map| map.gaussians().len());

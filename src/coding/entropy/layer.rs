@@ -30,8 +30,6 @@ use crate::container::Header;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 
-/// Bytes of payload before the coded Gaussians: their number.
-pub(crate) const LAYER_PREFIX: usize = 4;
 /// Most Gaussians per byte. A layer that declares more is refused before time is spent on it.
 const MAX_PER_BYTE: usize = 4;
 
@@ -39,12 +37,20 @@ const MAX_PER_BYTE: usize = 4;
 #[cfg(feature = "encode")]
 #[derive(Debug)]
 pub(crate) struct EncodedLayer {
-    /// The payload of its `GAUS` chunk.
-    pub(crate) payload: Vec<u8>,
+    /// The coded Gaussians.
+    pub(crate) bytes: Vec<u8>,
     /// For each Gaussian, the level of its cell.
     pub(crate) levels: Vec<u32>,
     /// The costs of symbols with the models as they are after the last Gaussian.
     pub(crate) costs: SymbolCosts,
+}
+
+#[cfg(feature = "encode")]
+impl EncodedLayer {
+    /// The number of its Gaussians.
+    pub(crate) fn count(&self) -> usize {
+        self.levels.len()
+    }
 }
 
 /// Reads and writes layers, and computes the cost of Gaussians in them.
@@ -62,24 +68,15 @@ impl<'a> LayerCoder<'a> {
         Self { quantization, grid, channels: header.color.channels() }
     }
 
-    /// Splits the payload of a layer into the number of its Gaussians, which is 1 to `allowed`, and
-    /// the bytes of the coded Gaussians.
-    pub(crate) fn read_count(payload: &[u8], allowed: u32) -> Result<(usize, &[u8]), DecodeError> {
-        let malformed = |reason| Err(DecodeError::malformed(ChunkType::GAUS, reason));
-        let Some((prefix, bytes)) = payload.split_first_chunk::<LAYER_PREFIX>() else {
-            return malformed("too short for a number of Gaussians");
-        };
-        let count = u32::from_le_bytes(*prefix);
-        if count == 0 {
-            return malformed("no Gaussians");
-        }
-        if count > allowed {
-            return malformed("more Gaussians than the header declares");
-        }
+    /// Checks that a layer may have `count` Gaussians in these bytes.
+    pub(crate) fn check_count(count: u32, bytes: &[u8]) -> Result<(), DecodeError> {
         if count as usize > bytes.len().saturating_mul(MAX_PER_BYTE) {
-            return malformed("too short for its number of Gaussians");
+            return Err(DecodeError::malformed(
+                ChunkType::LAYER,
+                "too short for its number of Gaussians",
+            ));
         }
-        Ok((count as usize, bytes))
+        Ok(())
     }
 
     /// Reads as many Gaussians as `out` has elements, of a picture with this colour model. They are to be dropped if
@@ -155,15 +152,14 @@ impl<'a> LayerCoder<'a> {
     #[cfg(feature = "encode")]
     pub(crate) fn write(&self, codes: &mut [Code]) -> EncodedLayer {
         let (mut models, mut levels) = (tables::initial_models(), Vec::with_capacity(codes.len()));
-        let mut payload = (codes.len() as u32).to_le_bytes().to_vec();
         let mut encoder = RansEncoder::new(&mut models);
         let count = codes.len();
         let (levels_of, scratch) = (&mut levels, Vec::new());
         let mut gaussians = KnownGaussians { layer: self, codes, levels: levels_of, scratch };
         tree_walk::walk(&mut encoder, &self.grid, count, &mut gaussians);
-        payload.extend(encoder.finish());
+        let bytes = encoder.finish();
         let costs = models.iter().map(Model::costs).collect();
-        EncodedLayer { payload, levels, costs }
+        EncodedLayer { bytes, levels, costs }
     }
 
     /// Moves the `first` codes in the order of the tree to the front, in any order.
@@ -257,7 +253,7 @@ fn check_complete<S: SymbolSearch>(decoder: &RansDecoder<'_, S>) -> Result<(), D
     if decoder.is_complete() {
         return Ok(());
     }
-    Err(DecodeError::malformed(ChunkType::GAUS, "invalid entropy-coded data"))
+    Err(DecodeError::malformed(ChunkType::LAYER, "invalid entropy-coded data"))
 }
 
 /// The Gaussians that a decoder is about to read.
@@ -364,7 +360,7 @@ mod tests {
             let quantization = quantization(channels);
             let coder = coder(&quantization);
             let sent = codes.clone();
-            let EncodedLayer { payload, levels, .. } = coder.write(&mut codes);
+            let EncodedLayer { bytes, levels, .. } = coder.write(&mut codes);
             prop_assert_eq!(levels.len(), codes.len());
             // Centres move within their position intervals, all else stays.
             let sorted = |codes: &[Code]| {
@@ -375,12 +371,12 @@ mod tests {
             };
             prop_assert_eq!(sorted(&sent), sorted(&codes));
             let mut read = Vec::new();
-            let (count, bytes) =
-                LayerCoder::read_count(&payload, codes.len() as u32).expect("the count is right");
-            coder.read(count, bytes, None, |code, _| read.push(code)).expect("the layer is valid");
+            let count = codes.len();
+            LayerCoder::check_count(count as u32, &bytes).expect("the count is right");
+            coder.read(count, &bytes, None, |code, _| read.push(code)).expect("the layer is valid");
             prop_assert_eq!(&read, &codes);
             // The centres stay where they are when they are written again.
-            prop_assert_eq!(coder.write(&mut codes).payload, payload);
+            prop_assert_eq!(coder.write(&mut codes).bytes, bytes);
         }
 
         #[test]
@@ -406,16 +402,14 @@ mod tests {
         #[test]
         fn a_layer_has_the_declared_number_of_gaussians_whatever_its_bytes(
             bytes in prop::collection::vec(any::<u8>(), 0..400),
-            count in prop_oneof![0_u32..2000, any::<u32>()],
+            count in 1_u32..2000,
         ) {
             let quantization = quantization(3);
             let coder = coder(&quantization);
-            let payload = [&count.to_le_bytes(), &bytes[..]].concat();
-            let counted = LayerCoder::read_count(&payload, 1000);
-            let is_allowed = (1..=1000).contains(&count) && count as usize <= 4 * bytes.len();
-            prop_assert_eq!(counted.is_ok(), is_allowed);
-            if let Ok((declared, rest)) = counted {
-                prop_assert_eq!((declared, rest), (count as usize, &bytes[..]));
+            let is_allowed = count <= 1000 && count as usize <= 4 * bytes.len();
+            if is_allowed {
+                prop_assert!(LayerCoder::check_count(count, &bytes).is_ok());
+                let (declared, rest) = (count as usize, &bytes[..]);
                 let mut codes = Vec::new();
                 let read = coder.read(declared, rest, None, |code, _| codes.push(code));
                 // All arrive, also those of a malformed layer.

@@ -11,6 +11,7 @@ mod numbers;
 mod quantization;
 mod rans;
 mod statistics;
+pub(crate) mod steps;
 mod symbol;
 mod tables;
 #[cfg(all(test, feature = "encode"))]
@@ -21,7 +22,7 @@ mod tree_walk;
 pub(crate) use cells::CenterGrid;
 #[cfg(feature = "encode")]
 pub(crate) use layer::EncodedLayer;
-pub(crate) use layer::{LAYER_PREFIX, LayerCoder};
+pub(crate) use layer::LayerCoder;
 pub(crate) use quantization::Quantization;
 pub use quantization::QuantizationSteps;
 #[cfg(feature = "encode")]

@@ -4,18 +4,15 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use byteorder::{ByteOrder, LittleEndian};
-
 use super::cells::CenterGrid;
-use crate::chunk::ChunkType;
+use super::steps;
 use crate::color::ColorModel;
+use crate::container::Fields;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::math;
 use crate::simd::Backend;
 
-/// Steps of geometry: position, size, ratio, slant.
-const GEOMETRY: usize = 4;
 /// Largest step exponent.
 pub(crate) const MAX_EXPONENT: u32 = 7;
 /// The largest code that the encoder rounds to.
@@ -23,8 +20,6 @@ pub(crate) const MAX_EXPONENT: u32 = 7;
 pub(crate) const MOST_CODE: f32 = 30_000.0;
 /// Most fraction bits of a position: the least position interval is 2^-6 pixels.
 const MAX_FRACTION_BITS: i32 = 6;
-/// Valid steps.
-const STEPS: core::ops::RangeInclusive<f32> = 9.536_743e-7..=1024.0;
 /// The logarithms of size and ratio are clamped to this magnitude, so that their exponentials stay
 /// finite.
 const MAX_LOGARITHM: f32 = 20.0;
@@ -155,48 +150,56 @@ pub(crate) struct Quantization {
 
 impl Quantization {
     /// The quantization grid with these steps: of position, size, ratio and slant, and of each colour axis.
-    pub(crate) fn new([position, size, ratio, slant]: [f32; GEOMETRY], color: Vec<f32>) -> Self {
+    pub(crate) fn new([position, size, ratio, slant]: steps::Geometry, color: Vec<f32>) -> Self {
         let [size, ratio] = [size, ratio].map(ExpTable::new);
         Self { position, size, ratio, slant, color }
     }
 
-    /// Reads the payload of `QNTZ`: four steps of geometry, then one per channel (spec, section
-    /// 5.3).
-    pub(crate) fn parse(payload: &[u8], channels: usize) -> Result<Self, DecodeError> {
-        let malformed = |reason| DecodeError::malformed(ChunkType::QNTZ, reason);
-        if payload.len() != (GEOMETRY + channels) * size_of::<f32>() {
-            return Err(malformed("the length is not four bytes per step"));
+    /// Reads what the header says of steps: that of the first colour axis, those of the others in relation to it,
+    /// and, if they are not the usual ones, those of geometry (spec, section 5.3).
+    pub(crate) fn parse(
+        fields: &mut Fields<'_>,
+        channels: usize,
+        has_geometry: bool,
+    ) -> Result<Self, DecodeError> {
+        let mut color = vec![steps::read(fields)?];
+        for _ in 1..channels {
+            color.push(steps::read_related(fields, color[0])?);
         }
-        let steps: Vec<f32> = payload.chunks_exact(4).map(LittleEndian::read_f32).collect();
-        let (geometry, color) = steps.split_first_chunk().expect("four steps at least");
-        Self::checked(*geometry, color.to_vec())
-    }
-
-    /// [`Quantization::new`], of steps that come from a file.
-    pub(crate) fn checked(geometry: [f32; GEOMETRY], color: Vec<f32>) -> Result<Self, DecodeError> {
-        if !geometry.iter().chain(&color).all(|step| STEPS.contains(step)) {
-            let reason = "a step that is not within 2^-20 to 2^10";
-            return Err(DecodeError::malformed(ChunkType::QNTZ, reason));
+        let mut geometry = steps::USUAL_GEOMETRY;
+        if has_geometry {
+            for step in &mut geometry {
+                *step = steps::read(fields)?;
+            }
         }
         Ok(Self::new(geometry, color))
     }
 
     /// The steps.
     pub(crate) fn steps(&self) -> QuantizationSteps {
-        QuantizationSteps {
-            position: self.position,
-            size: self.size.step,
-            ratio: self.ratio.step,
-            slant: self.slant,
-            color: self.color.clone(),
-        }
+        let [position, size, ratio, slant] = self.geometry();
+        QuantizationSteps { position, size, ratio, slant, color: self.color.clone() }
     }
 
-    /// The payload of `QNTZ`.
+    fn geometry(&self) -> steps::Geometry {
+        [self.position, self.size.step, self.ratio.step, self.slant]
+    }
+
+    /// Whether the steps of geometry are the usual ones.
     #[cfg(feature = "encode")]
-    pub(crate) fn to_payload(&self) -> Vec<u8> {
-        let geometry = [self.position, self.size.step, self.ratio.step, self.slant];
-        geometry.iter().chain(&self.color).flat_map(|step| step.to_le_bytes()).collect()
+    pub(crate) fn has_usual_geometry(&self) -> bool {
+        self.geometry() == steps::USUAL_GEOMETRY
+    }
+
+    /// Appends what the header says of the steps, which must be such that it can: see [`steps`].
+    #[cfg(feature = "encode")]
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+        let (first, others) = self.color.split_first().expect("a channel at least");
+        steps::write(*first, out);
+        others.iter().for_each(|step| steps::write_related(*step, *first, out));
+        if !self.has_usual_geometry() {
+            self.geometry().iter().for_each(|step| steps::write(*step, out));
+        }
     }
 
     /// The shape of a Gaussian with this code.

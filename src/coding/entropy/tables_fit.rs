@@ -4,11 +4,12 @@ use std::fmt::Write;
 
 use super::contexts;
 use super::layer::LayerCoder;
-use super::quantization::Quantization;
 use super::rans::{Model, RansDecoder, SymbolCoder};
 use super::symbol::SYMBOLS;
 use super::tables;
-use crate::container::Header;
+use crate::chunk::ChunkType;
+use crate::coding::layer_count::LayerCount;
+use crate::container::{Dequantizer, Event, Header, Parser, varint};
 
 /// How often each symbol of each context was coded.
 type SymbolCounts = Vec<[f64; SYMBOLS]>;
@@ -61,33 +62,44 @@ fn fit_the_tables() {
 
 /// The symbols of a file, per thousand Gaussians.
 fn counts(file: &[u8]) -> SymbolCounts {
-    let mut rest = &file[8..];
-    let mut chunks = Vec::new();
-    while let Some((length, after)) = rest.split_first_chunk::<4>() {
-        let (kind, after) = after.split_at(4);
-        let (payload, after) = after.split_at(u32::from_le_bytes(*length) as usize);
-        chunks.push((kind, payload));
-        rest = &after[4..];
-    }
-    let of = |wanted: &'static [u8]| chunks.iter().filter(move |(kind, _)| *kind == wanted);
-    let header = Header::parse(of(b"GHDR").next().expect("a header").1).expect("a valid header");
-    let channels = header.color.channels();
-    let steps = of(b"QNTZ").next().expect("steps").1;
-    let quantization = Quantization::parse(steps, channels).expect("valid steps");
+    let (header, dequantizer) =
+        Header::parse(&payloads(file, ChunkType::HEADER)[0]).expect("valid");
+    let Some(Dequantizer::Entropy(quantization)) = dequantizer else { panic!("not entropy coded") };
     let coder = LayerCoder::new(&quantization, &header);
     let mut counts = vec![[0.0; SYMBOLS]; contexts::COUNT];
-    for (_, payload) in of(b"GAUS") {
+    let mut left = header.gaussians;
+    let layers = payloads(file, ChunkType::LAYER);
+    for (number, payload) in layers.iter().enumerate() {
         let mut models = tables::initial_models();
-        let (count, bytes) =
-            LayerCoder::read_count(payload, header.gaussians).expect("a valid layer");
+        let mut bytes = &payload[..];
+        let declared = LayerCount::new(left, layers.len() - 1 - number);
+        let count = declared.read(&mut varint::Arriving::default(), &mut bytes);
+        let count = count.expect("a valid layer").expect("a whole layer");
+        left -= count;
         let decoder = RansDecoder::new(bytes, &mut models);
         let mut counter = SymbolCounter { coder: decoder, counts };
-        coder.read_with(&mut counter, count, |_, _| ());
+        coder.read_with(&mut counter, count as usize, |_, _| ());
         assert!(counter.coder.is_complete());
         counts = counter.counts;
     }
     let factor = 1000.0 / f64::from(header.gaussians);
     counts.iter().map(|counts| counts.map(|count| factor * count)).collect()
+}
+
+/// The payloads of all chunks of a type.
+fn payloads(mut file: &[u8], wanted: ChunkType) -> Vec<Vec<u8>> {
+    let mut parser = Parser::new();
+    let mut payloads = Vec::new();
+    loop {
+        match parser.next(&mut file).expect("a valid file") {
+            Event::NeedMore => break payloads,
+            Event::Begin(chunk, _) if chunk == wanted => payloads.push(Vec::new()),
+            Event::Payload(bytes) if parser.current() == Some(wanted) => {
+                payloads.last_mut().expect("it has begun").extend_from_slice(bytes);
+            }
+            _ => {}
+        }
+    }
 }
 
 /// The starts that fit the counts of a context. Counts of rare symbols are noisy, so the

@@ -3,13 +3,12 @@
 use super::bits::BitReader;
 use super::quantizer::Quantizer;
 use crate::chunk::ChunkType;
+use crate::coding::layer_count::LayerCount;
+use crate::container::varint;
 use crate::error::DecodeError;
 use crate::gaussian::MAX_COMPONENTS;
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
-
-/// Bytes of payload before the codes: the number of Gaussians in the layer.
-pub(crate) const LAYER_PREFIX: u64 = 4;
 
 /// The number of bytes of the codes of `count` Gaussians.
 pub(crate) fn packed_length(quantizers: &[Quantizer], count: u32) -> u64 {
@@ -20,9 +19,12 @@ pub(crate) fn packed_length(quantizers: &[Quantizer], count: u32) -> u64 {
 /// Reads one layer as its bytes arrive.
 #[derive(Debug)]
 pub(crate) struct PackedLayerReader {
-    bits: BitReader,
-    /// The number of Gaussians in this layer, once its four bytes have arrived.
+    /// What is known of the number of Gaussians, and its bytes.
+    declared: LayerCount,
+    arriving: varint::Arriving,
+    /// The number of Gaussians in this layer, once its bytes have arrived.
     count: Option<u32>,
+    bits: BitReader,
     /// The number of Gaussians that were read.
     done: u32,
     /// The components of the Gaussian that is arriving.
@@ -35,10 +37,12 @@ pub(crate) struct PackedLayerReader {
 
 impl PackedLayerReader {
     /// A reader for a payload of `length` bytes.
-    pub(crate) fn new(length: u32) -> Self {
+    pub(crate) fn new(length: u32, declared: LayerCount) -> Self {
         Self {
-            bits: BitReader::default(),
+            declared,
+            arriving: varint::Arriving::default(),
             count: None,
+            bits: BitReader::default(),
             done: 0,
             values: [0.0; MAX_COMPONENTS],
             filled: 0,
@@ -46,23 +50,19 @@ impl PackedLayerReader {
         }
     }
 
-    /// The number of Gaussians in this layer: 1 to `allowed`, and just as many as the payload has
-    /// bytes for. `None` until its bytes have arrived.
+    /// The number of Gaussians in this layer: just as many as the payload has bytes for. `None` until its bytes have
+    /// arrived.
     pub(crate) fn count(
         &mut self,
         input: &mut &[u8],
         quantizers: &[Quantizer],
-        allowed: u32,
     ) -> Result<Option<u32>, DecodeError> {
         if self.count.is_none() {
-            let Some(count) = self.bits.read(32, input) else { return Ok(None) };
-            if count == 0 {
-                return Err(malformed("no Gaussians"));
-            }
-            if count > allowed {
-                return Err(malformed("more Gaussians than the header declares"));
-            }
-            if u64::from(self.length) != LAYER_PREFIX + packed_length(quantizers, count) {
+            let Some(count) = self.declared.read(&mut self.arriving, input)? else {
+                return Ok(None);
+            };
+            let codes = packed_length(quantizers, count);
+            if u64::from(self.length) != u64::from(self.arriving.bytes()) + codes {
                 return Err(malformed("the length does not match the number of Gaussians"));
             }
             self.count = Some(count);
@@ -111,7 +111,7 @@ impl PackedLayerReader {
 }
 
 fn malformed(reason: &'static str) -> DecodeError {
-    DecodeError::malformed(ChunkType::GAUS, reason)
+    DecodeError::malformed(ChunkType::LAYER, reason)
 }
 
 /// The Gaussians of a file with the packed coding, as codes.
@@ -123,11 +123,10 @@ pub(crate) struct PackedCodes {
     pub(crate) codes: Vec<[u32; MAX_COMPONENTS]>,
 }
 
-/// The payload of a layer with these codes.
+/// The bytes of these codes.
 #[cfg(feature = "encode")]
 pub(crate) fn write_layer(codes: &[[u32; MAX_COMPONENTS]], quantizers: &[Quantizer]) -> Vec<u8> {
     let mut writer = super::bits::BitWriter::default();
-    writer.write(codes.len() as u32, 32);
     for gaussian in codes {
         for (&code, quantizer) in gaussian.iter().zip(quantizers) {
             writer.write(code, quantizer.bits().into());

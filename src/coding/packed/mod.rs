@@ -7,7 +7,7 @@ mod quantizer;
 
 pub(crate) use layer::PackedLayerReader;
 #[cfg(feature = "encode")]
-pub(crate) use layer::{LAYER_PREFIX, PackedCodes, packed_length, write_layer};
+pub(crate) use layer::{PackedCodes, packed_length, write_layer};
 #[cfg(feature = "encode")]
 pub(crate) use quantizer::MAX_PARAMETER;
 pub use quantizer::{Quantizer, UniformQuantizer};

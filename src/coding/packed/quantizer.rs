@@ -1,16 +1,13 @@
 //! LSQ+ quantizers: `value = code * scale + offset`, or the exponential of that (spec, section 6;
 //! paper, section "Compression Framework").
 
+#[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-use byteorder::{ByteOrder, LittleEndian};
-
-use crate::chunk::ChunkType;
+use crate::container::Fields;
 use crate::error::DecodeError;
 use crate::math;
 
-/// Bytes of one entry of the `QNTZ` chunk.
-pub(crate) const ENTRY_LENGTH: usize = 12;
 /// Largest magnitude of a scale and of an offset.
 pub(crate) const MAX_PARAMETER: f32 = 4_294_967_296.0;
 
@@ -80,62 +77,39 @@ impl Quantizer {
         }
     }
 
-    /// Reads the payload of `QNTZ`: one entry per component (spec, section 5.3).
-    pub(crate) fn parse_all(payload: &[u8], components: usize) -> Result<Vec<Self>, DecodeError> {
-        if payload.len() != components * ENTRY_LENGTH {
-            return Err(malformed("the length is not 12 bytes per component"));
+    /// Reads an entry of the header (spec, section 6).
+    pub(crate) fn parse(fields: &mut Fields<'_>) -> Result<Self, DecodeError> {
+        let (kind, bits) = (fields.u8()?, fields.u8()?);
+        match kind {
+            0 if bits == 32 => return Ok(Self::Float),
+            0 => return Err(fields.malformed("a float that is not 32 bits deep")),
+            1 | 2 => {}
+            kind => return Err(fields.unsupported("quantizer", kind.into())),
         }
-        payload.chunks_exact(ENTRY_LENGTH).map(Self::parse).collect()
+        let uniform = UniformQuantizer { bits, scale: fields.f32()?, offset: fields.f32()? };
+        if !(1..=16).contains(&bits) {
+            return Err(fields.malformed("a bit depth that is not 1 to 16"));
+        }
+        if !(uniform.scale > 0.0 && uniform.scale <= MAX_PARAMETER) {
+            return Err(fields.malformed("a scale that is not positive and at most 2^32"));
+        }
+        if uniform.offset.is_nan() || uniform.offset.abs() > MAX_PARAMETER {
+            return Err(fields.malformed("an offset that is not within +-2^32"));
+        }
+        Ok(if kind == 1 { Self::Linear(uniform) } else { Self::Log(uniform) })
     }
 
-    fn parse(entry: &[u8]) -> Result<Self, DecodeError> {
-        if entry[2..4] != [0; 2] {
-            return Err(malformed("a reserved byte is not zero"));
-        }
-        let steps = UniformQuantizer {
-            bits: entry[1],
-            scale: LittleEndian::read_f32(&entry[4..]),
-            offset: LittleEndian::read_f32(&entry[8..]),
-        };
-        let quantizer = match entry[0] {
-            0 if steps.bits != 32 => return Err(malformed("a float that is not 32 bits deep")),
-            0 if steps.scale != 1.0 || steps.offset != 0.0 => {
-                return Err(malformed("a float whose scale and offset are not 1 and 0"));
-            }
-            0 => return Ok(Self::Float),
-            1 => Self::Linear(steps),
-            2 => Self::Log(steps),
-            kind => return Err(DecodeError::unsupported(ChunkType::QNTZ, "kind", kind.into())),
-        };
-        if !(1..=16).contains(&steps.bits) {
-            return Err(malformed("a bit depth that is not 1 to 16"));
-        }
-        if !(steps.scale > 0.0 && steps.scale <= MAX_PARAMETER) {
-            return Err(malformed("a scale that is not positive and at most 2^32"));
-        }
-        if steps.offset.is_nan() || steps.offset.abs() > MAX_PARAMETER {
-            return Err(malformed("an offset that is not within +-2^32"));
-        }
-        Ok(quantizer)
-    }
-
-    /// The entry of `QNTZ` for this quantizer.
+    /// Appends the entry of the header for this quantizer.
     #[cfg(feature = "encode")]
-    pub(crate) fn to_entry(self) -> [u8; ENTRY_LENGTH] {
-        let (kind, steps) = match self {
-            Self::Float => (0, UniformQuantizer { bits: 32, scale: 1.0, offset: 0.0 }),
-            Self::Linear(steps) => (1, steps),
-            Self::Log(steps) => (2, steps),
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+        let (kind, uniform) = match self {
+            Self::Float => (0, None),
+            Self::Linear(uniform) => (1, Some(uniform)),
+            Self::Log(uniform) => (2, Some(uniform)),
         };
-        let mut entry = [0; ENTRY_LENGTH];
-        entry[0] = kind;
-        entry[1] = steps.bits;
-        LittleEndian::write_f32(&mut entry[4..], steps.scale);
-        LittleEndian::write_f32(&mut entry[8..], steps.offset);
-        entry
+        out.extend([kind, self.bits()]);
+        if let Some(UniformQuantizer { scale, offset, .. }) = uniform {
+            out.extend([scale, offset].into_iter().flat_map(|number| number.to_le_bytes()));
+        }
     }
-}
-
-fn malformed(reason: &'static str) -> DecodeError {
-    DecodeError::malformed(ChunkType::QNTZ, reason)
 }

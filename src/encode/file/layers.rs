@@ -2,36 +2,48 @@
 
 use rayon::prelude::*;
 
-use crate::chunk::FRAMING;
+use crate::chunk::ChunkType;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
 use crate::coding::packed::{self, Quantizer};
-use crate::container::Header;
+use crate::container::{Header, varint};
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::gaussian::MAX_COMPONENTS;
 use crate::layers::bounds::LayerBounds;
 use crate::layers::plan;
 
-/// The payloads of the layers of a packed file, from codes in the order of the file.
+/// The layers of a packed file, from codes in the order of the file: the numbers of their Gaussians, and their bytes.
 pub(super) fn write_packed_layers(
     codes: &[[u32; MAX_COMPONENTS]],
     quantizers: &[Quantizer],
-) -> Vec<Vec<u8>> {
+) -> Vec<(usize, Vec<u8>)> {
     let mut rest = codes;
     let layer = |count| {
         let (layer, later) = rest.split_at(count);
         rest = later;
-        packed::write_layer(layer, quantizers)
+        (count, packed::write_layer(layer, quantizers))
     };
     plan::packed_layers(codes.len()).into_iter().map(layer).collect()
 }
 
+/// What a layer begins with: the number of its Gaussians, unless it is the last one (spec, section 5.4).
+pub(super) fn count_bytes(count: usize, is_last: bool) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if !is_last {
+        varint::write(count as u32, &mut bytes);
+    }
+    bytes
+}
+
 /// Bytes that the layers of `count` Gaussians take in a packed file, their framing included.
 pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
-    let layer = |count| {
-        FRAMING as u64 + packed::LAYER_PREFIX + packed::packed_length(quantizers, count as u32)
+    let layers = plan::packed_layers(count);
+    let last = layers.len().saturating_sub(1);
+    let layer = |(number, &count): (usize, &usize)| {
+        let codes = packed::packed_length(quantizers, count as u32) as usize;
+        ChunkType::LAYER.framed(count_bytes(count, number == last).len() + codes) as u64
     };
-    plan::packed_layers(count).into_iter().map(layer).sum()
+    layers.iter().enumerate().map(layer).sum()
 }
 
 /// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds
@@ -59,7 +71,7 @@ pub(super) fn bounds_payload(
     }
     let mut rest = codes;
     let layers_of_codes = layers.iter().map(|layer| {
-        let (codes, later) = rest.split_at(layer.levels.len());
+        let (codes, later) = rest.split_at(layer.count());
         rest = later;
         codes
     });

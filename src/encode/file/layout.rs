@@ -1,10 +1,11 @@
 //! The chunks of a file, around its layers (spec, sections 4 and 5).
 
 use super::layers;
-use crate::chunk::{ChunkType, FRAMING};
+use crate::chunk::{ChunkType, VERSION};
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
-use crate::coding::packed::PackedCodes;
-use crate::container::{ChunkWriter, Coding, Header, Metadata, VERSION};
+use crate::coding::packed::{PackedCodes, Quantizer};
+use crate::color::SampleDepth;
+use crate::container::{ChunkWriter, Coding, Dequantizer, Header, Metadata};
 use crate::encode::error::{OptionError, Result};
 use crate::encode::progress::Observer;
 use crate::encode::source::Source;
@@ -49,7 +50,10 @@ impl<'a> FileLayout<'a> {
             layers: 0,
             kernel,
             parameterization,
-            base_color: mean.map(|value| (value * 65535.0).round() as u16),
+            base_color: mean.map(|value| match source.depth() {
+                SampleDepth::Eight => (value * 255.0).round() as u16 * 257,
+                SampleDepth::Sixteen => (value * 65535.0).round() as u16,
+            }),
         };
         Self { header, metadata, texture: None }
     }
@@ -77,10 +81,11 @@ impl<'a> FileLayout<'a> {
     pub(crate) fn start(&self, gaussians: u32) -> Vec<u8> {
         let layers = u16::from(gaussians > 0);
         let header = Header { gaussians, layers, ..self.header.clone() };
+        let quantizers = vec![Quantizer::Float; header.components()];
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::GHDR, &header.to_payload());
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(&Dequantizer::Packed(quantizers))]);
         for (kind, payload) in self.metadata.chunks() {
-            file.chunk(kind, &payload);
+            file.chunk(kind, &[&payload]);
         }
         file.into_bytes()
     }
@@ -88,10 +93,10 @@ impl<'a> FileLayout<'a> {
     /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
     pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
         let PackedCodes { quantizers, codes } = self.ordered(packed);
-        let quantization: Vec<u8> = quantizers.iter().flat_map(|q| q.to_entry()).collect();
         let layers = layers::write_packed_layers(&codes, &quantizers);
+        let layers = layers.iter().map(|(count, bytes)| (*count, &bytes[..]));
         let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
-        self.write(&header, &quantization, None, layers.iter().map(Vec::as_slice))
+        self.write(&header, &Dequantizer::Packed(quantizers), None, layers)
     }
 
     /// The layers that codes make in a file.
@@ -120,40 +125,41 @@ impl<'a> FileLayout<'a> {
         };
         let coder = LayerCoder::new(quantization, &header);
         let bounds = layers::bounds_payload(&coder, codes, layers, &header, observer)?;
-        let payloads = layers.iter().map(|layer| &layer.payload[..]);
-        Ok(self.write(&header, &quantization.to_payload(), bounds, payloads))
+        let layers = layers.iter().map(|layer| (layer.count(), &layer.bytes[..]));
+        Ok(self.write(&header, &Dequantizer::Entropy(quantization.clone()), bounds, layers))
     }
 
-    /// A file of either coding, from the payloads of its chunks.
+    /// A file of either coding, from its layers: the numbers of their Gaussians, and their bytes.
     fn write<'b>(
         &self,
         header: &Header,
-        quantization: &[u8],
+        dequantizer: &Dequantizer,
         bounds: Option<Vec<u8>>,
-        layers: impl ExactSizeIterator<Item = &'b [u8]>,
+        layers: impl ExactSizeIterator<Item = (usize, &'b [u8])>,
     ) -> Vec<u8> {
         let header = Header { layers: layers.len() as u16, ..header.clone() };
+        let last = layers.len().saturating_sub(1);
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::GHDR, &header.to_payload());
-        file.chunk(ChunkType::QNTZ, quantization);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(dequantizer)]);
         for (kind, payload) in self.metadata.chunks() {
-            file.chunk(kind, &payload);
-        }
-        if let Some(texture) = self.texture {
-            file.chunk(ChunkType::TXTR, texture);
+            file.chunk(kind, &[&payload]);
         }
         if let Some(bounds) = bounds {
-            file.chunk(ChunkType::BNDS, &bounds);
+            file.chunk(ChunkType::BNDS, &[&bounds]);
         }
-        for layer in layers {
-            file.chunk(ChunkType::GAUS, layer);
+        for (number, (count, bytes)) in layers.enumerate() {
+            // What has few Gaussians yet looks better without noise.
+            if let Some(texture) = self.texture.filter(|_| number == last) {
+                file.chunk(ChunkType::TXTR, &[texture]);
+            }
+            file.chunk(ChunkType::LAYER, &[&layers::count_bytes(count, number == last), bytes]);
         }
         file.finish()
     }
 
     /// Size in bytes of the metadata.
     pub(crate) fn metadata_length(&self) -> usize {
-        self.metadata.chunks().map(|(_, payload)| payload.len() + FRAMING).sum()
+        self.metadata.chunks().map(|(kind, payload)| kind.framed(payload.len())).sum()
     }
 
     /// Refuses a target of `bytes` that a file without Gaussians, of `least`, exceeds by its metadata

@@ -112,7 +112,7 @@ impl<'a> CodeOptimizer<'a> {
         let CodedLayers { quantization, codes, layers } = coded;
         let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
         let coder = LayerCoder::new(&quantization, self.layout.header());
-        let bytes: usize = layers.iter().map(|layer| layer.payload.len()).sum();
+        let bytes: usize = layers.iter().map(|layer| layer.bytes.len()).sum();
         let parts = codes.chunks(PART).zip(contexts.chunks(PART));
         let sums = observer.map(parts, |(codes, contexts)| {
             let (mut bits, mut tiles) = (0.0, 0.0);

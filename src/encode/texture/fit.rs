@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::strengths::{Strength, strengths};
-use crate::chunk::FRAMING;
+use crate::chunk::ChunkType;
 use crate::color::ColorModel;
 use crate::container::Metadata;
 use crate::encode::aim::Aim;
@@ -109,7 +109,7 @@ fn coded(
     if coded.codes.is_empty() {
         return Ok(None);
     }
-    let color_step = rate_model::color_step(step) as f32;
+    let color_step = coded.quantization.color[0];
     let payload = Texture::to_payload(&mut coded.codes, color_step, picture.header());
     let texture =
         Texture::parse(&payload, picture.header(), |_| Ok(())).expect("it was just written");
@@ -117,7 +117,7 @@ fn coded(
     let without = Picture::new(layout.header(), &[], &limits, 0);
     let with = Picture::new(layout.header(), texture.gaussians(), &limits, 0);
     let gain = squared_error(&without, map, observer)? - squared_error(&with, map, observer)?;
-    let bits = ((payload.len() + FRAMING) * 8) as f64;
+    let bits = (ChunkType::TXTR.framed(payload.len()) * 8) as f64;
     let price = f64::from(rate_model::lambda(&coded.quantization));
     Ok((gain > price * bits).then_some(payload))
 }

@@ -267,11 +267,10 @@ mod tests {
             let mut color = [0.0; 4];
             color[octave] = amplitude_sum(amplitude);
             let gaussian = Gaussian { center: [32.0; 2], cholesky: [2000.0, 0.0, 2000.0], color };
-            let step = 0.01;
-            let quantization = rate_model::quantization(f64::from(step).log2(), &[1.0; 3]);
+            let quantization = rate_model::quantization(0.01_f64.log2(), &[1.0; 3]);
             let grid = CenterGrid::new(65, 65);
             let mut codes = [quantization.code(&gaussian, 7, &grid, ColorModel::Rgb)];
-            let payload = Texture::to_payload(&mut codes, step, layout.header());
+            let payload = Texture::to_payload(&mut codes, quantization.color[0], layout.header());
             let texture =
                 Texture::parse(&payload, layout.header(), |_| Ok(())).expect("it was just written");
             let mut samples = vec![0; SIDE * SIDE];
