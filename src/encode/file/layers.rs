@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use crate::chunk::ChunkType;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
+use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{self, Quantizer};
-use crate::container::{Header, varint};
+use crate::container::Header;
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::gaussian::MAX_COMPONENTS;
@@ -26,22 +27,14 @@ pub(super) fn write_packed_layers(
     plan::packed_layers(codes.len()).into_iter().map(layer).collect()
 }
 
-/// What a layer begins with: the number of its Gaussians, unless it is the last one (spec, section 5.4).
-pub(super) fn count_bytes(count: usize, is_last: bool) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if !is_last {
-        varint::write(count as u32, &mut bytes);
-    }
-    bytes
-}
-
 /// Bytes that the layers of `count` Gaussians take in a packed file, their framing included.
 pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
     let layers = plan::packed_layers(count);
     let last = layers.len().saturating_sub(1);
     let layer = |(number, &count): (usize, &usize)| {
         let codes = packed::packed_length(quantizers, count as u32) as usize;
-        ChunkType::LAYER.framed(count_bytes(count, number == last).len() + codes) as u64
+        let count = LayerCount::written(count as u32, number == last);
+        ChunkType::LAYER.framed(count.len() + codes) as u64
     };
     layers.iter().enumerate().map(layer).sum()
 }

@@ -3,7 +3,8 @@
 use super::layers;
 use crate::chunk::{ChunkType, VERSION};
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
-use crate::coding::packed::{PackedCodes, Quantizer};
+use crate::coding::layer_count::LayerCount;
+use crate::coding::packed::PackedCodes;
 use crate::color::SampleDepth;
 use crate::container::{ChunkWriter, Coding, Dequantizer, Header, Metadata};
 use crate::encode::error::{OptionError, Result};
@@ -81,9 +82,8 @@ impl<'a> FileLayout<'a> {
     pub(crate) fn start(&self, gaussians: u32) -> Vec<u8> {
         let layers = u16::from(gaussians > 0);
         let header = Header { gaussians, layers, ..self.header.clone() };
-        let quantizers = vec![Quantizer::Float; header.components()];
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(&Dequantizer::Packed(quantizers))]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(None)]);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &[&payload]);
         }
@@ -140,7 +140,7 @@ impl<'a> FileLayout<'a> {
         let header = Header { layers: layers.len() as u16, ..header.clone() };
         let last = layers.len().saturating_sub(1);
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(dequantizer)]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(Some(dequantizer))]);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &[&payload]);
         }
@@ -152,7 +152,8 @@ impl<'a> FileLayout<'a> {
             if let Some(texture) = self.texture.filter(|_| number == last) {
                 file.chunk(ChunkType::TXTR, &[texture]);
             }
-            file.chunk(ChunkType::LAYER, &[&layers::count_bytes(count, number == last), bytes]);
+            let count = LayerCount::written(count as u32, number == last);
+            file.chunk(ChunkType::LAYER, &[&count, bytes]);
         }
         file.finish()
     }
