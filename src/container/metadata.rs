@@ -96,6 +96,16 @@ impl Metadata {
         Ok(())
     }
 
+    /// Whether a chunk of metadata says how the picture is shown: its colours, or that it is turned.
+    #[cfg(feature = "encode")]
+    pub(crate) fn is_of_display(chunk: ChunkType, payload: &[u8]) -> bool {
+        match chunk {
+            ChunkType::ICCP => true,
+            ChunkType::EXIF => Self::orientation_of(payload) != Orientation::NoTransforms,
+            _ => false,
+        }
+    }
+
     /// Whether a chunk is metadata, which [`Metadata::insert`] takes.
     pub(crate) fn includes(chunk: ChunkType) -> bool {
         matches!(chunk, ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP | ChunkType::TEXT)

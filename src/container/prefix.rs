@@ -11,7 +11,6 @@ use super::writer::ChunkWriter;
 use crate::chunk::{ChunkType, SIGNATURE};
 use crate::coding::layer_count::LayerCount;
 use crate::error::DecodeError;
-use crate::orientation::Orientation;
 
 /// The file of the first layers of another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,11 +119,10 @@ impl<'a> Prefixes<'a> {
                 let gaussians = count.ok_or_else(too_short)?;
                 self.layers.push(Layer { gaussians, bytes, end, gaussians_before, bytes_before });
             }
-            ChunkType::ICCP | ChunkType::EXIF if self.kept.iter().any(|kept| kept.1 == chunk) => {
-                return Err(DecodeError::malformed(chunk, "appears twice"));
-            }
-            ChunkType::ICCP => self.kept.push((self.layers.len(), chunk, payload)),
-            ChunkType::EXIF if Metadata::orientation_of(payload) != Orientation::NoTransforms => {
+            _ if Metadata::is_of_display(chunk, payload) => {
+                if self.kept.iter().any(|(_, kept, _)| *kept == chunk) {
+                    return Err(DecodeError::malformed(chunk, "appears twice"));
+                }
                 self.kept.push((self.layers.len(), chunk, payload));
             }
             _ if !chunk.is_critical() => {}
