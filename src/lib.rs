@@ -123,9 +123,9 @@ pub use chunk::ChunkType;
 pub use coding::entropy::{AttributeBits, QuantizationSteps};
 pub use coding::packed::{Quantizer, UniformQuantizer};
 pub use color::{ColorModel, SampleDepth};
-#[cfg(feature = "encode")]
-pub use container::MetadataError;
 pub use container::{Coding, Header, Metadata, Text};
+#[cfg(feature = "encode")]
+pub use container::{MetadataError, Prefix, Prefixes};
 #[cfg(feature = "std")]
 pub use decode::Decoder;
 pub use decode::{ChunkStatistics, Decoded, Samples, StreamDecoder, decode};

@@ -1,6 +1,9 @@
 //! How many Gaussians a layer has: each begins with its number but the last, which has the rest of those that the
 //! header declares (spec, section 5.4).
 
+#[cfg(feature = "encode")]
+use alloc::vec::Vec;
+
 use crate::chunk::ChunkType;
 use crate::container::varint;
 use crate::error::DecodeError;
@@ -22,6 +25,16 @@ impl LayerCount {
             0 => Self::Rest(left),
             _ => Self::AtMost(left.saturating_sub(later as u32)),
         }
+    }
+
+    /// The bytes of the number with which a layer begins.
+    #[cfg(feature = "encode")]
+    pub(crate) fn written(count: u32, is_last: bool) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if !is_last {
+            varint::write(count, &mut bytes);
+        }
+        bytes
     }
 
     /// Takes the bytes of the number from `input`, if there are any. `None` until all of them have arrived.

@@ -1,6 +1,7 @@
 //! The header, the chunk `H`: all that a decoder must know before it allocates memory, and what turns the codes
 //! of Gaussians into values (spec, section 5.1).
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use super::fields::Fields;
@@ -146,20 +147,24 @@ impl Header {
         Ok((header, dequantizer))
     }
 
-    /// The payload of the header. The dequantizer is that of its coding, and is left out if there are no Gaussians.
+    /// The payload of the header. The dequantizer is that of its coding; it is needed only if there are Gaussians.
     #[cfg(feature = "encode")]
-    pub(crate) fn to_payload(&self, dequantizer: &Dequantizer) -> Vec<u8> {
-        let form = match dequantizer {
-            Dequantizer::Packed(_) => self.parameterization.code(),
-            Dequantizer::Entropy(quantization) => u8::from(!quantization.has_usual_geometry()),
+    pub(crate) fn to_payload(&self, dequantizer: Option<&Dequantizer>) -> Vec<u8> {
+        let dequantizer = dequantizer.filter(|_| self.gaussians > 0);
+        let form = match (self.coding, dequantizer) {
+            (Coding::Packed, _) => self.parameterization.code(),
+            (Coding::Entropy, Some(Dequantizer::Entropy(steps))) if !steps.has_usual_geometry() => {
+                1
+            }
+            (Coding::Entropy, _) => 0,
         };
-        let mut format = self.color.code() | form << FORM_SHIFT;
         let flags = [
             (self.depth == SampleDepth::Sixteen, SIXTEEN_BITS),
-            (matches!(dequantizer, Dequantizer::Entropy(_)), ENTROPY),
+            (self.coding == Coding::Entropy, ENTROPY),
             (self.kernel == Kernel::Quartic, QUARTIC),
         ];
-        format |= flags.iter().filter(|(holds, _)| *holds).map(|(_, flag)| flag).sum::<u8>();
+        let flags = flags.iter().filter(|(holds, _)| *holds).map(|(_, flag)| flag).sum::<u8>();
+        let format = self.color.code() | form << FORM_SHIFT | flags;
         let mut payload = vec![format];
         for number in [self.width, self.height, self.gaussians] {
             varint::write(number, &mut payload);
@@ -177,11 +182,11 @@ impl Header {
             payload.extend(cutoff.to_le_bytes());
         }
         match dequantizer {
-            _ if self.gaussians == 0 => {}
-            Dequantizer::Packed(quantizers) => {
+            None => {}
+            Some(Dequantizer::Packed(quantizers)) => {
                 quantizers.iter().for_each(|quantizer| quantizer.write(&mut payload));
             }
-            Dequantizer::Entropy(quantization) => quantization.write(&mut payload),
+            Some(Dequantizer::Entropy(quantization)) => quantization.write(&mut payload),
         }
         payload
     }

@@ -62,7 +62,12 @@ impl Metadata {
     /// that Exif knows. The decoder's samples are not turned.
     #[must_use]
     pub fn orientation(&self) -> Orientation {
-        self.exif.as_deref().and_then(exif::orientation).unwrap_or_default()
+        self.exif.as_deref().map(Self::orientation_of).unwrap_or_default()
+    }
+
+    /// What Exif data say of the orientation.
+    pub(crate) fn orientation_of(exif: &[u8]) -> Orientation {
+        exif::orientation(exif).unwrap_or_default()
     }
 
     /// Makes Exif say that the picture is upright. One that says nothing stays as it is.
@@ -89,6 +94,16 @@ impl Metadata {
         }
         *slot = Some(payload);
         Ok(())
+    }
+
+    /// Whether a chunk of metadata says how the picture is shown: its colours, or that it is turned.
+    #[cfg(feature = "encode")]
+    pub(crate) fn is_of_display(chunk: ChunkType, payload: &[u8]) -> bool {
+        match chunk {
+            ChunkType::ICCP => true,
+            ChunkType::EXIF => Self::orientation_of(payload) != Orientation::NoTransforms,
+            _ => false,
+        }
     }
 
     /// Whether a chunk is metadata, which [`Metadata::insert`] takes.

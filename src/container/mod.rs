@@ -5,6 +5,8 @@ mod fields;
 mod header;
 mod metadata;
 mod parser;
+#[cfg(feature = "encode")]
+mod prefix;
 pub(crate) mod varint;
 #[cfg(feature = "encode")]
 mod writer;
@@ -20,5 +22,7 @@ pub use header::{Coding, Header};
 pub use metadata::MetadataError;
 pub use metadata::{Metadata, Text};
 pub(crate) use parser::{Event, Parser};
+#[cfg(feature = "encode")]
+pub use prefix::{Prefix, Prefixes};
 #[cfg(feature = "encode")]
 pub(crate) use writer::ChunkWriter;

@@ -253,8 +253,8 @@ impl ChunkDecoder {
                 let payload = core::mem::take(payload);
                 self.metadata.insert(chunk, payload)?;
                 // What has been shown is not turned afterwards.
-                let turns = self.metadata.orientation() != Orientation::NoTransforms;
-                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turns {
+                let turned = self.metadata.orientation() != Orientation::NoTransforms;
+                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turned {
                     let reason = "an orientation after the first layer";
                     return Err(DecodeError::malformed(chunk, reason));
                 }

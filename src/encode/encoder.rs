@@ -83,6 +83,7 @@ pub struct Encoder {
     effort: u8,
     precision: Precision,
     texture: u8,
+    first_layer: Option<u32>,
     seed: u64,
     threads: Threads,
     limits: Limits,
@@ -107,6 +108,7 @@ impl Encoder {
             effort: 4,
             precision: Precision::Entropy,
             texture: USUAL_STRENGTH,
+            first_layer: None,
             seed: 0,
             threads: Threads::Pool,
             limits: Limits::default(),
@@ -149,6 +151,15 @@ impl Encoder {
     /// one, and only where the source has such detail.
     pub fn with_texture(mut self, strength: u8) -> Self {
         self.texture = strength;
+        self
+    }
+
+    /// Most bytes of the file that the first layer makes ([`Prefixes`](crate::Prefixes)): a placeholder, with which the
+    /// whole file begins. ICC profile and an orientation in Exif count as well; all other metadata then stand
+    /// after the first layer. Default `None`: the first layer has about a tenth of the file. Files of
+    /// [`Precision::Packed`] and [`Precision::Float`] have layers of the usual size in any case.
+    pub fn with_first_layer(mut self, bytes: Option<u32>) -> Self {
+        self.first_layer = bytes;
         self
     }
 
@@ -234,6 +245,7 @@ impl Encoder {
                 tune: self.tune,
                 precision: self.precision,
                 texture: self.texture,
+                first_layer: self.first_layer,
                 seed: self.seed,
                 metadata: &self.metadata,
                 training,

@@ -102,6 +102,17 @@ pub enum OptionError {
         /// Size in bytes of the metadata in it.
         metadata: u64,
     },
+    /// The first layer cannot be so small.
+    #[error(
+        "a first layer that makes a file of {bytes} bytes; that of this picture, with its ICC profile and \
+         orientation, takes at least {least}"
+    )]
+    FirstLayer {
+        /// Most bytes of the file that was asked for.
+        bytes: u32,
+        /// The least that can be asked for.
+        least: u32,
+    },
     /// The metadata cannot be stored.
     #[error(transparent)]
     Metadata(#[from] MetadataError),

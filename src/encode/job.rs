@@ -17,6 +17,8 @@ pub(crate) struct Job<'a> {
     pub(crate) precision: Precision,
     /// The strength of the texture, 0 to 100.
     pub(crate) texture: u8,
+    /// Most bytes of the file that the first layer makes; `None` for one of the usual size.
+    pub(crate) first_layer: Option<u32>,
     pub(crate) seed: u64,
     pub(crate) metadata: &'a Metadata,
     pub(crate) training: &'a Training,

@@ -140,7 +140,8 @@ fn encode_for_target(
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
     let tiled = TiledSource::new(source, job.tune, observer)?;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata);
+    let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata)
+        .with_first_layer(job.first_layer);
 
     let asked = job.aim;
     let (aim, budget) = within_reach(job, &layout, &tiled, observer)?;

@@ -54,7 +54,9 @@ pub(crate) struct TextureCost {
 pub(crate) fn check_limits(job: &Job<'_>) -> Result<()> {
     let Job { source, aim, training, metadata, limits, .. } = *job;
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, [0.0; 4], kernel, parameterization, metadata);
+    let layout = FileLayout::new(source, [0.0; 4], kernel, parameterization, metadata)
+        .with_first_layer(job.first_layer);
+    layout.check_first_layer()?;
     let gaussians = if let Aim::Count(count) = aim { count } else { 0 };
     let mut stream = StreamDecoder::new().with_limits(limits.clone());
     stream.feed(&layout.start(gaussians)).map_err(refusal)?;

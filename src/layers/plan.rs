@@ -44,12 +44,12 @@ mod shares {
     /// An entropy-coded file with fewer Gaussians than this has no such layers.
     const LEAST_ENTROPY: usize = 250;
     /// A file with fewer Gaussians than this need not be decoded on several threads.
-    const LEAST_PARALLEL: usize = 2048;
+    const LEAST_PARALLEL: usize = 4096;
     /// Most of a file's Gaussians in one layer, as a fraction: two threads then take the same time.
     /// It is over one half because Gaussians of the first layers take more time each.
     const LARGEST: f64 = 0.52;
-    /// Most Gaussians in a layer, so that many threads can be used.
-    const MOST_IN_LAYER: usize = 16_384;
+    /// Most Gaussians in a layer, so that many threads can be used, and its number takes two bytes.
+    const MOST_IN_LAYER: usize = 16_383;
     /// A file with more Gaussians than this is a large picture, which has small layers, so that a
     /// region needs few of them.
     pub(crate) const MOST_WHOLE: usize = 32_768;

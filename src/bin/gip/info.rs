@@ -4,7 +4,8 @@ use core::fmt::{self, Display};
 
 use anyhow::{Context, Result, anyhow};
 use image_gip::{
-    ChunkType, Coding, ColorModel, Header, Kernel, Parameterization, Quantizer, StreamDecoder,
+    ChunkType, Coding, ColorModel, Header, Kernel, Parameterization, Prefix, Prefixes, Quantizer,
+    StreamDecoder,
 };
 use serde::Serialize;
 
@@ -12,13 +13,17 @@ use crate::args;
 use crate::encode::bits_per_pixel;
 use crate::files;
 
+/// How many prefixes the text shows.
+const SHOWN_PREFIXES: usize = 3;
+
 pub(crate) fn run(args: &args::Info) -> Result<()> {
     let context = || files::input_name(&args.file);
     let bytes = files::read(&args.file)?;
     let mut stream = StreamDecoder::new().with_limits(args.limits.limits()).with_statistics();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
-    let info = FileInfo::new(header, &stream, bytes.len());
+    let prefixes = Prefixes::new(&bytes).with_context(context)?;
+    let info = FileInfo::new(header, &stream, &prefixes, bytes.len());
     let text = if args.json { serde_json::to_string(&info)? } else { info.to_string() };
     files::print(text.trim_end(), None)
 }
@@ -47,6 +52,8 @@ struct FileInfo {
     base_color: Vec<u16>,
     chunks: Vec<Chunk>,
     bits_per_gaussian: BitsPerGaussian,
+    /// The files that the first layers make.
+    prefixes: Vec<PrefixInfo>,
     /// Of the packed coding; empty with the entropy coding.
     components: Vec<Component>,
     /// Of the entropy coding; `None` with the packed coding.
@@ -62,6 +69,15 @@ struct Texture {
     gaussians: usize,
     bytes: u64,
     bits_per_gaussian: f64,
+}
+
+/// What the first layers are: so many Gaussians, which end at this byte of the file, and what `gip prefix` writes.
+#[derive(Debug, Serialize)]
+struct PrefixInfo {
+    layers: u16,
+    gaussians: u32,
+    end: usize,
+    bytes: usize,
 }
 
 /// The chunks of one type. Their bytes include length, type and CRC.
@@ -129,7 +145,7 @@ struct TextSize {
 }
 
 impl FileInfo {
-    fn new(header: &Header, stream: &StreamDecoder, bytes: usize) -> Self {
+    fn new(header: &Header, stream: &StreamDecoder, prefixes: &Prefixes<'_>, bytes: usize) -> Self {
         let channels = header.color.channels();
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
@@ -197,6 +213,15 @@ impl FileInfo {
                 .map(|c| Chunk { kind: c.kind.to_string(), count: c.count, bytes: c.bytes })
                 .collect(),
             bits_per_gaussian,
+            prefixes: prefixes
+                .iter()
+                .map(|Prefix { layers, gaussians, end, bytes, .. }| PrefixInfo {
+                    layers,
+                    gaussians,
+                    end,
+                    bytes,
+                })
+                .collect(),
             components,
             quantization_steps: stream.quantization_steps().map(StepSizes::from),
             texture,
@@ -256,7 +281,7 @@ impl Display for FileInfo {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { width, height, color, depth, kernel, cutoff, .. } = self;
         let bits = &self.bits_per_gaussian;
-        let mut row = |name: &str, value: &dyn Display| writeln!(f, "{name:<18}{value}");
+        let mut row = |name: &str, value: &dyn Display| writeln!(f, "{name:<20}{value}");
         row("size", &format_args!("{width}x{height}, {color}, {depth} bits per sample"))?;
         if self.orientation != 1 {
             let Self { orientation, upright_width: width, upright_height: height, .. } = self;
@@ -308,6 +333,13 @@ impl Display for FileInfo {
                     "{gaussians} Gaussians, {bytes} bytes, {bits_per_gaussian:.2} bits per Gaussian"
                 ),
             )?;
+        }
+        // Of many layers, those of a picture of its parts are of no interest.
+        for PrefixInfo { layers, gaussians, bytes, .. } in self.prefixes.iter().take(SHOWN_PREFIXES)
+        {
+            let plural = if *layers == 1 { "" } else { "s" };
+            let name = format!("prefix of {layers} layer{plural}");
+            row(&name, &format_args!("{gaussians} Gaussians, {bytes} bytes"))?;
         }
         for Chunk { kind, count, bytes } in &self.chunks {
             row(&format!("chunk {kind}"), &format_args!("{count}, {bytes} bytes"))?;

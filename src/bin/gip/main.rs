@@ -13,6 +13,7 @@ mod files;
 mod info;
 mod limits;
 mod picture;
+mod prefix;
 mod source;
 
 use std::process::ExitCode;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::Batch(args) => batch::run(&args),
         Command::Info(args) => info::run(&args).map(success),
         Command::Compare(args) => compare::run(&args).map(success),
+        Command::Prefix(args) => prefix::run(&args).map(success),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("error: {}", errors::one_line(&error));

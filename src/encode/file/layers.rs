@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use crate::chunk::ChunkType;
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder};
+use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{self, Quantizer};
-use crate::container::{Header, varint};
+use crate::container::Header;
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::gaussian::MAX_COMPONENTS;
@@ -26,34 +27,28 @@ pub(super) fn write_packed_layers(
     plan::packed_layers(codes.len()).into_iter().map(layer).collect()
 }
 
-/// What a layer begins with: the number of its Gaussians, unless it is the last one (spec, section 5.4).
-pub(super) fn count_bytes(count: usize, is_last: bool) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if !is_last {
-        varint::write(count as u32, &mut bytes);
-    }
-    bytes
-}
-
 /// Bytes that the layers of `count` Gaussians take in a packed file, their framing included.
 pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
     let layers = plan::packed_layers(count);
     let last = layers.len().saturating_sub(1);
     let layer = |(number, &count): (usize, &usize)| {
         let codes = packed::packed_length(quantizers, count as u32) as usize;
-        ChunkType::LAYER.framed(count_bytes(count, number == last).len() + codes) as u64
+        let count = LayerCount::written(count as u32, number == last);
+        ChunkType::LAYER.framed(count.len() + codes) as u64
     };
     layers.iter().enumerate().map(layer).sum()
 }
 
 /// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds
-/// their centres to their position intervals, as the decoder reads them.
+/// their centres to their position intervals, as the decoder reads them. The first layer has as many
+/// Gaussians as there is `room` for, in bytes; without that, its usual share.
 pub(super) fn write_entropy_layers(
     coder: &LayerCoder<'_>,
     codes: &mut [Code],
+    room: Option<usize>,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<EncodedLayer>> {
-    let layers = divide(coder, codes, observer)?;
+    let layers = divide(coder, codes, room, observer)?;
     observer.map(layers.into_iter(), |codes| coder.write(codes))
 }
 
@@ -90,6 +85,7 @@ pub(super) fn bounds_payload(
 fn divide<'a>(
     coder: &LayerCoder<'_>,
     codes: &'a mut [Code],
+    room: Option<usize>,
     observer: &mut Observer<'_>,
 ) -> Result<Vec<&'a mut [Code]>> {
     let count = codes.len();
@@ -97,16 +93,44 @@ fn divide<'a>(
     observer.poll()?;
     codes.par_sort_by_key(|code| core::cmp::Reverse(code.energy()));
     observer.poll()?;
+    let first = room.map_or(0, |room| count_within(coder, codes, room));
+    let (first, mut rest) = codes.split_at_mut(first);
     let mut parts = Vec::new();
-    let mut rest = codes;
-    for first in plan::first_entropy_layers(count) {
-        let (part, later) = rest.split_at_mut(first);
-        parts.push(part);
-        rest = later;
+    let mut shared = 0;
+    for share in plan::first_entropy_layers(count) {
+        // The Gaussians of the first layer belong to the usual ones.
+        shared += share;
+        let before = first.len() + parts.iter().map(|part: &&mut [Code]| part.len()).sum::<usize>();
+        if first.is_empty() || shared > 2 * before {
+            let (part, later) = rest.split_at_mut(shared - before);
+            parts.push(part);
+            rest = later;
+        }
     }
     parts.push(rest);
-    parts.retain(|part| !part.is_empty());
-    divide_by_position(coder, parts, most, observer)
+    let mut layers = divide_by_position(coder, parts, most, observer)?;
+    layers.insert(0, first);
+    layers.retain(|layer| !layer.is_empty());
+    Ok(layers)
+}
+
+/// How many of the first codes take at most so many bytes as a layer.
+fn count_within(coder: &LayerCoder<'_>, codes: &[Code], room: usize) -> usize {
+    let fits = |count: usize| {
+        codes.get(..count).is_some_and(|codes| coder.write(&mut codes.to_vec()).bytes.len() <= room)
+    };
+    let mut step = 1;
+    while fits(step) {
+        step *= 2;
+    }
+    let mut count = 0;
+    while step > 0 {
+        if fits(count + step) {
+            count += step;
+        }
+        step /= 2;
+    }
+    count
 }
 
 /// Divides each of the parts by position into layers of `most` codes; the last layer of a part may have
@@ -153,7 +177,7 @@ mod tests {
             (249, 249, 1),
             (2047, 1700, 3),
             (6000, 3120, 4),
-            (32_000, 16_384, 4),
+            (32_000, 16_383, 4),
             (70_000, 320, 220),
         ] {
             let mut random = fastrand::Rng::with_seed(count as u64);
@@ -163,7 +187,7 @@ mod tests {
                 ..Code::default()
             };
             let mut codes: Vec<Code> = (0..count).map(|_| code()).collect();
-            let layers = unobserved(|observer| divide(&coder, &mut codes, observer));
+            let layers = unobserved(|observer| divide(&coder, &mut codes, None, observer));
             let sizes: Vec<usize> = layers.iter().map(|layer| layer.len()).collect();
             assert_eq!(sizes.iter().sum::<usize>(), count);
             assert_eq!(sizes.len(), number, "{sizes:?}");

@@ -1,9 +1,10 @@
 //! The chunks of a file, around its layers (spec, sections 4 and 5).
 
 use super::layers;
-use crate::chunk::{ChunkType, VERSION};
-use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes};
-use crate::coding::packed::{PackedCodes, Quantizer};
+use crate::chunk::{ChunkType, SIGNATURE, VERSION};
+use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes, steps};
+use crate::coding::layer_count::LayerCount;
+use crate::coding::packed::PackedCodes;
 use crate::color::SampleDepth;
 use crate::container::{ChunkWriter, Coding, Dequantizer, Header, Metadata};
 use crate::encode::error::{OptionError, Result};
@@ -11,6 +12,11 @@ use crate::encode::progress::Observer;
 use crate::encode::source::Source;
 use crate::gaussian::{Gaussian, MAX_COMPONENTS, Parameterization};
 use crate::kernel::Kernel;
+
+/// Most bytes of a Gaussian that has a layer of its own.
+const BYTES_OF_GAUSSIAN: usize = 32;
+/// How many more bytes numbers of Gaussians and lengths may take than the least.
+const BYTES_OF_NUMBERS: usize = 4;
 
 /// Codes in the order of their file, with centres as the decoder reads them, and the layers that they
 /// make.
@@ -28,6 +34,8 @@ pub(crate) struct FileLayout<'a> {
     metadata: &'a Metadata,
     /// The payload of `tXTR`.
     texture: Option<&'a [u8]>,
+    /// Most bytes of the file that the first layer makes; `None` for one with its usual share.
+    first_layer: Option<u32>,
 }
 
 impl<'a> FileLayout<'a> {
@@ -55,7 +63,12 @@ impl<'a> FileLayout<'a> {
                 SampleDepth::Sixteen => (value * 65535.0).round() as u16,
             }),
         };
-        Self { header, metadata, texture: None }
+        Self { header, metadata, texture: None, first_layer: None }
+    }
+
+    /// The same with a first layer that makes a file of at most so many bytes ([`Prefixes`](crate::Prefixes)).
+    pub(crate) fn with_first_layer(self, bytes: Option<u32>) -> Self {
+        Self { first_layer: bytes, ..self }
     }
 
     /// The same with a texture, unless the payload is `None`.
@@ -63,7 +76,8 @@ impl<'a> FileLayout<'a> {
     where
         'a: 'b,
     {
-        FileLayout { header: self.header.clone(), metadata: self.metadata, texture }
+        let first_layer = self.first_layer;
+        FileLayout { header: self.header.clone(), metadata: self.metadata, texture, first_layer }
     }
 
     /// The header. Its coding and its numbers of Gaussians and layers are those of an empty packed
@@ -81,9 +95,8 @@ impl<'a> FileLayout<'a> {
     pub(crate) fn start(&self, gaussians: u32) -> Vec<u8> {
         let layers = u16::from(gaussians > 0);
         let header = Header { gaussians, layers, ..self.header.clone() };
-        let quantizers = vec![Quantizer::Float; header.components()];
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(&Dequantizer::Packed(quantizers))]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(None)]);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &[&payload]);
         }
@@ -106,7 +119,9 @@ impl<'a> FileLayout<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers> {
         let coder = LayerCoder::new(&quantization, &self.header);
-        let layers = layers::write_entropy_layers(&coder, &mut codes, observer)?;
+        let room =
+            self.first_layer.map(|bytes| (bytes as usize).saturating_sub(self.least_prefix()));
+        let layers = layers::write_entropy_layers(&coder, &mut codes, room, observer)?;
         Ok(CodedLayers { quantization, codes, layers })
     }
 
@@ -129,6 +144,34 @@ impl<'a> FileLayout<'a> {
         Ok(self.write(&header, &Dequantizer::Entropy(quantization.clone()), bounds, layers))
     }
 
+    /// Bytes of a file of one layer, and of what says how the picture is shown, less those of the coded Gaussians.
+    fn least_prefix(&self) -> usize {
+        let colors = vec![steps::rounded(1.0); self.header.color.channels()];
+        let quantization = Quantization::new(steps::USUAL_GEOMETRY, colors);
+        let header =
+            Header { coding: Coding::Entropy, gaussians: 1, layers: 1, ..self.header.clone() };
+        let header = header.to_payload(Some(&Dequantizer::Entropy(quantization)));
+        let shown = self
+            .metadata
+            .chunks()
+            .filter(|(kind, payload)| Metadata::is_of_display(*kind, payload));
+        SIGNATURE.len()
+            + ChunkType::HEADER.framed(header.len())
+            + shown.map(|(kind, payload)| kind.framed(payload.len())).sum::<usize>()
+            + ChunkType::LAYER.framed(0)
+            + ChunkType::END.framed(0)
+            + BYTES_OF_NUMBERS
+    }
+
+    /// Refuses a first layer that has no room for a Gaussian.
+    pub(crate) fn check_first_layer(&self) -> Result<(), OptionError> {
+        let least = (self.least_prefix() + BYTES_OF_GAUSSIAN) as u32;
+        match self.first_layer {
+            Some(bytes) if bytes < least => Err(OptionError::FirstLayer { bytes, least }),
+            _ => Ok(()),
+        }
+    }
+
     /// A file of either coding, from its layers: the numbers of their Gaussians, and their bytes.
     fn write<'b>(
         &self,
@@ -140,19 +183,27 @@ impl<'a> FileLayout<'a> {
         let header = Header { layers: layers.len() as u16, ..header.clone() };
         let last = layers.len().saturating_sub(1);
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(dequantizer)]);
-        for (kind, payload) in self.metadata.chunks() {
-            file.chunk(kind, &[&payload]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(Some(dequantizer))]);
+        let mut early: Vec<_> = self.metadata.chunks().collect();
+        early.extend(bounds.map(|bounds| (ChunkType::BNDS, bounds)));
+        let mut late = Vec::new();
+        if self.first_layer.is_some() && last > 0 {
+            // What need not be known at once stands after a first layer that is to come early.
+            (early, late) = early
+                .into_iter()
+                .partition(|(kind, payload)| Metadata::is_of_display(*kind, payload));
         }
-        if let Some(bounds) = bounds {
-            file.chunk(ChunkType::BNDS, &[&bounds]);
-        }
+        early.iter().for_each(|(kind, payload)| file.chunk(*kind, &[payload]));
         for (number, (count, bytes)) in layers.enumerate() {
+            if number == 1 {
+                late.iter().for_each(|(kind, payload)| file.chunk(*kind, &[payload]));
+            }
             // What has few Gaussians yet looks better without noise.
             if let Some(texture) = self.texture.filter(|_| number == last) {
                 file.chunk(ChunkType::TXTR, &[texture]);
             }
-            file.chunk(ChunkType::LAYER, &[&layers::count_bytes(count, number == last), bytes]);
+            let count = LayerCount::written(count as u32, number == last);
+            file.chunk(ChunkType::LAYER, &[&count, bytes]);
         }
         file.finish()
     }

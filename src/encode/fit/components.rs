@@ -55,7 +55,7 @@ impl Components {
 // Constants: docs/tuning.md, "Growth".
 /// Largest magnitude of a trained colour: where larger colours cancel each other, the picture
 /// depends on rounding errors.
-pub(super) const MOST_COLOR: f32 = 8.0;
+pub(crate) const MOST_COLOR: f32 = 2.0;
 
 /// Pixels by which rounding may move a centre outwards: where a Gaussian is steep, an error along x
 /// moves it along y.

@@ -20,5 +20,6 @@ pub(crate) mod training;
 mod training_loop;
 mod training_tile;
 
+pub(crate) use components::MOST_COLOR;
 pub use paper::VectorQuantizer;
 pub(crate) use trained::{Fit, Work};

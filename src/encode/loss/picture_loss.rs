@@ -17,7 +17,7 @@ use crate::render::tile_grid::TILE_HEIGHT;
 
 // Constants: docs/tuning.md, "What a person sees".
 /// Coarser steps of both chroma axes, whose errors count less than those of luma.
-const VISUAL_AXIS_STEPS: [f32; 4] = [1.0, 1.6, 1.6, 1.0];
+const VISUAL_AXIS_STEPS: [f32; 4] = [1.0, 1.625, 1.625, 1.0];
 
 /// How much errors count in a picture.
 #[derive(Debug)]

@@ -9,9 +9,10 @@ use rayon::prelude::*;
 use super::residuals::{Band, Residuals, window};
 use super::rounds::{BandEntries, Entry, Round};
 use super::window::{ErrorChange, ErrorGradient, Window};
-use crate::coding::entropy::{Code, LayerCoder, MAX_EXPONENT, SymbolCosts};
+use crate::coding::entropy::{Code, LayerCoder, MAX_EXPONENT, MOST_CODE, SymbolCosts};
 use crate::color::ColorModel;
 use crate::encode::error::Result;
+use crate::encode::fit::MOST_COLOR;
 use crate::encode::loss::ColorCurvature;
 use crate::encode::own_frame::{self, GeometryChange};
 use crate::encode::progress::Observer;
@@ -329,7 +330,8 @@ impl CoordinateDescent<'_> {
             }
             let present = code.color[axis];
             let best = present as f32 - by_axis[axis] * unit / by_itself;
-            let best = best.clamp(-30_000.0, 30_000.0);
+            let most = (MOST_COLOR / unit).min(MOST_CODE);
+            let best = best.clamp(-most, most);
             let rounded = best.round() as i32;
             let towards_zero = rounded - rounded.signum();
             let candidates = [rounded, towards_zero, rounded + 1, rounded - 1, present, 0];

@@ -6,6 +6,7 @@ use super::batch::Batch;
 use super::decode::Decode;
 use super::encode::Encode;
 use super::inspect::{Compare, Info};
+use super::prefix::Prefix;
 
 /// Encodes, decodes, inspects and compares .gip files: pictures made of 2D Gaussians.
 #[derive(Debug, Parser)]
@@ -20,6 +21,7 @@ Examples:
   gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
   gip batch photos --out gips                        a folder, one picture per core
   gip info photo.gip                                 what the file contains
+  gip prefix photo.gip 500 placeholder.gip           its first layers, in 500 bytes at most
   gip compare photo.png photo.gip                    how much they differ
 
 In place of any file, `-` is standard input or standard output, but not as an input of `gip batch`.
@@ -37,6 +39,7 @@ pub(crate) enum Command {
     Batch(Batch),
     Info(Info),
     Compare(Compare),
+    Prefix(Prefix),
 }
 
 #[cfg(test)]
@@ -54,7 +57,7 @@ mod tests {
         let mut tool = Args::command();
         tool.build();
         let mut commands: Vec<clap::Command> = tool.get_subcommands().cloned().collect();
-        assert_eq!(commands.len(), 5 + 1, "five and `help`");
+        assert_eq!(commands.len(), 6 + 1, "six and `help`");
         commands.push(tool);
         for mut command in commands {
             let help = command.render_long_help().to_string();

@@ -91,6 +91,10 @@ pub(crate) struct EncoderArgs {
     #[arg(long, value_name = "T", default_value_t = 50,
           value_parser = clap::value_parser!(u8).range(0..=100))]
     texture: u8,
+    /// Let the first layer make a file of at most N bytes, from 64 to 65536, as a placeholder: `gip prefix` cuts it
+    /// off. ICC profile and orientation are in it; all other metadata are stored after it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=65_536))]
+    first_layer: Option<u32>,
     /// How the Gaussians are stored.
     #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
     precision: PrecisionArg,
@@ -106,8 +110,16 @@ pub(crate) struct EncoderArgs {
 impl EncoderArgs {
     /// The arguments above and the group of the targets, for what excludes them. The group that
     /// `clap` makes of a struct is empty if another struct is flattened into it.
-    pub(super) const IDS: [&str; 7] =
-        ["TargetArgs", "tune", "effort", "texture", "precision", "seed", "keep_invisible"];
+    pub(super) const IDS: [&str; 8] = [
+        "TargetArgs",
+        "tune",
+        "effort",
+        "texture",
+        "first_layer",
+        "precision",
+        "seed",
+        "keep_invisible",
+    ];
 
     pub(crate) fn encoder(&self) -> Encoder {
         Encoder::new()
@@ -115,6 +127,7 @@ impl EncoderArgs {
             .with_tune(self.tune.into())
             .with_effort(self.effort)
             .with_texture(self.texture)
+            .with_first_layer(self.first_layer)
             .with_precision(self.precision.into())
             .with_seed(self.seed)
             .with_keep_invisible(self.keep_invisible)

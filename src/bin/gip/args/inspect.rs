@@ -12,6 +12,8 @@ pub(crate) struct Info {
     /// Print one JSON object: the size of the file, all fields of the header, number and bytes of
     /// the chunks of each type, bits per Gaussian by attribute, and sizes of the metadata.
     ///
+    /// `prefixes` has, for each number of layers from the first on, the number of Gaussians, the place where they
+    /// end in the file (`end`), and the size of the file that `gip prefix` makes of them (`bytes`).
     /// `width` and `height` are those of the picture as stored; `upright_width` and `upright_height` those after it
     /// is turned by `orientation`, 1 to 8 as in Exif.
     /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the

@@ -7,6 +7,7 @@ mod encode;
 mod inspect;
 mod keep;
 mod limits;
+mod prefix;
 mod values;
 
 pub(crate) use batch::Batch;
@@ -14,3 +15,4 @@ pub(crate) use command::{Args, Command};
 pub(crate) use decode::Decode;
 pub(crate) use encode::Encode;
 pub(crate) use inspect::{Compare, Info};
+pub(crate) use prefix::Prefix;

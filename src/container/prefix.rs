@@ -1,0 +1,200 @@
+//! Small files that are the beginning of large ones: the first layers of a file are a picture, and so is a file of them
+//! (spec, section 4.4). Nothing is decoded for it.
+
+use alloc::vec::Vec;
+
+use super::header::{Dequantizer, Header};
+use super::metadata::Metadata;
+use super::parser::{Event, Parser};
+use super::varint;
+use super::writer::ChunkWriter;
+use crate::chunk::{ChunkType, SIGNATURE};
+use crate::coding::layer_count::LayerCount;
+use crate::error::DecodeError;
+
+/// The file of the first layers of another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Prefix {
+    /// How many layers it has.
+    pub layers: u16,
+    /// How many Gaussians these have.
+    pub gaussians: u32,
+    /// How many bytes the file of them has: see [`Prefixes::file`].
+    pub bytes: usize,
+    /// Where these layers end in the file that they are taken from.
+    pub end: usize,
+}
+
+/// The files that the first layers of a file make: one for each number of layers, up to all of those that the bytes
+/// at hand have completely.
+///
+/// A file that is cut off is no whole file, which decoders report as an error. These are: a placeholder of a few
+/// hundred bytes, or a smaller picture for a slow line, from a file that is at hand, without decoding and encoding.
+/// They keep what says how the picture is shown: the ICC profile, and Exif if it turns the picture. Texture and other
+/// metadata are left out.
+#[derive(Debug)]
+pub struct Prefixes<'a> {
+    header: Header,
+    dequantizer: Option<Dequantizer>,
+    /// Chunks to keep, each with the number of layers before it.
+    kept: Vec<(usize, ChunkType, &'a [u8])>,
+    layers: Vec<Layer<'a>>,
+}
+
+#[derive(Debug)]
+struct Layer<'a> {
+    gaussians: u32,
+    /// Without the number of Gaussians.
+    bytes: &'a [u8],
+    /// Where the layer ends in the file.
+    end: usize,
+    /// The Gaussians of all layers before it.
+    gaussians_before: u32,
+    /// The bytes of all layers before it, in a file that does not end with them.
+    bytes_before: usize,
+}
+
+impl Layer<'_> {
+    /// The bytes of its chunk.
+    fn framed(&self, is_last: bool) -> usize {
+        let count = LayerCount::written(self.gaussians, is_last);
+        ChunkType::LAYER.framed(count.len() + self.bytes.len())
+    }
+}
+
+impl<'a> Prefixes<'a> {
+    /// The prefixes of a file, or of the beginning of one.
+    ///
+    /// # Errors
+    /// When the header is not complete, or the file is malformed or unsupported up to the last complete layer. The
+    /// Gaussians themselves are not looked at.
+    pub fn new(file: &'a [u8]) -> Result<Self, DecodeError> {
+        let mut parser = Parser::new();
+        let (mut rest, mut payload) = (file, &file[..0]);
+        let mut found: Option<Self> = None;
+        loop {
+            match parser.next(&mut rest)? {
+                Event::NeedMore => break,
+                Event::Begin(chunk, _) => {
+                    if found.is_some() == (chunk == ChunkType::HEADER) {
+                        let reason = "the header does not stand at the beginning, and only there";
+                        return Err(DecodeError::malformed(chunk, reason));
+                    }
+                    payload = &[];
+                }
+                // All of it is there if the chunk is complete.
+                Event::Payload(bytes) => payload = bytes,
+                Event::Complete(ChunkType::END, _) => break,
+                Event::Complete(chunk, _) => match &mut found {
+                    None => found = Some(Self::of_header(payload)?),
+                    Some(found) => found.add(chunk, payload, file.len() - rest.len())?,
+                },
+            }
+        }
+        found.ok_or(DecodeError::UnexpectedEnd { chunk: parser.current() })
+    }
+
+    fn of_header(payload: &[u8]) -> Result<Self, DecodeError> {
+        let (header, dequantizer) = Header::parse(payload)?;
+        Ok(Self { header, dequantizer, kept: Vec::new(), layers: Vec::new() })
+    }
+
+    /// Takes the payload of a chunk that ends at this place in the file.
+    fn add(&mut self, chunk: ChunkType, payload: &'a [u8], end: usize) -> Result<(), DecodeError> {
+        match chunk {
+            ChunkType::LAYER => {
+                let declared = usize::from(self.header.layers);
+                if self.layers.len() == declared {
+                    let reason = "more layers than the header declares";
+                    return Err(DecodeError::malformed(chunk, reason));
+                }
+                let (gaussians_before, bytes_before) = self.so_far();
+                let later = declared - self.layers.len() - 1;
+                let mut bytes = payload;
+                let declared = LayerCount::new(self.header.gaussians - gaussians_before, later);
+                let count = declared.read(&mut varint::Arriving::default(), &mut bytes)?;
+                let too_short =
+                    || DecodeError::malformed(chunk, "too short for a number of Gaussians");
+                let gaussians = count.ok_or_else(too_short)?;
+                self.layers.push(Layer { gaussians, bytes, end, gaussians_before, bytes_before });
+            }
+            _ if Metadata::is_of_display(chunk, payload) => {
+                if self.kept.iter().any(|(_, kept, _)| *kept == chunk) {
+                    return Err(DecodeError::malformed(chunk, "appears twice"));
+                }
+                self.kept.push((self.layers.len(), chunk, payload));
+            }
+            _ if !chunk.is_critical() => {}
+            _ => return Err(DecodeError::unknown_critical(chunk)),
+        }
+        Ok(())
+    }
+
+    /// The Gaussians and the bytes of all layers so far.
+    fn so_far(&self) -> (u32, usize) {
+        let of = |last: &Layer<'_>| {
+            (last.gaussians_before + last.gaussians, last.bytes_before + last.framed(false))
+        };
+        self.layers.last().map_or((0, 0), of)
+    }
+
+    /// All prefixes: first that of the first layer.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Prefix> + '_ {
+        self.layers.iter().enumerate().map(|(number, last)| Prefix {
+            layers: number as u16 + 1,
+            gaussians: last.gaussians_before + last.gaussians,
+            bytes: self.length(number, last),
+            end: last.end,
+        })
+    }
+
+    /// The number of layers that the whole file has.
+    #[must_use]
+    pub fn layers(&self) -> u16 {
+        self.header.layers
+    }
+
+    /// The longest prefix of at most so many bytes. `None` if the first layer takes more.
+    #[must_use]
+    pub fn within(&self, bytes: usize) -> Option<Prefix> {
+        // A prefix of more layers has more bytes.
+        self.iter().take_while(|prefix| prefix.bytes <= bytes).last()
+    }
+
+    /// The file of a prefix.
+    #[must_use]
+    pub fn file(&self, prefix: Prefix) -> Vec<u8> {
+        let layers = &self.layers[..self.layers.len().min(prefix.layers.into())];
+        let gaussians = layers.iter().map(|layer| layer.gaussians).sum();
+        let mut file = ChunkWriter::new();
+        file.chunk(ChunkType::HEADER, &[&self.header(layers.len(), gaussians)]);
+        for (number, layer) in layers.iter().enumerate() {
+            for (_, kind, payload) in self.kept.iter().filter(|(before, ..)| *before == number) {
+                file.chunk(*kind, &[payload]);
+            }
+            let count = LayerCount::written(layer.gaussians, number + 1 == layers.len());
+            file.chunk(ChunkType::LAYER, &[&count, layer.bytes]);
+        }
+        file.finish()
+    }
+
+    /// The length of the file that ends with this layer, before which there are `before` layers.
+    fn length(&self, before: usize, last: &Layer<'_>) -> usize {
+        let kept = self.kept.iter().filter(|(layers, ..)| *layers <= before);
+        let kept = kept.map(|(_, kind, payload)| kind.framed(payload.len())).sum::<usize>();
+        let header = self.header(before + 1, last.gaussians_before + last.gaussians);
+        SIGNATURE.len()
+            + ChunkType::HEADER.framed(header.len())
+            + kept
+            + last.bytes_before
+            + last.framed(true)
+            + ChunkType::END.framed(0)
+    }
+
+    /// The payload of the header of so many layers and Gaussians.
+    fn header(&self, layers: usize, gaussians: u32) -> Vec<u8> {
+        let header = Header { layers: layers as u16, gaussians, ..self.header.clone() };
+        header.to_payload(self.dequantizer.as_ref())
+    }
+}
