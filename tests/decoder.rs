@@ -8,8 +8,7 @@ use std::io::{self, Read};
 use common::{
     CHOLESKY, ENTROPY, EXPONENTIAL, Entry, File, GRAY_ALPHA, Header, QUARTIC, RGB, RGBA, Random,
     SIGNATURE, bits, cases, checked, chunk, crc32, decode, decode_pieces, decode_valid, kind,
-    layered, number, of_chunks, offsets, oracle, packed, payload, quantizers, steps,
-    without_last_word,
+    layered, number, of_chunks, offsets, oracle, packed, quantizers, steps, without_last_word,
 };
 use image_gip::{
     ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Orientation,
@@ -754,15 +753,6 @@ fn limits_hold_from_the_start_or_from_where_they_are_set() {
     let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
     is_width(decoder.set_limits(narrow(23)));
     is_width(decoder.decode_into(&mut [0; 1224]));
-}
-
-/// What to do to a sound field, and what the error then says.
-type Change<'a, T> = (&'a dyn Fn(&mut T), &'a str);
-
-/// The error of a file of these chunks, which must have one.
-#[track_caller]
-fn refused(chunks: &[Vec<u8>]) -> String {
-    decode(&of_chunks(chunks)).1.expect_err("a file that breaks a rule").to_string()
 }
 
 /// What the header says of steps, and whether it may.

@@ -19,7 +19,7 @@ fn decode(bytes: &[u8]) -> (StreamDecoder, Result<(), DecodeError>) {
 }
 
 /// A number whose magnitude has up to `bits` bits, each length as likely.
-fn number(random: &mut Random, bits: u64) -> i32 {
+fn integer(random: &mut Random, bits: u64) -> i32 {
     let length = random.next() % (bits + 1);
     let magnitude = (random.next() & ((1 << length) - 1)) as i32;
     if random.next() & 1 == 1 { -magnitude } else { magnitude }
@@ -37,10 +37,10 @@ fn code(random: &mut Random, header: &Header, spread: u32) -> Code {
     });
     Code {
         exponent,
-        axes: (0..header.channels()).map(|_| number(random, long)).collect(),
-        size: number(random, long),
-        ratio: number(random, long),
-        slant: number(random, long),
+        axes: (0..header.channels()).map(|_| integer(random, long)).collect(),
+        size: integer(random, long),
+        ratio: integer(random, long),
+        slant: integer(random, long),
         center,
     }
 }

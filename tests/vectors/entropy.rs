@@ -51,8 +51,7 @@ pub(super) fn scattered(seed: u64, header: Header, count: usize) -> File {
 /// Equal Gaussians without colour: 216 of them take 54 bytes, and so do 217.
 fn dense(count: usize) -> File {
     let header = header(GRAY, 24, 16);
-    let mut steps = usual_steps(GRAY);
-    steps[0] = MOST_STEP;
+    let steps = vec![MOST_STEP, 0.75, 0.75, 1.75, at_most(0.1)];
     let code = Code { exponent: 1, ..at(&header, [4.0, 8.0], 0) };
     File::of_entropy_coded(header, steps, vec![vec![code; count]])
 }
