@@ -6,8 +6,9 @@ mod common;
 use std::io::{self, Read};
 
 use common::{
-    CHOLESKY, EXPONENTIAL, Entry, File, GRAY_ALPHA, Ghdr, QUARTIC, RGB, RGBA, Random, bits, cases,
-    chunk, decode, decode_pieces, decode_valid, gaus, layered, of_chunks, oracle, qntz,
+    CHOLESKY, ENTROPY, EXPONENTIAL, Entry, File, GRAY_ALPHA, Header, QUARTIC, RGB, RGBA, Random,
+    SIGNATURE, bits, cases, checked, chunk, crc32, decode, decode_pieces, decode_valid, kind,
+    layered, number, of_chunks, offsets, oracle, packed, quantizers, steps, without_last_word,
 };
 use image_gip::{
     ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Orientation,
@@ -36,8 +37,8 @@ fn sample() -> File {
         (0..count).flat_map(|_| entries.iter().map(&mut code).collect::<Vec<_>>()).collect()
     };
     let layers = vec![layer(3), layer(1), layer(4)];
-    let base = [20_000, 30_000, 40_000, 0];
-    let header = Ghdr { color: RGB, width: 24, height: 17, base, ..Ghdr::default() };
+    let base = [78 * 257, 117 * 257, 156 * 257, 0];
+    let header = Header { color: RGB, width: 24, height: 17, base, ..Header::default() };
     File::new(header, entries.clone(), layers)
         .with(b"iCCP", b"profile")
         .with(b"eXIf", b"II*\0")
@@ -45,6 +46,11 @@ fn sample() -> File {
         .with(b"tEXt", b"Title\0A test")
         .with(b"tEXt", "Autorin\0Zoë".as_bytes())
         .with(b"prVt", &[1, 2, 3])
+}
+
+/// The letters of a type.
+fn letters(chunk: ChunkType) -> String {
+    chunk.to_string().split(' ').next().unwrap_or_default().into()
 }
 
 /// What a decoder has to say for itself: the error in words, and everything it holds.
@@ -95,13 +101,13 @@ proptest! {
         parameterization in 0_u8..3,
         base in any::<[u16; 4]>(),
     ) {
-        let mut base = base;
-        base[usize::from(color) + 1..].fill(0);
         let depth = if sixteen { 16 } else { 8 };
+        let mut base = if sixteen { base } else { base.map(|base| base / 257 * 257) };
+        base[usize::from(color) + 1..].fill(0);
         let (kernel, cutoff) = kernel;
         let (width, height) = size;
         let header =
-            Ghdr { color, depth, width, height, kernel, parameterization, cutoff, base, ..Ghdr::default() };
+            Header { color, depth, width, height, kernel, form: parameterization, cutoff, base, ..Header::default() };
         let decoder = decode_valid(&File::of_floats(header, &[]).bytes());
         let found = decoder.header().expect("a complete file");
         prop_assert_eq!((found.version, found.width, found.height), (1, width, height));
@@ -131,7 +137,7 @@ proptest! {
             Entry { bits, .. } => (random.next() & ((1 << bits) - 1)) as u32,
         };
         let codes: Vec<u32> = (0..9 * 7).map(code).collect();
-        let header = Ghdr { color: RGBA, ..Ghdr::default() };
+        let header = Header { color: RGBA, ..Header::default() };
         let file = File::new(header, entries.clone(), vec![codes.clone()]);
         let decoder = decode_valid(&file.bytes());
         let expected: Vec<Gaussian> = codes
@@ -182,21 +188,20 @@ fn every_truncation_is_an_unexpected_end_and_shows_the_prefix() {
         let (decoder, result) = decode(&bytes[..length]);
         let error = result.expect_err("a part of a file");
         assert!(error.is_unexpected_end(), "{length} bytes: {error}");
-        let mut start = 8;
-        let current = chunks.iter().find(|chunk| {
-            start += chunk.len();
-            start > length
-        });
-        let in_chunk = current.filter(|chunk| length >= start - chunk.len() + 8);
+        // A chunk is named when its type is complete.
+        let mut starts = chunks.iter().zip(offsets(&chunks)).rev();
+        let current = starts.find(|(chunk, start)| length >= start + kind(chunk).len());
+        let in_chunk = current.filter(|(chunk, start)| length < start + chunk.len());
         let named = match error {
-            DecodeError::UnexpectedEnd { chunk } => chunk.map(|chunk| chunk.0.to_vec()),
+            DecodeError::UnexpectedEnd { chunk } => chunk.map(letters),
             _ => None,
         };
-        assert_eq!(named, in_chunk.map(|chunk| chunk[4..8].to_vec()), "{length} bytes");
+        let expected = in_chunk.map(|(chunk, _)| String::from_utf8_lossy(kind(chunk)).into_owned());
+        assert_eq!(named, expected, "{length} bytes");
         let gaussians = decoder.gaussians();
         assert_eq!(bits(gaussians), bits(&all.gaussians()[..gaussians.len()]));
         let Some(picture) = decoder.picture() else {
-            assert!(length < 8 + 48, "the header has arrived");
+            assert!(length < offsets(&chunks)[1], "the header has arrived");
             continue;
         };
         let mut found = vec![0.0; 24 * 17 * 3];
@@ -205,7 +210,7 @@ fn every_truncation_is_an_unexpected_end_and_shows_the_prefix() {
         assert_eq!(found, oracle::render(&file, &request).concat(), "{length} bytes");
     }
     // All but CRC and end: every Gaussian is there.
-    let (decoder, _) = decode(&bytes[..bytes.len() - 16]);
+    let (decoder, _) = decode(&bytes[..bytes.len() - 10]);
     assert_eq!(decoder.gaussians().len(), 8);
 }
 
@@ -241,7 +246,7 @@ fn a_damaged_layer_keeps_the_layers_before_it() {
         let (mut decoder, result) = decode(&of_chunks(&damaged));
         match result.expect_err("a wrong CRC") {
             DecodeError::Malformed { chunk, reason } => {
-                assert_eq!(chunk, ChunkType::GAUS);
+                assert_eq!(chunk, ChunkType::LAYER);
                 assert!(reason.to_string().contains("CRC"), "{reason}");
             }
             error => panic!("{error}"),
@@ -276,7 +281,7 @@ fn metadata_arrives_as_it_was_stored() {
         metadata.texts.iter().map(|t| (t.keyword.as_str(), t.text.as_str())).collect();
     assert_eq!(texts, [("Title", "A test"), ("Autorin", "Zoë")]);
     let text = decoder.chunks().iter().find(|c| c.kind == ChunkType::TEXT).expect("two of them");
-    assert_eq!((text.count, text.bytes), (2, 24 + 12 + 12));
+    assert_eq!((text.count, text.bytes), (2, 2 * (4 + 1 + 12 + 4)));
     let bytes: u64 = decoder.chunks().iter().map(|chunk| chunk.bytes).sum();
     assert_eq!(bytes + 8, sample().bytes().len() as u64);
 }
@@ -298,28 +303,106 @@ fn the_orientation_is_told_as_soon_as_it_is_known() {
     let turned = File { extra: Vec::new(), ..sample() }.with(b"tEXt", b"Title\0A test");
     let first_layer = |file: &File| {
         let chunks = file.chunks();
-        let at = chunks.iter().position(|chunk| &chunk[4..8] == b"GAUS").expect("layers");
-        8 + chunks[..at].iter().map(Vec::len).sum::<usize>() + 8
+        let at = chunks.iter().position(|chunk| kind(chunk) == b"L").expect("layers");
+        offsets(&chunks)[at]
     };
     let plain = first_layer(&turned);
-    assert_eq!(told(&turned.bytes()), Some((plain, Orientation::NoTransforms)));
+    // With the letter that says that a layer begins.
+    assert_eq!(told(&turned.bytes()), Some((plain + 1, Orientation::NoTransforms)));
     let turned = turned.with(b"eXIf", ROTATE_90);
     assert_eq!(decode_valid(&turned.bytes()).metadata().orientation(), Orientation::Rotate90);
     // With the end of the Exif data.
-    assert_eq!(told(&turned.bytes()), Some((first_layer(&turned) - 8, Orientation::Rotate90)));
+    assert_eq!(told(&turned.bytes()), Some((first_layer(&turned), Orientation::Rotate90)));
 
-    let empty = File::new(Ghdr::default(), vec![Entry::FLOAT; 6], vec![]).bytes();
+    let empty = File::new(Header::default(), vec![Entry::FLOAT; 6], vec![]).bytes();
     assert_eq!(told(&empty), Some((empty.len(), Orientation::NoTransforms)));
 }
 
 #[test]
-fn known_ancillary_chunks_after_the_first_layer_are_skipped() {
+fn metadata_may_stand_between_and_after_the_layers() {
     let file = sample();
-    let mut chunks = file.chunks();
-    chunks.insert(chunks.len() - 2, chunk(b"iCCP", b"too late"));
-    chunks.insert(chunks.len() - 1, chunk(b"tEXt", b"not even text"));
-    let decoder = decode_valid(&of_chunks(&chunks));
-    assert_eq!(decoder.metadata(), decode_valid(&file.bytes()).metadata());
+    let all = decode_valid(&file.bytes());
+    let bare = File { extra: Vec::new(), ..file.clone() }.chunks();
+    let extra: Vec<Vec<u8>> =
+        file.extra.iter().map(|(kind, payload)| chunk(kind, payload)).collect();
+    // Header, three layers, end: behind each of them but the last.
+    for at in 1..5 {
+        let mut chunks = bare.clone();
+        drop(chunks.splice(at..at, extra.clone()));
+        let bytes = of_chunks(&chunks);
+        for decoder in [decode_valid(&bytes), decode_pieces(bytes.chunks(1), Limits::default()).0] {
+            assert!(decoder.is_complete(), "{at}");
+            assert_eq!(decoder.metadata(), all.metadata(), "{at}");
+            assert_eq!(bits(decoder.gaussians()), bits(all.gaussians()), "{at}");
+            assert_eq!(decoder.orientation(), Some(Orientation::NoTransforms), "{at}");
+        }
+        // The decoder of a reader, and the short way.
+        let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+        decoder.read_to_end().expect("it is sound");
+        assert_eq!(decoder.metadata(), all.metadata(), "{at}");
+        assert_eq!(image_gip::decode(&bytes).expect("it is sound").metadata, *all.metadata());
+    }
+    // One here, one there.
+    let mut chunks = bare.clone();
+    for (at, extra) in [(1, 3), (3, 4), (5, 0), (6, 2), (7, 1)] {
+        chunks.insert(at, chunk(&file.extra[extra].0, &file.extra[extra].1));
+    }
+    assert_eq!(decode_valid(&of_chunks(&chunks)).metadata(), all.metadata());
+}
+
+#[test]
+fn what_is_wrong_with_an_ancillary_chunk_is_so_behind_the_layers() {
+    let file = sample();
+    let chunks = file.chunks();
+    for (kind, payload, expected) in [
+        (b"iCCP", &b"again"[..], "iCCP: appears twice"),
+        (b"xMPd", b"again", "xMPd: appears twice"),
+        (b"tEXt", b"not even text", "tEXt: no NUL after the keyword"),
+    ] {
+        for (behind, kept) in [(4, 0), (3, 3), (2, 4), (1, 8)] {
+            let mut chunks = chunks.clone();
+            chunks.insert(chunks.len() - behind, chunk(kind, payload));
+            let (decoder, result) = decode(&of_chunks(&chunks));
+            let error = result.expect_err("it breaks a rule").to_string();
+            assert!(error.contains(expected), "{error}");
+            assert_eq!(decoder.gaussians().len(), kept);
+        }
+    }
+}
+
+#[test]
+fn exif_may_not_turn_a_picture_that_has_been_shown() {
+    let bare = File { extra: Vec::new(), ..sample() }.chunks();
+    let upright = [&ROTATE_90[..19], &[1], &ROTATE_90[20..]].concat();
+    assert_eq!(ROTATE_90[19], 6);
+    for at in 1..5 {
+        let with = |exif: &[u8]| {
+            let mut chunks = bare.clone();
+            chunks.insert(at, chunk(b"eXIf", exif));
+            of_chunks(&chunks)
+        };
+        for exif in [&upright[..], b"", b"II*\0", b"no Exif"] {
+            let decoder = decode_valid(&with(exif));
+            assert_eq!(decoder.metadata().exif.as_deref(), Some(exif));
+            assert_eq!(decoder.orientation(), Some(Orientation::NoTransforms));
+        }
+        let bytes = with(ROTATE_90);
+        let (decoder, result) = decode(&bytes);
+        if at == 1 {
+            result.expect("nothing has been shown");
+            assert_eq!(decoder.orientation(), Some(Orientation::Rotate90));
+            continue;
+        }
+        let error = result.expect_err("the picture has been shown").to_string();
+        assert!(error.contains("eXIf: an orientation after the first layer"), "{error}");
+        // The picture stays as it was shown, and its layers stay.
+        assert_eq!(decoder.orientation(), Some(Orientation::NoTransforms));
+        assert_eq!(decoder.metadata().exif, None);
+        assert_eq!(decoder.gaussians().len(), [3, 4, 8][at - 2]);
+        let mut decoder = Decoder::new(&bytes[..]).expect("it begins well");
+        assert_eq!(decoder.read_to_end().expect_err("the same").to_string(), error);
+        assert_eq!(decoder.metadata().orientation(), Orientation::NoTransforms);
+    }
 }
 
 /// A reader that gives one byte at a time, interrupts every other call, and fails at the end of
@@ -374,7 +457,7 @@ fn awkward_readers_make_no_difference() {
 
     // A failing reader is an error of its own, after which the picture so far is there: two layers, and
     // of the third, which lacks 14 of its 32 bytes, two Gaussians of 63 bits.
-    let cut = &bytes[..bytes.len() - 30];
+    let cut = &bytes[..bytes.len() - (6 + 4 + 14)];
     let mut decoder = Decoder::new(awkward(cut, true)).expect("a valid header");
     let error = decoder.read_to_end().expect_err("the reader fails");
     assert!(matches!(&error, DecodeError::Io(io) if io.to_string().contains("cut")), "{error}");
@@ -385,7 +468,8 @@ fn awkward_readers_make_no_difference() {
     assert!(error.is_unexpected_end(), "{error}");
     assert_eq!(decoder.picture().expect("every layer is sound").gaussians().len(), 3 + 1 + 2);
     // A file that ends before its first layer has no picture to open.
-    let error = Decoder::new(&bytes[..100]).expect_err("the file is too short");
+    let first_layer = offsets(&file.chunks())[1 + file.extra.len()];
+    let error = Decoder::new(&bytes[..first_layer]).expect_err("the file is too short");
     assert!(error.is_unexpected_end(), "{error}");
 }
 
@@ -432,18 +516,19 @@ fn layers_are_counted_as_they_arrive() {
 fn damaged_twice() -> Vec<u8> {
     let mut chunks = layered::chunks();
     let first = &mut chunks[layered::BEFORE];
-    *first = chunk(b"GAUS", &first[8..first.len() - 6]);
+    *first = without_last_word(first);
     *chunks[layered::BEFORE + 1].last_mut().expect("a CRC") ^= 1;
     of_chunks(&chunks)
 }
 
 /// Files of both codings, with metadata and without, with bounds, without Gaussians.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
-    let header = Ghdr { depth: 16, base: [9, 0, 0, 0], ..Ghdr::default() };
+    let header = Header { depth: 16, base: [9, 0, 0, 0], ..Header::default() };
     let mut described = layered::chunks();
     described.insert(1, chunk(b"iCCP", &[7; 20_000]));
-    described.insert(2, chunk(b"tEXt", b"Title\0Layers"));
+    described.insert(layered::BEFORE + 2, chunk(b"tEXt", b"Title\0Layers"));
     described.insert(described.len() - 1, chunk(b"prVt", &[8; 100]));
+    described.insert(described.len() - 1, chunk(b"xMPd", &[7; 300]));
     vec![
         ("packed", sample().bytes()),
         ("empty", File::of_floats(header, &[]).bytes()),
@@ -489,13 +574,13 @@ fn one_call_refuses_what_is_not_a_whole_sound_file() {
     }
     let bytes = damaged_twice();
     let expected = decode(&bytes).1.expect_err("damaged").to_string();
-    assert!(expected.contains("GAUS") && !expected.contains("CRC"), "{expected}");
+    assert!(expected.contains("L (layer)") && !expected.contains("CRC"), "{expected}");
     assert_eq!(image_gip::decode(&bytes).expect_err("damaged").to_string(), expected);
     // That the file ends early comes behind it, too.
     let short = layered::damaged(&[0]);
     let error = image_gip::decode(&short[..short.len() - 5]).expect_err("damaged");
     assert_eq!(error.to_string(), expected);
-    let large = Ghdr { width: 1 << 17, ..Ghdr::default() };
+    let large = Header { width: 1 << 17, ..Header::default() };
     let error = image_gip::decode(&File::of_floats(large, &[]).bytes()).expect_err("too wide");
     assert!(matches!(error, DecodeError::Limit { kind: LimitKind::Width, .. }), "{error}");
 }
@@ -670,6 +755,178 @@ fn limits_hold_from_the_start_or_from_where_they_are_set() {
     is_width(decoder.decode_into(&mut [0; 1224]));
 }
 
+/// What the header says of steps, and whether it may.
+fn with_steps(steps: &[u8], form: u8) -> Result<Vec<f32>, String> {
+    let header =
+        Header { coding: ENTROPY, color: RGB, form, gaussians: 1, layers: 1, ..Header::default() };
+    let mut decoder = StreamDecoder::new();
+    let header = of_chunks(&[chunk(b"H", &[&header.fields(), steps].concat())]);
+    decoder.feed(&header).map_err(|error| error.to_string())?;
+    let steps = decoder.quantization_steps().expect("the header has arrived");
+    let geometry = [steps.position, steps.size, steps.ratio, steps.slant];
+    Ok([&geometry[..], &steps.color].concat())
+}
+
+#[test]
+fn steps_have_the_values_of_their_codes() {
+    let usual = steps::usual_geometry();
+    let of_axes = |first: u16, ratios: [u8; 2]| [&first.to_le_bytes()[..], &ratios].concat();
+    for (first, [second, third], expected) in [
+        (0xA000, [128, 128], [1.0, 1.0, 1.0]),
+        (0xA000, [0, 255], [1.0, 1.0 / 256.0, 248.0]),
+        (0x9800, [136, 112], [0.5, 0.75, 0.25]),
+        // 2^-20 and 2^10, the bounds.
+        (0, [128, 255], [2_f32.powi(-20), 2_f32.powi(-20), 248.0 * 2_f32.powi(-20)]),
+        (0xF000, [128, 0], [1024.0, 1024.0, 4.0]),
+        (
+            0x0801,
+            [112, 255],
+            [
+                (1.0 + 1.0 / 2048.0) * 2_f32.powi(-19),
+                (1.0 + 1.0 / 2048.0) * 2_f32.powi(-20),
+                (1.0 + 1.0 / 2048.0) * 2_f32.powi(-19) * 248.0,
+            ],
+        ),
+    ] {
+        let found = with_steps(&of_axes(first, [second, third]), 0).expect("it is sound");
+        assert_eq!(found, [&usual[..], &expected].concat());
+    }
+    // Those of geometry, if the format says so.
+    let geometry = [0, 0xF000, 0xA000, 0x9C00].map(u16::to_le_bytes).concat();
+    let steps = [of_axes(0xA000, [128; 2]), geometry].concat();
+    let expected = [2_f32.powi(-20), 1024.0, 1.0, 0.75, 1.0, 1.0, 1.0];
+    assert_eq!(with_steps(&steps, 1).expect("it is sound"), expected);
+    assert!(with_steps(&steps, 0).expect_err("they are too many").contains("longer than"));
+    assert!(with_steps(&steps[..11], 1).expect_err("too few").contains("shorter than"));
+    assert!(with_steps(&steps[..4], 1).expect_err("too few").contains("shorter than"));
+
+    for first in [0xF001, u16::MAX] {
+        let error = with_steps(&of_axes(first, [128; 2]), 0).expect_err("it is too large");
+        assert!(error.contains("H (header): a step of more than 2^10"), "{error}");
+        for at in 0..4 {
+            let mut steps = steps.clone();
+            steps[4 + 2 * at..][..2].copy_from_slice(&first.to_le_bytes());
+            let error = with_steps(&steps, 1).expect_err("it is too large");
+            assert!(error.contains("H (header): a step of more than 2^10"), "{error}");
+        }
+    }
+    // One that is told by its ratio.
+    for (first, ratio) in [(0, 127), (0xF000, 129), (1, 127), (0xEFFF, 129), (0x0800, 111)] {
+        for ratios in [[ratio, 128], [128, ratio]] {
+            let error = with_steps(&of_axes(first, ratios), 0).expect_err("it is out of range");
+            assert!(error.contains("H (header): a step that is not within"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn every_layer_but_the_last_says_how_many_gaussians_it_has() {
+    let entries = vec![Entry::linear(3, 0.5, 1.0); 6];
+    let mut random = Random(4);
+    let mut layer = |count: usize| (0..6 * count).map(|_| random.next() as u32 & 7).collect();
+    // Numbers of one byte and of more, and the last layer of any size.
+    for counts in [vec![1], vec![1, 1], vec![127, 128, 1, 2], vec![1, 16_383, 16_384, 300]] {
+        let layers: Vec<Vec<u32>> = counts.iter().map(|&count| layer(count)).collect();
+        let file = File::new(Header::default(), entries.clone(), layers);
+        let bytes = file.bytes();
+        let decoder = decode_valid(&bytes);
+        assert!(decoder.layers().iter().map(|&count| count as usize).eq(counts));
+        let expected = file.components();
+        assert_eq!(decoder.gaussians().len(), expected.len());
+        for (found, values) in decoder.gaussians().iter().zip(&expected) {
+            assert_eq!((found.center, found.color[0]), ([values[0], values[1]], values[5]));
+        }
+        let (sliced, result) = decode_pieces(bytes.chunks(1), Limits::default());
+        assert_eq!(outcome(&sliced, &result), outcome(&decoder, &Ok(())));
+    }
+}
+
+#[test]
+fn a_length_takes_as_many_bytes_as_it_needs() {
+    let sound = sample();
+    for (length, bytes) in [(0, 1), (127, 1), (128, 2), (16_383, 2), (16_384, 3), (2_097_152, 4)] {
+        assert_eq!(number(length).len(), bytes);
+        let file = sound.clone().with(b"abCd", &vec![9; length as usize]);
+        let decoder = decode_valid(&file.bytes());
+        let found = decoder.chunks().iter().find(|chunk| letters(chunk.kind) == "abCd");
+        let expected = (4 + bytes + length as usize + 4) as u64;
+        assert_eq!(found.expect("it has arrived").bytes, expected);
+    }
+    // One byte more than it needs, or more than there can be, whatever else the chunk has.
+    for (length, expected) in [
+        (&[0x83, 0][..], "a number with more bytes than it needs"),
+        (&[0x83, 0x80, 0x80, 0x80, 0], "a number with more bytes than it needs"),
+        (&[0xFF, 0xFF, 0xFF, 0xFF, 0x10], "a number of more than 32 bits"),
+        (&[0x83, 0x80, 0x80, 0x80, 0x80, 0], "a number of more than 32 bits"),
+        (&[0x80, 0x80, 0x80, 0x80, 0x08], "the length is over 2^31 - 1"),
+        (&[0xFF, 0xFF, 0xFF, 0xFF, 0x0F], "the length is over 2^31 - 1"),
+    ] {
+        for kind in [&b"abCd"[..], b"L"] {
+            let wrong = checked(&[kind, length, &[1, 2, 3]].concat());
+            let bytes = of_chunks(&[sound.chunks()[0].clone(), wrong]);
+            let error = decode(&bytes).1.expect_err("no length").to_string();
+            assert!(error.contains(expected), "{error}");
+            // It is told with the byte that is wrong, the fifth at the latest.
+            let end = sound.chunks()[0].len() + 8 + kind.len() + length.len().min(5);
+            assert!(decode(&bytes[..end - 1]).1.expect_err("incomplete").is_unexpected_end());
+            assert_eq!(decode(&bytes[..end]).1.expect_err("no length").to_string(), error);
+        }
+    }
+    // The longest that there can be.
+    let longest = [&b"prVt"[..], &[0xFF, 0xFF, 0xFF, 0xFF, 0x07]].concat();
+    let bytes = of_chunks(&[sound.chunks()[0].clone(), longest]);
+    assert!(decode(&bytes).1.expect_err("it is missing").is_unexpected_end());
+}
+
+#[test]
+fn the_crc_is_of_type_length_and_payload() {
+    let header = sample().chunks()[0].clone();
+    for (kind, payload) in [(&b"prVt"[..], &b"private"[..]), (b"tEXt", b"a\0b"), (b"xMPd", b"")] {
+        let length = number(payload.len() as u32);
+        let with_crc_of = |parts: &[&[u8]]| {
+            let crc = crc32(&parts.concat()).to_le_bytes();
+            of_chunks(&[header.clone(), [kind, &length, payload, &crc].concat()])
+        };
+        let sound = decode(&with_crc_of(&[kind, &length, payload])).1.expect_err("incomplete");
+        assert!(sound.is_unexpected_end(), "{sound}");
+        let length = &length[..];
+        for parts in [&[kind, payload][..], &[length, payload], &[kind, length], &[payload]] {
+            if parts.concat() != [kind, length, payload].concat() {
+                let error = decode(&with_crc_of(parts)).1.expect_err("another CRC").to_string();
+                assert!(error.contains("the CRC does not match"), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn signature_and_version_are_judged_byte_by_byte() {
+    let sound = sample().bytes();
+    for at in 0..8 {
+        for other in (0..=u8::MAX).filter(|&other| other != SIGNATURE[at]) {
+            let mut bytes = sound.clone();
+            bytes[at] = other;
+            let is_expected = |error: &DecodeError| match error {
+                DecodeError::Unsupported { chunk: ChunkType::HEADER, .. } => {
+                    at == 6 && error.to_string().contains(&format!("version {other}"))
+                }
+                DecodeError::Signature => at != 6,
+                _ => false,
+            };
+            // As soon as the byte has arrived, whatever follows.
+            for end in [at + 1, 8, bytes.len()] {
+                let error = decode(&bytes[..end.max(at + 1)]).1.expect_err("another signature");
+                assert!(is_expected(&error), "byte {at} is {other}: {error}");
+            }
+            let error = Decoder::new(&bytes[..]).expect_err("another signature");
+            assert!(is_expected(&error), "byte {at} is {other}: {error}");
+        }
+    }
+    let of_another_version = [&SIGNATURE[..6], b"\x02whatever follows"].concat();
+    let error = decode(&of_another_version).1.expect_err("version 2").to_string();
+    assert!(error.contains("version 2"), "{error}");
+}
+
 /// What to do to a sound field, and what the error then says.
 type Change<'a, T> = (&'a dyn Fn(&mut T), &'a str);
 
@@ -679,128 +936,196 @@ fn refused(chunks: &[Vec<u8>]) -> String {
     decode(&of_chunks(chunks)).1.expect_err("a file that breaks a rule").to_string()
 }
 
-#[test]
-fn errors_name_the_chunk_and_the_rule() {
-    let entries = vec![Entry::FLOAT; 7];
-    let header = |change: &dyn Fn(&mut Ghdr)| {
-        let mut header = Ghdr { color: GRAY_ALPHA, gaussians: 1, layers: 1, ..Ghdr::default() };
-        change(&mut header);
-        chunk(b"GHDR", &header.payload())
-    };
-    let sound = header(&|_| {});
-    let quantizers = chunk(b"QNTZ", &qntz(&entries));
-    let codes = [4.0, 4.0, 1.0, 0.0, 1.0, 0.5, 0.5].map(f32::to_bits);
-    let layer = chunk(b"GAUS", &gaus(&entries, &codes));
-    let end = chunk(b"GEND", &[]);
-    let after = |first: Vec<u8>| [first, quantizers.clone(), layer.clone(), end.clone()];
-    decode(&of_chunks(&after(sound.clone()))).1.expect("sound until it is changed");
+#[track_caller]
+fn check_refused(chunks: &[Vec<u8>], expected: &str) {
+    let error = refused(chunks);
+    assert!(error.contains(expected), "{error:?} instead of {expected:?}");
+}
 
-    let changes: [Change<'_, Ghdr>; 20] = [
-        (&|h| h.version = 2, "GHDR: unsupported: version 2"),
-        (&|h| h.coding = 2, "GHDR: unsupported: coding 2"),
-        (&|h| h.color = 4, "GHDR: unsupported: colour model 4"),
-        (&|h| h.depth = 10, "GHDR: unsupported: sample depth 10"),
-        (&|h| h.kernel = 2, "GHDR: unsupported: kernel 2"),
-        (&|h| h.parameterization = 3, "GHDR: unsupported: parameterization 3"),
-        (&|h| h.transform = 1, "GHDR: unsupported: colour transform 1"),
-        (&|h| h.width = 0, "GHDR: the width is zero"),
-        (&|h| h.height = 0, "GHDR: the height is zero"),
-        (&|h| h.width = (1 << 20) + 1, "GHDR: the width is over 2^20"),
-        (&|h| h.height = u32::MAX, "GHDR: the height is over 2^20"),
-        (&|h| h.layers = 0, "GHDR: Gaussians, but no layer"),
-        (&|h| h.layers = 2, "GHDR: more layers than Gaussians"),
-        (&|h| h.gaussians = 0, "GHDR: more layers than Gaussians"),
-        (&|h| h.cutoff = 8.5, "GHDR: a cut-off of the quartic kernel that is not 4"),
-        (&|h| (h.kernel, h.cutoff) = (0, 0.0), "GHDR: a cut-off that is not in (0, 64]"),
-        (&|h| (h.kernel, h.cutoff) = (0, 64.5), "GHDR: a cut-off that is not in (0, 64]"),
-        (&|h| (h.kernel, h.cutoff) = (0, f32::NAN), "GHDR: a cut-off that is not in (0, 64]"),
-        (&|h| h.reserved[1] = 1, "GHDR: a reserved byte is not zero"),
-        (&|h| h.base[2] = 1, "GHDR: base colour in an absent channel"),
+#[test]
+fn errors_name_the_field_of_the_header_and_the_rule() {
+    let entries = vec![Entry::FLOAT; 7];
+    let sound = Header { color: GRAY_ALPHA, gaussians: 1, layers: 1, ..Header::default() };
+    let codes = [4.0, 4.0, 1.0, 0.0, 1.0, 0.5, 0.5].map(f32::to_bits);
+    let (layer, end) = (chunk(b"L", &packed(&entries, &codes)), chunk(b"E", &[]));
+    let after = |first: Vec<u8>| [first, layer.clone(), end.clone()];
+    decode(&of_chunks(&after(sound.chunk(&quantizers(&entries)))))
+        .1
+        .expect("sound until it is changed");
+
+    let changes: [Change<'_, Header>; 16] = [
+        (&|h| h.reserved = 1, "unsupported: format 177"),
+        (&|h| h.form = 3, "unsupported: parameterization 3"),
+        (&|h| (h.coding, h.form) = (ENTROPY, 2), "unsupported: form of steps 2"),
+        (&|h| (h.coding, h.form) = (ENTROPY, 3), "unsupported: form of steps 3"),
+        (&|h| h.width = 0, "the width is zero"),
+        (&|h| h.height = 0, "the height is zero"),
+        (&|h| h.width = (1 << 20) + 1, "the width is over 2^20"),
+        (&|h| h.height = u32::MAX, "the height is over 2^20"),
+        (&|h| h.layers = 0, "Gaussians, but no layer"),
+        (&|h| h.layers = 2, "more layers than Gaussians"),
+        (&|h| (h.gaussians, h.layers) = (1 << 16, 1 << 16), "more than 65535 layers"),
+        (&|h| (h.kernel, h.cutoff) = (0, 0.0), "a cut-off that is not in (0, 64]"),
+        (&|h| (h.kernel, h.cutoff) = (0, -1.0), "a cut-off that is not in (0, 64]"),
+        (&|h| (h.kernel, h.cutoff) = (0, 64.5), "a cut-off that is not in (0, 64]"),
+        (&|h| (h.kernel, h.cutoff) = (0, f32::NAN), "a cut-off that is not in (0, 64]"),
+        (&|h| h.color = RGB, "is shorter than its fields"),
     ];
     for (change, expected) in changes {
-        let error = refused(&after(header(change)));
-        assert!(error.contains(expected), "{error:?} instead of {expected:?}");
+        let mut header = sound;
+        change(&mut header);
+        let expected = format!("chunk H (header): {expected}");
+        check_refused(&after(header.chunk(&quantizers(&entries))), &expected);
     }
 
-    let entry = |change: &dyn Fn(&mut Entry)| {
+    let changes: [Change<'_, Entry>; 12] = [
+        (&|e| e.kind = 3, "unsupported: quantizer 3"),
+        (&|e| e.bits = 0, "a bit depth that is not 1 to 16"),
+        (&|e| e.bits = 17, "a bit depth that is not 1 to 16"),
+        (&|e| e.scale = 0.0, "a scale that is not positive"),
+        (&|e| e.scale = -1.0, "a scale that is not positive"),
+        (&|e| e.scale = f32::NAN, "a scale that is not positive"),
+        (&|e| e.scale = f32::INFINITY, "a scale that is not positive"),
+        (&|e| e.scale = 4_294_967_296.0_f32.next_up(), "a scale that is not positive"),
+        (&|e| e.offset = f32::NAN, "an offset that is not within"),
+        (&|e| e.offset = -f32::INFINITY, "an offset that is not within"),
+        (&|e| e.offset = -5e9, "an offset that is not within"),
+        (&|e| e.kind = 0, "a float that is not 32 bits deep"),
+    ];
+    for (change, expected) in changes {
         let mut entries = entries.clone();
         entries[3] = Entry::linear(8, 1.0, 0.0);
         change(&mut entries[3]);
-        chunk(b"QNTZ", &qntz(&entries))
-    };
-    let changes: [Change<'_, Entry>; 14] = [
-        (&|e| e.kind = 3, "QNTZ: unsupported: kind 3"),
-        (&|e| e.reserved[0] = 1, "QNTZ: a reserved byte is not zero"),
-        (&|e| e.bits = 0, "QNTZ: a bit depth that is not 1 to 16"),
-        (&|e| e.bits = 17, "QNTZ: a bit depth that is not 1 to 16"),
-        (&|e| e.scale = 0.0, "QNTZ: a scale that is not positive"),
-        (&|e| e.scale = -1.0, "QNTZ: a scale that is not positive"),
-        (&|e| e.scale = f32::NAN, "QNTZ: a scale that is not positive"),
-        (&|e| e.scale = f32::INFINITY, "QNTZ: a scale that is not positive"),
-        (&|e| e.scale = 4_294_967_296.0_f32.next_up(), "QNTZ: a scale that is not positive"),
-        (&|e| e.offset = f32::NAN, "QNTZ: an offset that is not within"),
-        (&|e| e.offset = -f32::INFINITY, "QNTZ: an offset that is not within"),
-        (&|e| e.offset = -5e9, "QNTZ: an offset that is not within"),
-        (&|e| e.kind = 0, "QNTZ: a float that is not 32 bits deep"),
-        (
-            &|e| *e = Entry { offset: 1.0, ..Entry::FLOAT },
-            "QNTZ: a float whose scale and offset are not 1 and 0",
-        ),
-    ];
-    for (change, expected) in changes {
-        let error = refused(&[sound.clone(), entry(change), layer.clone(), end.clone()]);
-        assert!(error.contains(expected), "{error:?} instead of {expected:?}");
+        let expected = format!("chunk H (header): {expected}");
+        check_refused(&after(sound.chunk(&quantizers(&entries))), &expected);
     }
 
-    let (s, q, l, e) = (&sound, &quantizers, &layer, &end);
-    let other = |kind: &[u8; 4], payload: &[u8]| chunk(kind, payload);
-    let mut short = gaus(&entries, &codes);
-    short.pop();
-    let mut none = gaus(&entries, &codes);
-    none[0] = 0;
-    let mut two = gaus(&entries, &codes);
-    two[0] = 2;
+    // The fields: 16 x 16, one Gaussian in one layer, black.
+    let fields = |width: &[u8], rest: &[u8]| {
+        [&[sound.format()], width, &[16, 1, 1, 0, 0], &quantizers(&entries), rest].concat()
+    };
+    let whole = fields(&[16], &[]);
+    assert_eq!(chunk(b"H", &whole), sound.chunk(&quantizers(&entries)));
+    for (payload, expected) in [
+        (whole[..whole.len() - 1].to_vec(), "is shorter than its fields"),
+        (whole[..4].to_vec(), "is shorter than its fields"),
+        (Vec::new(), "is shorter than its fields"),
+        (fields(&[16], &[0]), "is longer than its fields"),
+        (fields(&[16], &[0; 255 - 21]), "is longer than its fields"),
+        (fields(&[16], &[0; 256 - 21]), "is too long"),
+        (fields(&[0x90, 0], &[]), "a number with more bytes than it needs"),
+        (fields(&[0x90, 0x80, 0x80, 0x80, 0], &[]), "a number with more bytes than it needs"),
+        (fields(&[0x90, 0x80, 0x80, 0x80, 0x10], &[]), "a number of more than 32 bits"),
+        (fields(&[0x90, 0x80, 0x80, 0x80, 0x80, 0], &[]), "a number of more than 32 bits"),
+        (fields(&[0x90, 0x80, 0x80, 0x80, 0x0F], &[]), "the width is over 2^20"),
+    ] {
+        let expected = format!("chunk H (header): {expected}");
+        check_refused(&after(chunk(b"H", &payload)), &expected);
+    }
+    // Without Gaussians there are no quantizers, and neither are there layers.
+    let empty = Header { gaussians: 0, layers: 0, ..sound };
+    decode_valid(&of_chunks(&[chunk(b"H", &empty.fields()), end.clone()]));
+    let with_quantizers = chunk(b"H", &[&empty.fields()[..], &quantizers(&entries)].concat());
+    check_refused(&after(with_quantizers), "chunk H (header): is longer than its fields");
+    check_refused(&after(chunk(b"H", &empty.fields())), "chunk L (layer): more layers than");
+}
+
+#[test]
+fn errors_name_the_chunk_and_the_rule() {
+    let entries = vec![Entry::FLOAT; 7];
+    let of = |gaussians: u32, layers: u32, entries: &[Entry]| {
+        let header = Header { color: GRAY_ALPHA, gaussians, layers, ..Header::default() };
+        header.chunk(&quantizers(entries))
+    };
+    let codes = [4.0, 4.0, 1.0, 0.0, 1.0, 0.5, 0.5].map(f32::to_bits);
+    let gaussian = packed(&entries, &codes);
+    let other = |kind: &[u8], payload: &[u8]| chunk(kind, payload);
+    let layer = |count: &[u8], bytes: &[u8]| chunk(b"L", &[count, bytes].concat());
+    let (s, l, e) = (of(1, 1, &entries), layer(&[], &gaussian), chunk(b"E", &[]));
+    let (s, l, e) = (&s, &l, &e);
+    let (two, first) = (of(4, 2, &entries), layer(&[1], &gaussian));
+    let (two, first) = (&two, &first);
+    let threes = layer(&[], &gaussian.repeat(3));
+    decode(&of_chunks(&[two.clone(), first.clone(), threes, e.clone()])).1.expect("it is sound");
     let nan = codes.map(|code| if code == 0 { f32::NAN.to_bits() } else { code });
     let infinite = codes.map(|code| if code == 0 { f32::INFINITY.to_bits() } else { code });
     let odd = vec![Entry::linear(1, 1.0, 0.0); 7];
-    let odd_codes = chunk(b"QNTZ", &qntz(&odd));
-    let mut padded = gaus(&odd, &[1; 7]);
-    padded[4] |= 0x80;
+    let mut padded = packed(&odd, &[1; 7]);
+    padded[0] |= 0x80;
     let sequences: Vec<(Vec<Vec<u8>>, &str)> = vec![
-        (vec![q.clone()], "QNTZ: stands before the header"),
+        (vec![l.clone()], "L (layer): stands before the header"),
+        (vec![e.clone()], "E (end): stands before the header"),
+        (vec![other(b"A", &[])], "A: stands before the header"),
         (vec![other(b"abCd", &[])], "abCd: stands before the header"),
-        (vec![s.clone(), s.clone()], "GHDR: appears twice"),
-        (vec![s.clone(), q.clone(), q.clone()], "QNTZ: appears twice"),
-        (vec![s.clone(), l.clone()], "GAUS: stands before QNTZ"),
-        (vec![s.clone(), q.clone(), l.clone(), l.clone()], "GAUS: more layers than"),
-        (vec![s.clone(), q.clone(), e.clone()], "GEND: fewer layers or Gaussians"),
-        (vec![s.clone(), e.clone()], "GEND: fewer layers or Gaussians"),
-        (vec![s.clone(), q.clone(), l.clone(), other(b"GEND", &[0])], "GEND: is not empty"),
-        (vec![s.clone(), other(b"ABCD", &[])], "ABCD: unsupported: critical chunk"),
-        (vec![s.clone(), other(b"ab1d", &[])], "ab1d: the type is not four letters"),
-        (vec![s.clone(), other(b"a\xFF\0d", &[])], "the type is not four letters"),
-        (vec![other(b"GHDR", &[1; 35])], "GHDR: the length is not 36 bytes"),
-        (vec![other(b"GHDR", &[1; 37])], "GHDR: the length is not 36 bytes"),
-        (vec![other(b"GHDR", &[])], "GHDR: the length is not 36 bytes"),
-        (vec![other(b"GHDR", &[2; 108])], "GHDR: unsupported: version 2"),
-        (vec![other(b"GHDR", &[1; 109])], "GHDR: is too long"),
-        (vec![s.clone(), other(b"QNTZ", &[0; 83])], "QNTZ: the length is not 12 bytes"),
-        (vec![s.clone(), other(b"QNTZ", &[0; 96])], "QNTZ: the length is not 12 bytes"),
-        (vec![s.clone(), q.clone(), other(b"GAUS", &[])], "GAUS: too short"),
-        (vec![s.clone(), q.clone(), other(b"GAUS", &[1, 0, 0])], "GAUS: too short"),
-        (vec![s.clone(), q.clone(), other(b"GAUS", &short)], "GAUS: the length does not match"),
-        (vec![s.clone(), q.clone(), other(b"GAUS", &none)], "GAUS: no Gaussians"),
-        (vec![s.clone(), q.clone(), other(b"GAUS", &two)], "GAUS: more Gaussians than"),
+        (vec![s.clone(), s.clone()], "H (header): appears twice"),
+        (vec![s.clone(), l.clone(), s.clone()], "H (header): appears twice"),
+        (vec![s.clone(), l.clone(), l.clone()], "L (layer): more layers than"),
+        (vec![s.clone(), e.clone()], "E (end): fewer layers than"),
+        (vec![two.clone(), first.clone(), e.clone()], "E (end): fewer layers than"),
+        (vec![s.clone(), l.clone(), other(b"E", &[0])], "E (end): is not empty"),
+        (vec![s.clone(), other(b"A", &[])], "A: unsupported: critical chunk"),
+        (vec![s.clone(), l.clone(), other(b"Z", &[])], "Z: unsupported: critical chunk"),
+        (vec![s.clone(), other(b"ab1d", &[])], "ab1d: the type is not of letters"),
+        (vec![s.clone(), other(b"a\xFF\0d", &[])], "a\\xff\\x00d: the type is not of letters"),
+        (vec![s.clone(), other(b"1", &[])], "1: the type is not of letters"),
+        (vec![s.clone(), other(b"@", &[])], "@: the type is not of letters"),
+        (vec![s.clone(), other(b"[", &[])], "[: the type is not of letters"),
+        (vec![s.clone(), other(b"`", &[])], "`: the type is not of letters"),
+        (vec![s.clone(), other(b"{", &[])], "{: the type is not of letters"),
+        (vec![s.clone(), other(b"\xFF", &[])], "\\xff: the type is not of letters"),
+        // The last layer has the rest of the Gaussians.
+        (vec![s.clone(), layer(&[], &[])], "L (layer): too short for its number"),
+        (vec![s.clone(), layer(&[], &gaussian[1..])], "L (layer): the length does not match"),
+        (vec![s.clone(), layer(&[1], &gaussian)], "L (layer): the length does not match"),
         (
-            vec![s.clone(), q.clone(), other(b"GAUS", &gaus(&entries, &nan))],
-            "GAUS: an attribute that is not finite",
+            vec![two.clone(), first.clone(), layer(&[], &gaussian.repeat(2))],
+            "L (layer): the length does not match",
         ),
         (
-            vec![s.clone(), q.clone(), other(b"GAUS", &gaus(&entries, &infinite))],
-            "GAUS: an attribute that is not finite",
+            vec![two.clone(), first.clone(), layer(&[], &gaussian.repeat(4))],
+            "L (layer): the length does not match",
         ),
-        (vec![s.clone(), odd_codes, other(b"GAUS", &padded)], "GAUS: a padding bit is not zero"),
+        // The others begin with their number.
+        (vec![two.clone(), layer(&[], &[])], "L (layer): too short for its number"),
+        (vec![two.clone(), layer(&[0x81], &[])], "L (layer): too short for its number"),
+        (vec![two.clone(), layer(&[0], &[])], "L (layer): no Gaussians"),
+        (vec![two.clone(), layer(&[0], &gaussian)], "L (layer): no Gaussians"),
+        (
+            vec![two.clone(), layer(&[4], &gaussian.repeat(4))],
+            "L (layer): more Gaussians than the header declares",
+        ),
+        (
+            vec![two.clone(), layer(&[0xFF, 0xFF, 0xFF, 0xFF, 0x0F], &gaussian)],
+            "L (layer): more Gaussians than the header declares",
+        ),
+        (
+            vec![two.clone(), layer(&[0x81, 0], &gaussian)],
+            "L (layer): a number with more bytes than it needs",
+        ),
+        (
+            vec![two.clone(), layer(&[0x81, 0x80, 0x80, 0x80, 0x10], &gaussian)],
+            "L (layer): a number of more than 32 bits",
+        ),
+        (vec![two.clone(), layer(&[2], &gaussian)], "L (layer): the length does not match"),
+        (vec![two.clone(), layer(&[1], &gaussian[1..])], "L (layer): the length does not match"),
+        (
+            vec![two.clone(), layer(&[1], &[&gaussian[..], &[0]].concat())],
+            "L (layer): the length does not match",
+        ),
+        (
+            vec![s.clone(), layer(&[], &packed(&entries, &nan))],
+            "L (layer): an attribute that is not finite",
+        ),
+        (
+            vec![s.clone(), layer(&[], &packed(&entries, &infinite))],
+            "L (layer): an attribute that is not finite",
+        ),
+        (vec![of(1, 1, &odd), layer(&[], &padded)], "L (layer): a padding bit is not zero"),
         (vec![s.clone(), other(b"iCCP", &[]), other(b"iCCP", &[])], "iCCP: appears twice"),
+        (
+            vec![s.clone(), other(b"xMPd", &[]), l.clone(), other(b"xMPd", &[])],
+            "xMPd: appears twice",
+        ),
         (vec![s.clone(), other(b"tEXt", b"x")], "tEXt: no NUL after the keyword"),
         (vec![s.clone(), other(b"tEXt", b"\0x")], "tEXt: the keyword is not 1 to 79"),
         (vec![s.clone(), other(b"tEXt", &[b'x'; 80])], "tEXt: no NUL"),
@@ -812,12 +1137,33 @@ fn errors_name_the_chunk_and_the_rule() {
         (vec![s.clone(), other(b"tEXt", b"x\0y\0")], "tEXt: a NUL in the text"),
     ];
     for (chunks, expected) in sequences {
-        let error = refused(&chunks);
-        assert!(error.contains(expected), "{error:?} instead of {expected:?}");
+        check_refused(&chunks, &format!("chunk {expected}"));
     }
-    let mut long = sound;
-    long[3] = 0x80;
-    assert!(refused(&[long]).contains("GHDR: the length is over 2^31 - 1"));
     let foreign = decode(b"\x89PNG\r\n\x1A\n").1.expect_err("another format");
     assert!(matches!(foreign, DecodeError::Signature));
+}
+
+#[test]
+fn chunks_of_unknown_ancillary_types_are_skipped_wherever_they_stand() {
+    let file = sample();
+    let expected = decode_valid(&file.bytes());
+    let count = file.chunks().len();
+    // Private and public, safe and unsafe to copy, with the reserved bit.
+    for kind in [b"prVt", b"aBCD", b"aBCd", b"abcd", b"aBcD", b"zZZZ"] {
+        for at in 1..count {
+            let mut chunks = file.chunks();
+            chunks.insert(at, chunk(kind, b"whatever"));
+            let bytes = of_chunks(&chunks);
+            let (decoder, result) = decode_pieces(bytes.chunks(1), Limits::default());
+            result.expect("it is skipped");
+            assert_eq!(bits(decoder.gaussians()), bits(expected.gaussians()));
+            assert_eq!(decoder.metadata(), expected.metadata());
+            // Its CRC must be right all the same.
+            let end = offsets(&chunks)[at + 1];
+            let mut damaged = bytes.clone();
+            damaged[end - 6] ^= 1;
+            let error = decode(&damaged).1.expect_err("damaged").to_string();
+            assert!(error.contains("the CRC does not match"), "{error}");
+        }
+    }
 }

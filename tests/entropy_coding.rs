@@ -5,7 +5,11 @@ mod common;
 
 use common::entropy::{self, Code, Grid};
 use common::rans::{self, Op};
-use common::{File, Ghdr, Random, bits, cases, chunk, decode_pieces, of_chunks, steps};
+use common::steps::{self, at_most};
+use common::{
+    ENTROPY, File, Header, Random, bits, cases, chunk, decode_pieces, number, of_chunks,
+    read_number,
+};
 use image_gip::{ChunkType, DecodeError, Limits, StreamDecoder};
 use proptest::prelude::*;
 
@@ -15,14 +19,14 @@ fn decode(bytes: &[u8]) -> (StreamDecoder, Result<(), DecodeError>) {
 }
 
 /// A number whose magnitude has up to `bits` bits, each length as likely.
-fn number(random: &mut Random, bits: u64) -> i32 {
+fn integer(random: &mut Random, bits: u64) -> i32 {
     let length = random.next() % (bits + 1);
     let magnitude = (random.next() & ((1 << length) - 1)) as i32;
     if random.next() & 1 == 1 { -magnitude } else { magnitude }
 }
 
 /// Codes of all exponents, mostly small, some beyond the symbols, anywhere in the grid.
-fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
+fn code(random: &mut Random, header: &Header, spread: u32) -> Code {
     let grid = Grid::new(header.sides());
     let exponent = (random.next() % 8) as u32;
     let long = if random.next().is_multiple_of(8) { 15 } else { 5 };
@@ -33,28 +37,41 @@ fn code(random: &mut Random, header: &Ghdr, spread: u32) -> Code {
     });
     Code {
         exponent,
-        axes: (0..header.channels()).map(|_| number(random, long)).collect(),
-        size: number(random, long),
-        ratio: number(random, long),
-        slant: number(random, long),
+        axes: (0..header.channels()).map(|_| integer(random, long)).collect(),
+        size: integer(random, long),
+        ratio: integer(random, long),
+        slant: integer(random, long),
         center,
     }
+}
+
+/// Steps of every size that a header can state, most of them as small as an encoder's.
+fn random_steps(random: &mut Random, channels: usize) -> Vec<f32> {
+    let [least, most] = [steps::LEAST, steps::MOST].map(steps::step);
+    let is_wild = random.next().is_multiple_of(4);
+    let mut step = |low: f32| {
+        let (low, high) = if is_wild { (least, most) } else { (low, low * 64.0) };
+        at_most(random.decades(low, high).clamp(least, most))
+    };
+    let first = step(0.01);
+    let mut steps = [0.1, 0.05, 0.05, 0.05].map(&mut step).to_vec();
+    if random.next().is_multiple_of(3) {
+        steps = steps::usual_geometry().to_vec();
+    }
+    steps.push(first);
+    steps.extend((1..channels).map(|_| {
+        let step = first * steps::ratio(random.next() as u8);
+        if (least..=most).contains(&step) { step } else { first }
+    }));
+    steps
 }
 
 fn random_file(seed: u64) -> File {
     let mut random = Random(seed);
     let mut side = || random.decades(1.0, if seed.is_multiple_of(4) { 1_048_576.0 } else { 200.0 });
-    let header = Ghdr { width: side() as u32, height: side() as u32, ..Ghdr::default() };
-    let header = Ghdr { color: (random.next() % 4) as u8, ..header };
-    let small = |step: f32| (step, step * 64.0);
-    let extreme = (2_f32.powi(-20), 2_f32.powi(10));
-    let ranges = [small(0.1), small(0.05), small(0.05), small(0.05)];
-    let of_axis = small(0.01);
-    let range = ranges.into_iter().chain([of_axis; 4]).take(4 + header.channels());
-    let wild = random.next().is_multiple_of(4);
-    let range = range.map(|range| if wild { extreme } else { range });
-    let steps = range.map(|(low, high)| random.decades(low, high).clamp(extreme.0, extreme.1));
-    let steps: Vec<f32> = steps.collect();
+    let header = Header { width: side() as u32, height: side() as u32, ..Header::default() };
+    let header = Header { color: (random.next() % 4) as u8, ..header };
+    let steps = random_steps(&mut random, header.channels());
     let layers = (0..1 + random.next() % 3).map(|_| {
         let most = if random.next().is_multiple_of(8) { 600 } else { 20 };
         let spread = if random.next().is_multiple_of(3) { 200 } else { u32::MAX };
@@ -75,42 +92,67 @@ fn oracle_bits(values: &[Vec<f32>]) -> Vec<[u32; 9]> {
     values.iter().map(bits).collect()
 }
 
-/// An entropy-coded file with this payload of its only layer.
-fn with_payload(header: &Ghdr, steps_of_file: &[f32], payload: &[u8]) -> Vec<u8> {
-    of_chunks(&[
-        chunk(b"GHDR", &header.payload()),
-        chunk(b"QNTZ", &steps(steps_of_file)),
-        chunk(b"GAUS", payload),
-        chunk(b"GEND", &[]),
-    ])
+/// Checks that crate and oracle make the same of the bytes of a layer, whether it is sound or not: where it is the last
+/// one, and where it begins with its number.
+#[track_caller]
+fn compare(header: &Header, steps: &[f32], count: u32, bytes: &[u8]) {
+    let expected = entropy::read(header.sides(), steps, count, bytes);
+    let last = crate_reads(header, steps, [count, 1], bytes);
+    check(&expected, &last);
+    let counted = [&number(count)[..], bytes].concat();
+    let another = crate_reads(header, steps, [count + 1, 2], &counted);
+    check(&expected, &another);
 }
 
-/// Checks that crate and oracle make the same of one layer, whether it is sound or not.
+/// Checks the same of the payload of a layer that begins with its number of Gaussians, at most this.
 #[track_caller]
-fn compare(header: &Ghdr, steps: &[f32], payload: &[u8]) {
-    let count = payload.first_chunk().map_or(1, |count| u32::from_le_bytes(*count));
-    let header = Ghdr { coding: 1, gaussians: count.max(1), layers: 1, ..*header };
-    let (decoder, result) = decode(&with_payload(&header, steps, payload));
-    match (entropy::read(header.sides(), steps, payload), result) {
-        (Ok(layer), Ok(())) => {
-            assert_eq!(oracle_bits(&layer.values), bits(decoder.gaussians()));
-        }
-        (Err(_), Err(DecodeError::Malformed { chunk: ChunkType::GAUS, .. })) => {}
-        (oracle, result) => panic!("the oracle: {:?}; the crate: {result:?}", oracle.map(|_| ())),
+fn compare_counted(header: &Header, steps: &[f32], most: u32, payload: &[u8]) {
+    let expected = match read_number(payload) {
+        None => Err("no number"),
+        Some((count, _)) if count == 0 || count > most => Err("a wrong number"),
+        Some((count, bytes)) => entropy::read(header.sides(), steps, count, bytes),
+    };
+    check(&expected, &crate_reads(header, steps, [most + 1, 2], payload));
+}
+
+/// What the crate finds in the first layer of a file that declares this many Gaussians and layers, of which it has just
+/// this one; `None` if the layer is malformed.
+fn crate_reads(
+    header: &Header,
+    steps: &[f32],
+    [gaussians, layers]: [u32; 2],
+    payload: &[u8],
+) -> Option<Vec<[u32; 9]>> {
+    let form = u8::from(!steps::has_usual_geometry(steps));
+    let header = Header { coding: ENTROPY, form, gaussians, layers, ..*header };
+    let chunks = [header.chunk(&steps::bytes(steps)), chunk(b"L", payload), chunk(b"E", &[])];
+    let (decoder, result) = decode(&of_chunks(&chunks));
+    match result {
+        Err(DecodeError::Malformed { chunk: ChunkType::LAYER, .. }) => return None,
+        Err(DecodeError::Malformed { chunk: ChunkType::END, .. }) if layers == 2 => {}
+        result => result.expect("the rest is sound"),
+    }
+    Some(bits(decoder.gaussians()))
+}
+
+#[track_caller]
+fn check(expected: &Result<entropy::Layer, rans::Flaw>, found: &Option<Vec<[u32; 9]>>) {
+    let expected = expected.as_ref().map(|layer| oracle_bits(&layer.values));
+    match (expected, found) {
+        (Ok(expected), Some(found)) => assert_eq!(*found, expected),
+        (Err(_), None) => {}
+        (Ok(_), None) => panic!("only the oracle reads it"),
+        (Err(flaw), Some(_)) => panic!("only the crate reads it: {flaw}"),
     }
 }
 
 /// The first layer of a random file: its header, steps, number of Gaussians, symbols and bits.
-fn layer(seed: u64) -> (Ghdr, Vec<f32>, u32, Vec<Op>) {
+fn layer(seed: u64) -> (Header, Vec<f32>, u32, Vec<Op>) {
     let file = random_file(seed);
     let coded = file.entropy_coded.expect("entropy-coded");
     let mut codes = coded.layers[0].clone();
     let ops = entropy::write(file.header.sides(), &coded.steps, &mut codes);
     (file.header, coded.steps, codes.len() as u32, ops)
-}
-
-fn payload(count: u32, ops: &[Op]) -> Vec<u8> {
-    [&count.to_le_bytes()[..], &rans::encode(ops)].concat()
 }
 
 proptest! {
@@ -123,9 +165,9 @@ proptest! {
         for layer in &coded.layers {
             let mut codes = layer.clone();
             let ops = entropy::write(file.header.sides(), &coded.steps, &mut codes);
-            let count = (codes.len() as u32).to_le_bytes();
-            let payload = [&count[..], &rans::encode(&ops)].concat();
-            let layer = entropy::read(file.header.sides(), &coded.steps, &payload);
+            let count = codes.len() as u32;
+            let layer =
+                entropy::read(file.header.sides(), &coded.steps, count, &rans::encode(&ops));
             let layer = layer.expect("what the oracle wrote");
             prop_assert_eq!(layer.ops, ops);
             prop_assert_eq!(layer.codes, codes);
@@ -143,22 +185,35 @@ proptest! {
         count in 1_u32..100,
         bytes in prop::collection::vec(any::<u8>(), 0..100),
     ) {
-        let header = Ghdr { color, width: sides.0, height: sides.1, ..Ghdr::default() };
-        let steps = vec![0.1; 4 + header.channels()];
-        compare(&header, &steps, &[&count.to_le_bytes()[..], &bytes].concat());
+        let header = Header { color, width: sides.0, height: sides.1, ..Header::default() };
+        let steps = vec![0.125; 4 + header.channels()];
+        compare(&header, &steps, count, &bytes);
     }
 
     #[test]
-    fn damaged_layers_are_judged_alike(seed: u64, at: usize, change in 1_u8.., shorter: bool) {
+    fn damaged_layers_are_judged_alike(
+        seed: u64,
+        at: usize,
+        change in 1_u8..,
+        shorter: bool,
+        counted: bool,
+    ) {
         let (header, steps, count, ops) = layer(seed);
-        let mut payload = payload(count, &ops);
+        let bytes = rans::encode(&ops);
+        // The last layer, or one that begins with its number.
+        let prefix = if counted { number(count) } else { Vec::new() };
+        let mut payload = [prefix, bytes].concat();
         let at = at % payload.len();
         if shorter {
             payload.truncate(at);
         } else {
             payload[at] ^= change;
         }
-        compare(&header, &steps, &payload);
+        if counted {
+            compare_counted(&header, &steps, count, &payload);
+        } else {
+            compare(&header, &steps, count, &payload);
+        }
     }
 
     /// The bytes are sound for some symbols, but not for those that the tree asks for.
@@ -170,6 +225,6 @@ proptest! {
             Op::Symbol { symbol, .. } => *symbol = other,
             Op::Bits { count, value } => *value = other & ((1 << *count) - 1),
         }
-        compare(&header, &steps, &payload(count, &ops));
+        compare(&header, &steps, count, &rans::encode(&ops));
     }
 }

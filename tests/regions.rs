@@ -9,7 +9,7 @@ use common::layered::{
     BEFORE, IN_A_LAYER, LAYERS, SIZE, chunks, damaged, decoded, regions, showing,
 };
 use common::texture::Texture;
-use common::{Random, bits, chunk, decode, decode_valid, of_chunks};
+use common::{Random, bits, chunk, decode, decode_valid, of_chunks, payload};
 use image_gip::{DecodeError, Decoder, Region, RenderOptions};
 
 fn rendered(file: &[u8], options: &RenderOptions) -> Result<Vec<u8>, DecodeError> {
@@ -178,7 +178,7 @@ fn the_picture_after_a_region_says_what_the_region_left_out() {
 #[test]
 fn wrong_bounds_are_refused() {
     let sound = chunks();
-    let entries = &sound[BEFORE - 1][8..][..4 * LAYERS];
+    let entries = payload(&sound[BEFORE - 1]);
     let mut reversed = entries.to_vec();
     (reversed[4], reversed[6]) = (9, 8);
     let cases: [(&[u8], &str); 4] = [
@@ -197,8 +197,9 @@ fn wrong_bounds_are_refused() {
     twice.insert(BEFORE, sound[BEFORE - 1].clone());
     let error = decode(&of_chunks(&twice)).1.expect_err("it is malformed").to_string();
     assert!(error.contains("bNDS") && error.contains("appears twice"), "{error}");
-    // Behind the first layer it says nothing, whatever it says.
+    // So it is behind the layers.
     let mut late = sound.clone();
-    late.insert(BEFORE + 1, chunk(b"bNDS", &[1]));
-    decode_valid(&of_chunks(&late));
+    late.insert(BEFORE + LAYERS, sound[BEFORE - 1].clone());
+    let error = decode(&of_chunks(&late)).1.expect_err("it is malformed").to_string();
+    assert!(error.contains("bNDS") && error.contains("appears twice"), "{error}");
 }

@@ -6,7 +6,7 @@ mod common;
 use common::oracle::{self, Request};
 use common::scenes::{PAPER, SMOOTH, WIDE, assert_matches_oracle, planes, random_rows, scene};
 use common::{
-    CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA,
+    CHOLESKY, COVARIANCE, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Header, RGB, RGBA,
     ROTATION_SCALE, Random, cases, decode_valid,
 };
 use image_gip::{ColorModel, DecodeError, Region, RenderOptions, RequestError, Threads};
@@ -151,7 +151,7 @@ fn pictures_of_any_size_match_the_oracle() {
 #[test]
 fn no_gaussian_leaves_the_base_color() {
     let file = scene(RGBA, CHOLESKY, SMOOTH, (33, 9), &[]);
-    let expected = vec![(f32::from(0x7FFF_u16) / 65535.0).to_bits(); 33 * 9 * 4];
+    let expected = vec![(127.0_f32 / 255.0).to_bits(); 33 * 9 * 4];
     assert_eq!(planes(&file, &Request::whole(&file), false, Threads::Pool), expected);
 }
 
@@ -320,7 +320,7 @@ proptest! {
             entries.iter().map(code).collect::<Vec<u32>>()
         };
         let layer: Vec<u32> = (0..15).flat_map(codes).collect();
-        let header = Ghdr { color: RGB, width: 24, height: 18, ..Ghdr::default() };
+        let header = Header { color: RGB, width: 24, height: 18, ..Header::default() };
         let file = File::new(header, entries, vec![layer]);
         assert_matches_oracle(&file, &Request::whole(&file));
     }
@@ -368,7 +368,7 @@ fn samples_round_to_the_nearest_and_clamp() {
     // A constant picture: one Gaussian so wide that it is flat.
     for value in [-3.0_f32, -1e-9, 0.0, 0.25, 0.5 / 255.0, 0.499 / 255.0, 254.6 / 255.0, 1.0, 9.0] {
         let rows = [vec![8.0, 8.0, 1e7, 0.0, 1e7, value]];
-        let header = Ghdr { width: 2, height: 2, ..Ghdr::default() };
+        let header = Header { width: 2, height: 2, ..Header::default() };
         let file = File::of_floats(header, &rows);
         let decoder = decode_valid(&file.bytes());
         let picture = decoder.picture().expect("the header has arrived");

@@ -18,9 +18,10 @@ use std::fs;
 use std::path::Path;
 
 use common::oracle::{self, Request};
-use common::{File, Ghdr, crc32, decode, decode_pieces, of_chunks};
+use common::{File, Header, crc32, decode, decode_pieces, of_chunks};
 use image_gip::{
-    ColorModel, DecodeError, Limits, Region, RenderOptions, SampleDepth, StreamDecoder, Threads,
+    ChunkType, ColorModel, DecodeError, Limits, Region, RenderOptions, SampleDepth, StreamDecoder,
+    Threads,
 };
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/spec/vectors");
@@ -122,10 +123,10 @@ impl Vector {
     }
 }
 
-fn header(color: u8, width: u32, height: u32) -> Ghdr {
+fn header(color: u8, width: u32, height: u32) -> Header {
     let mut base = [0; 4];
     base[..=usize::from(color)].fill(0x8080);
-    Ghdr { color, width, height, base, ..Ghdr::default() }
+    Header { color, width, height, base, ..Header::default() }
 }
 
 /// The CRC-32 of the interleaved samples at the file's depth, 16-bit ones big-endian.
@@ -143,6 +144,11 @@ fn render(decoder: &StreamDecoder, options: &RenderOptions) -> u32 {
     crc32(&bytes)
 }
 
+/// The letters of a type, without what the crate says that they stand for.
+fn letters(chunk: ChunkType) -> String {
+    chunk.to_string().split(' ').next().unwrap_or_default().into()
+}
+
 /// All ways to decode the file; they must agree. The lines of the index that belong to it.
 fn lines(vector: &Vector) -> String {
     let Vector { name, shows, bytes, file, requests } = vector;
@@ -157,9 +163,11 @@ fn lines(vector: &Vector) -> String {
         assert_eq!(by_bytes.gaussians().len(), kept, "{name}");
         let what = match error {
             DecodeError::Signature => "signature".into(),
-            DecodeError::Malformed { chunk, .. } => format!("malformed {chunk}"),
-            DecodeError::Unsupported { chunk, .. } => format!("unsupported {chunk}"),
-            DecodeError::UnexpectedEnd { chunk: Some(chunk) } => format!("unexpected end {chunk}"),
+            DecodeError::Malformed { chunk, .. } => format!("malformed {}", letters(chunk)),
+            DecodeError::Unsupported { chunk, .. } => format!("unsupported {}", letters(chunk)),
+            DecodeError::UnexpectedEnd { chunk: Some(chunk) } => {
+                format!("unexpected end {}", letters(chunk))
+            }
             DecodeError::UnexpectedEnd { chunk: None } => "unexpected end".into(),
             error => panic!("{name}: {error}"),
         };

@@ -6,10 +6,13 @@ mod common;
 use common::entropy::{Code, Grid};
 use common::oracle::{self, Request};
 use common::scenes::{SMOOTH, assert_matches_oracle, planes, random_rows, scene};
+use common::steps::at_most;
 use common::synthesis::{Block, Place, blocks_between_nodes, map_sums, place_in_block};
 use common::texture::{Texture, axes, map_sides};
-use common::{CHOLESKY, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, decode, of_chunks};
-use image_gip::{RenderOptions, Threads};
+use common::{
+    CHOLESKY, File, GRAY, GRAY_ALPHA, Header, RGB, RGBA, Random, chunk, decode, of_chunks, offsets,
+};
+use image_gip::{RenderOptions, StreamDecoder, Threads};
 
 /// The codes of the colour axes of about this much of each sum.
 fn rounded_axes(colors: [f32; 3]) -> [i32; 3] {
@@ -75,7 +78,7 @@ fn random_maps_match_the_oracle_bit_for_bit() {
         let sides = [size.0, size.1];
         let nodes = map_sides(sides).map(|side| side as usize);
         // Strong, of directions between the patterns, and just above what is cut off.
-        for step in [1.0, 0.2, 0.02] {
+        for step in [1.0, at_most(0.2), at_most(0.02)] {
             let count = (nodes[0] * nodes[1]).min(14);
             let file = textured(color, size, &random_map(&mut random, sides, step, count));
             for (width, height) in outputs(size) {
@@ -166,10 +169,13 @@ fn extreme_maps(sides: [u32; 2]) -> Vec<(&'static str, Texture)> {
     vec![
         ("as many Gaussians as nodes", {
             let codes = on_nodes(&|x, y| [9.0 * sign(x, y), 5.0, 6.0 * sign(y, 0)]);
-            Texture { step: 0.3, codes }
+            Texture { step: at_most(0.3), codes }
         }),
         ("as many at one point", {
-            Texture { step: 0.01, codes: nodes().map(|_| at(2.2, 2.9, [5.0, 2.0, 1.0])).collect() }
+            Texture {
+                step: at_most(0.01),
+                codes: nodes().map(|_| at(2.2, 2.9, [5.0, 2.0, 1.0])).collect(),
+            }
         }),
         ("colours at the bound", {
             let codes = on_nodes(&|x, y| [60.0 * sign(x, y), 20.0, 60.0 * sign(x, 0)]);
@@ -307,7 +313,7 @@ fn single_precision_stays_close_to_the_exact_texture() {
     let size = (61, 47);
     let sides = [61, 47];
     let map = random_map(&mut Random(16), sides, 1.0, 20);
-    let header = Ghdr { width: size.0, height: size.1, ..Ghdr::default() };
+    let header = Header { width: size.0, height: size.1, ..Header::default() };
     let file = File::of_floats(header, &[]).with(b"tXTR", &map.payload(sides));
     let sums = map_sums(sides, &map.payload(sides));
     let found = planes(&file, &Request::whole(&file), false, Threads::Pool);
@@ -349,8 +355,7 @@ fn texture_that_has_arrived_is_shown() {
     });
     assert_ne!(textured, plain);
     let (bytes, chunks) = (file.bytes(), file.chunks());
-    let start = of_chunks(&chunks[..2]).len();
-    let end = start + chunks[2].len();
+    let [start, end] = [1, 2].map(|at| offsets(&chunks)[at]);
     let shown = |bytes: &[u8]| {
         let (decoder, result) = decode(bytes);
         let picture = decoder.picture().expect("a header");
@@ -367,20 +372,53 @@ fn texture_that_has_arrived_is_shown() {
         assert!(samples == *expected, "{length}");
     }
     // An error behind it takes nothing away.
-    for wrong in [chunk(b"tXTR", b"?"), chunk(b"ABCD", b""), chunk(b"GAUS", &[0; 4])] {
+    for wrong in [chunk(b"tXTR", b"?"), chunk(b"A", b""), chunk(b"L", &[0; 4])] {
         let mut chunks = chunks.clone();
-        chunks[3] = wrong;
+        chunks[2] = wrong;
         let (samples, error) = shown(&of_chunks(&chunks));
         assert!(samples == textured, "{error}");
     }
 }
 
+#[test]
+fn texture_may_stand_behind_any_layer() {
+    let mut random = Random(17);
+    let size = (40, 30);
+    let rows = random_rows(&mut random, 6, (RGB, CHOLESKY), size);
+    let mut file = scene(RGB, CHOLESKY, SMOOTH, size, &rows);
+    let (entries, codes) = (file.entries, &file.layers[0]);
+    let (first, second) = codes.split_at(2 * entries.len());
+    file = File::new(file.header, entries, vec![first.to_vec(), second.to_vec()]);
+    let bare = file.chunks();
+    file = file.with(b"tXTR", &random_map(&mut random, size.into(), 1.0, 9).payload(size.into()));
+    let samples = |request: &Request| oracle::samples(&oracle::render(&file, request), 8);
+    let shown = |bytes: &[u8]| {
+        let mut decoder = StreamDecoder::new();
+        decoder.feed(bytes).expect("it is sound");
+        let picture = decoder.picture().expect("a header");
+        let mut samples = vec![0; 40 * 30 * 3];
+        picture.render_u8(&RenderOptions::new(), &mut samples).expect("a sound request");
+        samples.into_iter().map(u16::from).collect::<Vec<_>>()
+    };
+    let whole = Request::whole(&file);
+    for (at, prefix) in [(2, 2), (3, 6)] {
+        let mut chunks = bare.clone();
+        chunks.insert(at, file.chunks()[1].clone());
+        assert!(shown(&of_chunks(&chunks)) == samples(&whole));
+        // Until its last byte has arrived, there is none.
+        let bytes = of_chunks(&chunks[..=at]);
+        let plain = samples(&Request { prefix, ..whole.without_texture() });
+        assert!(shown(&bytes[..bytes.len() - 1]) == plain);
+        assert!(shown(&bytes) == samples(&Request { prefix, ..whole }));
+    }
+}
+
 /// The texture of a part of a picture.
 fn part(texture: &Texture, (width, height): (u32, u32), region: (u32, u32, u32, u32)) -> Vec<f32> {
-    let header = Ghdr { width, height, base: [32768, 0, 0, 0], ..Ghdr::default() };
+    let header = Header { width, height, base: [0x8080, 0, 0, 0], ..Header::default() };
     let file = File::of_floats(header, &[]).with(b"tXTR", &texture.payload(header.sides()));
     let request = Request { region, ..Request::whole(&file) };
-    let base = 32768.0 / 65535.0;
+    let base = 128.0 / 255.0;
     let planes = planes(&file, &request, false, Threads::Pool);
     planes.into_iter().map(|bits| f32::from_bits(bits) - base).collect()
 }
@@ -456,7 +494,7 @@ fn assert_sums_are_0(sums: impl Iterator<Item = f32>) {
 fn isotropic_blocks_have_the_sum_0_wherever_their_strength_changes() {
     let (width, height) = (124, 90);
     let mut random = Random(17);
-    let mut islands = random_map(&mut random, [width, height], 0.01, 20);
+    let mut islands = random_map(&mut random, [width, height], at_most(0.01), 20);
     // Of octave 0 alone, without direction.
     for code in &mut islands.codes {
         code.size = -4 << code.exponent.saturating_sub(1);

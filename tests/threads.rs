@@ -3,7 +3,7 @@
 mod common;
 
 use common::entropy::{Code, Grid};
-use common::{File, Ghdr, RGB, Random, bits, chunk, decode, decode_valid, of_chunks};
+use common::{File, Header, RGB, Random, bits, decode, decode_valid, of_chunks, without_last_word};
 use image_gip::{DecodeError, Decoder, Gaussian, RenderOptions, Threads};
 
 /// Numbers of threads, fewer and more than layers, and than this machine has.
@@ -17,7 +17,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 }
 
 fn sample() -> File {
-    let header = Ghdr { color: RGB, width: 200, height: 150, ..Ghdr::default() };
+    let header = Header { color: RGB, width: 200, height: 150, ..Header::default() };
     let grid = Grid::new(header.sides());
     let mut random = Random(21);
     let mut code = |_| {
@@ -28,14 +28,14 @@ fn sample() -> File {
         Code { exponent: 2, axes, size, ratio, slant, center }
     };
     let layers = LAYERS.map(|count| (0..count).map(&mut code).collect()).into();
-    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
+    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.125, 0.125, 0.125], layers)
 }
 
 /// The file with a layer that lacks its last word.
 fn damaged(layer: usize) -> Vec<u8> {
     let mut chunks = sample().chunks();
-    let damaged = &mut chunks[2 + layer];
-    *damaged = chunk(b"GAUS", &damaged[8..damaged.len() - 6]);
+    let damaged = &mut chunks[1 + layer];
+    *damaged = without_last_word(damaged);
     of_chunks(&chunks)
 }
 

@@ -100,7 +100,7 @@ impl Parser {
                     self.enter(State::Type);
                 }
                 State::Type => {
-                    if !self.collect(input, 1) {
+                    if self.collected == 0 && !self.collect(input, 1) {
                         return Ok(Event::NeedMore);
                     }
                     let length = ChunkType::length_from(self.word[0]);

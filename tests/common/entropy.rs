@@ -4,7 +4,7 @@
 use super::exp::exp;
 use super::rans::{Decoder, Encoder, Flaw, Op};
 
-/// The steps of `QNTZ` (section 5.3): position, size, ratio, slant, then the colour axes.
+/// The steps of section 7.5: position, size, ratio, slant, then the colour axes.
 pub(crate) type Steps = [f32];
 
 /// One Gaussian as it is coded.
@@ -257,13 +257,13 @@ pub(crate) struct Layer {
     pub(crate) values: Vec<Vec<f32>>,
 }
 
-/// Reads the payload of a `GAUS`, as if the header left room for any number of Gaussians.
-pub(crate) fn read(sides: [u32; 2], steps: &Steps, payload: &[u8]) -> Result<Layer, Flaw> {
-    let (count, bytes) = payload.split_first_chunk().ok_or("no count")?;
-    let count = u32::from_le_bytes(*count);
-    if count == 0 {
-        return Err("no Gaussians");
-    }
+/// Reads a layer of so many Gaussians.
+pub(crate) fn read(
+    sides: [u32; 2],
+    steps: &Steps,
+    count: u32,
+    bytes: &[u8],
+) -> Result<Layer, Flaw> {
     if u64::from(count) > 4 * bytes.len() as u64 {
         return Err("more than four Gaussians for each byte");
     }

@@ -7,17 +7,17 @@ use image_gip::Region;
 
 use super::entropy::{Code, Grid};
 use super::oracle::{grid, parts};
-use super::{File, Ghdr, RGB, Random, chunk, of_chunks};
+use super::{File, Header, RGB, Random, of_chunks, payload, without_last_word};
 
 pub(crate) const SIZE: (u32, u32) = (300, 200);
 pub(crate) const LAYERS: usize = 24;
 pub(crate) const IN_A_LAYER: usize = 20;
-/// Chunks before the first layer: header, steps, bounds.
-pub(crate) const BEFORE: usize = 3;
+/// Chunks before the first layer: header, bounds.
+pub(crate) const BEFORE: usize = 2;
 
 /// Each layer has a square of 50 x 50 pixels to itself, and shows around it.
 fn sample() -> File {
-    let header = Ghdr { color: RGB, width: SIZE.0, height: SIZE.1, ..Ghdr::default() };
+    let header = Header { color: RGB, width: SIZE.0, height: SIZE.1, ..Header::default() };
     let grid = Grid::new(header.sides());
     let mut random = Random(5);
     let layer = |number: usize| {
@@ -32,7 +32,7 @@ fn sample() -> File {
         (0..IN_A_LAYER).map(&mut code).collect()
     };
     let layers = (0..LAYERS).map(layer).collect();
-    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.1, 0.1, 0.1], layers)
+    File::of_entropy_coded(header, vec![0.5, 0.5, 0.5, 0.5, 0.125, 0.125, 0.125], layers)
 }
 
 /// The chunks of the file.
@@ -51,7 +51,7 @@ pub(crate) fn damaged(layers: &[usize]) -> Vec<u8> {
     let mut chunks = chunks();
     for layer in layers {
         let damaged = &mut chunks[BEFORE + layer];
-        *damaged = chunk(b"GAUS", &damaged[8..damaged.len() - 6]);
+        *damaged = without_last_word(damaged);
     }
     of_chunks(&chunks)
 }
@@ -66,7 +66,7 @@ pub(crate) fn decoded(mut decodes: impl FnMut(&[u8]) -> bool) -> Vec<usize> {
 /// The layers that may show in a region of an output of this size (section 5.6): eight pixels of the
 /// grid beside their bounds, and further where the grid is coarse.
 pub(crate) fn showing(size: (u32, u32), region: Region) -> Vec<usize> {
-    let entries = chunks()[BEFORE - 1][8..][..4 * LAYERS].to_vec();
+    let entries = payload(&chunks()[BEFORE - 1]).to_vec();
     let axis = |side, stored, start, length| {
         let of_grid = grid(stored, side);
         let (first, _) = parts(start, of_grid, side)[0];

@@ -10,6 +10,7 @@ pub(crate) mod memory;
 pub(crate) mod oracle;
 pub(crate) mod rans;
 pub(crate) mod scenes;
+pub(crate) mod steps;
 pub(crate) mod synthesis;
 pub(crate) mod texture;
 
@@ -17,7 +18,28 @@ use entropy::Code;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
 
 /// Section 4.1.
-pub(crate) const SIGNATURE: [u8; 8] = [0xC7, 0x47, 0x49, 0x50, 0x0D, 0x0A, 0x1A, 0x0A];
+pub(crate) const SIGNATURE: [u8; 8] = [0xC7, 0x47, 0x49, 0x50, 0x0D, 0x0A, 0x01, 0x0A];
+
+/// Section 2.
+pub(crate) fn number(value: u32) -> Vec<u8> {
+    let bytes = (0..5).map(|place| (u64::from(value) >> (7 * place) & 0x7F) as u8);
+    let mut bytes: Vec<u8> = bytes.collect();
+    while bytes.len() > 1 && bytes.last() == Some(&0) {
+        bytes.pop();
+    }
+    let last = bytes.len() - 1;
+    bytes[..last].iter_mut().for_each(|byte| *byte |= 0x80);
+    bytes
+}
+
+/// The `number` at the front of these bytes, and what follows it.
+pub(crate) fn read_number(bytes: &[u8]) -> Option<(u32, &[u8])> {
+    let length = bytes.iter().position(|&byte| byte < 0x80)? + 1;
+    let (found, rest) = bytes.split_at(length);
+    let value = found.iter().rev().fold(0, |value, byte| value << 7 | u64::from(byte & 0x7F));
+    let value = u32::try_from(value).ok()?;
+    (found == number(value)).then_some((value, rest))
+}
 
 /// CRC-32 as in PNG, bit by bit.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
@@ -28,38 +50,66 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// One chunk: length, type, payload, CRC (section 4.2).
-pub(crate) fn chunk(kind: &[u8; 4], payload: &[u8]) -> Vec<u8> {
-    let checked = [kind, payload].concat();
-    let length = (payload.len() as u32).to_le_bytes();
-    [&length, checked.as_slice(), &crc32(&checked).to_le_bytes()].concat()
+/// These bytes and their CRC.
+pub(crate) fn checked(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &crc32(bytes).to_le_bytes()].concat()
 }
 
-/// The payload of `GHDR`, field by field (section 5.1), whatever the values.
+/// One chunk: type, length, payload, CRC (section 4.2).
+pub(crate) fn chunk(kind: &[u8], payload: &[u8]) -> Vec<u8> {
+    checked(&[kind, &number(payload.len() as u32), payload].concat())
+}
+
+/// The letters of a chunk's type.
+pub(crate) fn kind(chunk: &[u8]) -> &[u8] {
+    let letters = if chunk[0].is_ascii_lowercase() { 4 } else { 1 };
+    &chunk[..letters]
+}
+
+/// The payload of a chunk.
+pub(crate) fn payload(chunk: &[u8]) -> &[u8] {
+    let (length, rest) = read_number(&chunk[kind(chunk).len()..]).expect("a length");
+    &rest[..length as usize]
+}
+
+/// Where chunks begin and where the last one ends, after the signature.
+pub(crate) fn offsets(chunks: &[Vec<u8>]) -> Vec<usize> {
+    let mut at = SIGNATURE.len();
+    let ends = chunks.iter().map(|chunk| {
+        at += chunk.len();
+        at
+    });
+    [SIGNATURE.len()].into_iter().chain(ends).collect()
+}
+
+/// The fields of the header before the quantizers or steps, whatever the values (section 5.1).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ghdr {
-    pub(crate) version: u8,
+pub(crate) struct Header {
+    /// 0 or 1.
     pub(crate) coding: u8,
     pub(crate) color: u8,
+    /// 8 or 16.
     pub(crate) depth: u8,
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) gaussians: u32,
-    pub(crate) layers: u16,
+    pub(crate) layers: u32,
     pub(crate) kernel: u8,
-    pub(crate) parameterization: u8,
+    /// The parameterization of the packed coding; whether the entropy coding has steps of geometry.
+    pub(crate) form: u8,
+    /// Bit 7 of the format.
+    pub(crate) reserved: u8,
+    /// Of kernel 0.
     pub(crate) cutoff: f32,
-    pub(crate) transform: u8,
-    pub(crate) reserved: [u8; 3],
+    /// In 1/65535, and a multiple of 257 if samples have 8 bits.
     pub(crate) base: [u16; 4],
 }
 
-impl Default for Ghdr {
+impl Default for Header {
     /// Gray, 8 bits, 16x16, no Gaussians, quartic kernel, Cholesky parameterization, black.
     fn default() -> Self {
         Self {
-            version: 1,
-            coding: 0,
+            coding: PACKED,
             color: GRAY,
             depth: 8,
             width: 16,
@@ -67,15 +117,16 @@ impl Default for Ghdr {
             gaussians: 0,
             layers: 0,
             kernel: QUARTIC,
-            parameterization: CHOLESKY,
+            form: CHOLESKY,
+            reserved: 0,
             cutoff: 4.0,
-            transform: 0,
-            reserved: [0; 3],
             base: [0; 4],
         }
     }
 }
 
+pub(crate) const PACKED: u8 = 0;
+pub(crate) const ENTROPY: u8 = 1;
 pub(crate) const GRAY: u8 = 0;
 pub(crate) const GRAY_ALPHA: u8 = 1;
 pub(crate) const RGB: u8 = 2;
@@ -86,19 +137,46 @@ pub(crate) const COVARIANCE: u8 = 0;
 pub(crate) const CHOLESKY: u8 = 1;
 pub(crate) const ROTATION_SCALE: u8 = 2;
 
-impl Ghdr {
-    pub(crate) fn payload(&self) -> Vec<u8> {
-        let mut bytes = vec![self.version, self.coding, self.color, self.depth];
-        bytes.extend(self.width.to_le_bytes());
-        bytes.extend(self.height.to_le_bytes());
-        bytes.extend(self.gaussians.to_le_bytes());
-        bytes.extend(self.layers.to_le_bytes());
-        bytes.extend([self.kernel, self.parameterization]);
-        bytes.extend(self.cutoff.to_le_bytes());
-        bytes.push(self.transform);
-        bytes.extend(self.reserved);
-        bytes.extend(self.base.iter().flat_map(|value| value.to_le_bytes()));
+impl Header {
+    pub(crate) fn format(&self) -> u8 {
+        let depth = u8::from(self.depth == 16);
+        let fields = [self.color, depth, self.coding, self.kernel, self.form, self.reserved];
+        fields.into_iter().zip([0, 2, 3, 4, 5, 7]).map(|(field, bit)| field << bit).sum()
+    }
+
+    /// The fields before the quantizers or steps.
+    pub(crate) fn fields(&self) -> Vec<u8> {
+        let mut bytes = vec![self.format()];
+        for field in [self.width, self.height, self.gaussians] {
+            bytes.extend(number(field));
+        }
+        if self.gaussians > 0 {
+            bytes.extend(number(self.layers));
+        }
+        for base in &self.base[..self.channels()] {
+            match self.depth {
+                8 => {
+                    assert_eq!(base % 257, 0, "a base colour of 8 bits");
+                    bytes.push((base / 257) as u8);
+                }
+                _ => bytes.extend(base.to_le_bytes()),
+            }
+        }
+        if self.kernel == EXPONENTIAL {
+            bytes.extend(self.cutoff.to_le_bytes());
+        }
         bytes
+    }
+
+    /// The chunk, with these quantizers or steps, which a picture without Gaussians does not have.
+    pub(crate) fn chunk(&self, dequantizer: &[u8]) -> Vec<u8> {
+        let dequantizer = if self.gaussians == 0 { &[] } else { dequantizer };
+        chunk(b"H", &[&self.fields(), dequantizer].concat())
+    }
+
+    /// Section 8.
+    pub(crate) fn parameterization(&self) -> u8 {
+        if self.coding == ENTROPY { CHOLESKY } else { self.form }
     }
 
     pub(crate) fn channels(&self) -> usize {
@@ -114,63 +192,60 @@ impl Ghdr {
     }
 }
 
-/// One entry of `QNTZ` (section 6), whatever the values.
+/// One quantizer (section 6), whatever the values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     pub(crate) kind: u8,
     pub(crate) bits: u8,
-    pub(crate) reserved: [u8; 2],
     pub(crate) scale: f32,
     pub(crate) offset: f32,
 }
 
 impl Entry {
-    pub(crate) const FLOAT: Self =
-        Self { kind: 0, bits: 32, reserved: [0; 2], scale: 1.0, offset: 0.0 };
+    pub(crate) const FLOAT: Self = Self { kind: 0, bits: 32, scale: 1.0, offset: 0.0 };
 
     pub(crate) const fn linear(bits: u8, scale: f32, offset: f32) -> Self {
-        Self { kind: 1, bits, reserved: [0; 2], scale, offset }
+        Self { kind: 1, bits, scale, offset }
     }
 
     pub(crate) const fn log(bits: u8, scale: f32, offset: f32) -> Self {
-        Self { kind: 2, bits, reserved: [0; 2], scale, offset }
+        Self { kind: 2, bits, scale, offset }
     }
 
-    fn payload(&self) -> Vec<u8> {
+    fn bytes(&self) -> Vec<u8> {
         let mut bytes = vec![self.kind, self.bits];
-        bytes.extend(self.reserved);
-        bytes.extend(self.scale.to_le_bytes());
-        bytes.extend(self.offset.to_le_bytes());
+        if self.kind != 0 {
+            bytes.extend([self.scale, self.offset].map(f32::to_le_bytes).concat());
+        }
         bytes
     }
 }
 
-/// The payload of `QNTZ`.
-pub(crate) fn qntz(entries: &[Entry]) -> Vec<u8> {
-    entries.iter().flat_map(Entry::payload).collect()
+/// The quantizers in the header.
+pub(crate) fn quantizers(entries: &[Entry]) -> Vec<u8> {
+    entries.iter().flat_map(Entry::bytes).collect()
 }
 
-/// The payload of `GAUS` (section 7.2): one code per component, Gaussian after Gaussian.
-pub(crate) fn gaus(entries: &[Entry], codes: &[u32]) -> Vec<u8> {
+/// The Gaussians of a packed layer (section 7.2): one code per component, Gaussian after Gaussian.
+pub(crate) fn packed(entries: &[Entry], codes: &[u32]) -> Vec<u8> {
     let mut bits = Vec::new();
     for (index, &code) in codes.iter().enumerate() {
         let width = entries[index % entries.len()].bits;
         bits.extend((0..width).map(|bit| code >> bit & 1));
     }
-    let count = (codes.len() / entries.len()) as u32;
-    let packed = bits.chunks(8).map(|byte| {
+    let bytes = bits.chunks(8).map(|byte| {
         byte.iter().enumerate().fold(0, |sum, (place, &bit)| sum | (bit as u8) << place)
     });
-    count.to_le_bytes().into_iter().chain(packed).collect()
+    bytes.collect()
 }
 
 /// A whole file.
 #[derive(Clone, Debug)]
 pub(crate) struct File {
-    pub(crate) header: Ghdr,
+    pub(crate) header: Header,
     pub(crate) entries: Vec<Entry>,
-    /// Chunks between `QNTZ` and the first layer: type and payload.
-    pub(crate) extra: Vec<([u8; 4], Vec<u8>)>,
+    /// Chunks between the header and the first layer: type and payload.
+    pub(crate) extra: Vec<(Vec<u8>, Vec<u8>)>,
     /// Codes of each layer.
     pub(crate) layers: Vec<Vec<u32>>,
     /// What an entropy-coded file has in place of entries and layers.
@@ -184,63 +259,61 @@ pub(crate) struct EntropyCoded {
     pub(crate) layers: Vec<Vec<Code>>,
 }
 
-/// The payload of `QNTZ` of the entropy coding.
-pub(crate) fn steps(steps: &[f32]) -> Vec<u8> {
-    steps.iter().flat_map(|step| step.to_le_bytes()).collect()
-}
-
 impl EntropyCoded {
-    /// The payloads of `GAUS`.
-    fn payloads(&self, header: &Ghdr) -> Vec<Vec<u8>> {
-        let payload = |layer: &Vec<Code>| {
+    /// The number of Gaussians in each layer, and the bytes in which they are coded.
+    fn layers(&self, header: &Header) -> Vec<(u32, Vec<u8>)> {
+        let layer = |layer: &Vec<Code>| {
             let ops = entropy::write(header.sides(), &self.steps, &mut layer.clone());
-            let count = (layer.len() as u32).to_le_bytes();
-            [&count[..], &rans::encode(&ops)].concat()
+            (layer.len() as u32, rans::encode(&ops))
         };
-        self.layers.iter().map(payload).collect()
+        self.layers.iter().map(layer).collect()
     }
 
-    fn components(&self, header: &Ghdr) -> Vec<Vec<f32>> {
-        let values = |payload: Vec<u8>| {
-            let layer = entropy::read(header.sides(), &self.steps, &payload);
+    fn components(&self, header: &Header) -> Vec<Vec<f32>> {
+        let values = |(count, bytes): (u32, Vec<u8>)| {
+            let layer = entropy::read(header.sides(), &self.steps, count, &bytes);
             layer.expect("what was just written").values
         };
-        self.payloads(header).into_iter().flat_map(values).collect()
+        self.layers(header).into_iter().flat_map(values).collect()
     }
 }
 
 impl File {
     /// A file whose attributes are floats: one row of components per Gaussian, in one layer.
-    pub(crate) fn of_floats(header: Ghdr, gaussians: &[Vec<f32>]) -> Self {
+    pub(crate) fn of_floats(header: Header, gaussians: &[Vec<f32>]) -> Self {
         let codes: Vec<u32> = gaussians.iter().flatten().map(|value| value.to_bits()).collect();
         let layers = if codes.is_empty() { vec![] } else { vec![codes] };
         Self::new(header, vec![Entry::FLOAT; header.components()], layers)
     }
 
     /// A file with these layers; the header's counts are set to match.
-    pub(crate) fn new(mut header: Ghdr, entries: Vec<Entry>, layers: Vec<Vec<u32>>) -> Self {
-        header.layers = layers.len() as u16;
+    pub(crate) fn new(mut header: Header, entries: Vec<Entry>, layers: Vec<Vec<u32>>) -> Self {
+        header.layers = layers.len() as u32;
         let codes: usize = layers.iter().map(Vec::len).sum();
         header.gaussians = (codes / entries.len()) as u32;
         Self { header, entries, extra: Vec::new(), layers, entropy_coded: None }
     }
 
-    /// An entropy-coded file with these layers; the header's coding and counts are set to match.
-    pub(crate) fn of_entropy_coded(header: Ghdr, steps: Vec<f32>, layers: Vec<Vec<Code>>) -> Self {
+    /// An entropy-coded file with these layers; the header's coding, form and counts are set to match.
+    pub(crate) fn of_entropy_coded(
+        header: Header,
+        steps: Vec<f32>,
+        layers: Vec<Vec<Code>>,
+    ) -> Self {
         let count: usize = layers.iter().map(Vec::len).sum();
-        let header = Ghdr {
-            coding: 1,
-            parameterization: CHOLESKY,
+        let header = Header {
+            coding: ENTROPY,
+            form: u8::from(!steps::has_usual_geometry(&steps)),
             gaussians: count as u32,
-            layers: layers.len() as u16,
+            layers: layers.len() as u32,
             ..header
         };
         let entropy_coded = Some(EntropyCoded { steps, layers });
         Self { header, entries: Vec::new(), extra: Vec::new(), layers: Vec::new(), entropy_coded }
     }
 
-    pub(crate) fn with(mut self, kind: &[u8; 4], payload: &[u8]) -> Self {
-        self.extra.push((*kind, payload.to_vec()));
+    pub(crate) fn with(mut self, kind: &[u8], payload: &[u8]) -> Self {
+        self.extra.push((kind.to_vec(), payload.to_vec()));
         self
     }
 
@@ -267,21 +340,31 @@ impl File {
         all
     }
 
+    /// What the header says of quantizers or steps.
+    pub(crate) fn dequantizer(&self) -> Vec<u8> {
+        match &self.entropy_coded {
+            None => quantizers(&self.entries),
+            Some(entropy_coded) => steps::bytes(&entropy_coded.steps),
+        }
+    }
+
+    /// The number of Gaussians in each layer, and the bytes in which they are coded.
+    fn coded_layers(&self) -> Vec<(u32, Vec<u8>)> {
+        if let Some(entropy_coded) = &self.entropy_coded {
+            return entropy_coded.layers(&self.header);
+        }
+        let layer = |codes: &Vec<u32>| {
+            ((codes.len() / self.entries.len()) as u32, packed(&self.entries, codes))
+        };
+        self.layers.iter().map(layer).collect()
+    }
+
     /// The chunks in order.
     pub(crate) fn chunks(&self) -> Vec<Vec<u8>> {
-        let (quantizers, layers) = match &self.entropy_coded {
-            None => {
-                let layers = self.layers.iter().map(|codes| gaus(&self.entries, codes));
-                (qntz(&self.entries), layers.collect())
-            }
-            Some(entropy_coded) => {
-                (steps(&entropy_coded.steps), entropy_coded.payloads(&self.header))
-            }
-        };
-        let mut chunks = vec![chunk(b"GHDR", &self.header.payload()), chunk(b"QNTZ", &quantizers)];
+        let mut chunks = vec![self.header.chunk(&self.dequantizer())];
         chunks.extend(self.extra.iter().map(|(kind, payload)| chunk(kind, payload)));
-        chunks.extend(layers.iter().map(|payload| chunk(b"GAUS", payload)));
-        chunks.push(chunk(b"GEND", &[]));
+        chunks.extend(layers(&self.coded_layers()));
+        chunks.push(chunk(b"E", &[]));
         chunks
     }
 
@@ -299,6 +382,23 @@ impl File {
     pub(crate) fn bytes(&self) -> Vec<u8> {
         of_chunks(&self.chunks())
     }
+}
+
+/// The layers of a file, from their numbers of Gaussians and the bytes in which those are coded. All but the last
+/// begin with their number (section 5.4).
+pub(crate) fn layers(coded: &[(u32, Vec<u8>)]) -> Vec<Vec<u8>> {
+    let later = (0..coded.len()).rev();
+    let layer = |((count, bytes), later): (&(u32, Vec<u8>), usize)| {
+        let count = if later > 0 { number(*count) } else { Vec::new() };
+        chunk(b"L", &[&count[..], bytes].concat())
+    };
+    coded.iter().zip(later).map(layer).collect()
+}
+
+/// A layer of the entropy coding without its last word: it is framed well, and malformed inside.
+pub(crate) fn without_last_word(layer: &[u8]) -> Vec<u8> {
+    let payload = payload(layer);
+    chunk(kind(layer), &payload[..payload.len() - 2])
 }
 
 /// Signature and chunks.

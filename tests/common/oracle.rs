@@ -191,7 +191,7 @@ pub(crate) fn sums(file: &File, request: &Request, texture: Option<&[f32]>) -> V
     }
     for values in file.components().into_iter().take(request.prefix) {
         let center = [values[0], values[1]];
-        let stored = cholesky(header.parameterization, [values[2], values[3], values[4]]);
+        let stored = cholesky(header.parameterization(), [values[2], values[3], values[4]]);
         if !is_drawable(center, stored, &values[5..]) {
             continue;
         }

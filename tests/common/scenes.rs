@@ -1,7 +1,7 @@
 //! Random files, and the crate's renderings of them against the oracle's.
 
 use super::oracle::{self, Request};
-use super::{CHOLESKY, COVARIANCE, EXPONENTIAL, File, Ghdr, QUARTIC, Random, decode_valid};
+use super::{CHOLESKY, COVARIANCE, EXPONENTIAL, File, Header, QUARTIC, Random, decode_valid};
 use image_gip::{Region, RenderOptions, Threads};
 
 /// A file of floats with these rows of components.
@@ -13,17 +13,17 @@ pub(crate) fn scene(
     rows: &[Vec<f32>],
 ) -> File {
     let mut base = [0; 4];
-    base[..=usize::from(color)].fill(0x7FFF);
+    base[..=usize::from(color)].fill(0x7F7F);
     let (width, height) = size;
-    let header = Ghdr {
+    let header = Header {
         color,
-        parameterization,
+        form: parameterization,
         kernel: kernel.0,
         cutoff: kernel.1,
         width,
         height,
         base,
-        ..Ghdr::default()
+        ..Header::default()
     };
     File::of_floats(header, rows)
 }

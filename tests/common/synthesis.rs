@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::oracle::{Request, sums};
 use super::texture::{map_sides, read};
-use super::{File, Ghdr, RGB};
+use super::{File, Header, RGB};
 
 /// The texture of a file at the size of a request.
 pub(crate) struct Synthesis {
@@ -104,7 +104,7 @@ impl Place {
 pub(crate) fn map_sums(stored: [u32; 2], payload: &[u8]) -> Vec<Vec<f32>> {
     let [width, height] = map_sides(stored);
     let base = [0, 0, 32768, 0];
-    let header = Ghdr { color: RGB, width, height, base, ..Ghdr::default() };
+    let header = Header { color: RGB, width, height, base, ..Header::default() };
     let file = File::of_floats(header, &read(stored, payload).expect("a sound texture"));
     sums(&file, &Request::whole(&file), None)
 }

@@ -2,6 +2,7 @@
 
 use super::entropy::{self, Code, Grid};
 use super::rans::{self, Flaw};
+use super::{number, read_number, steps};
 
 /// The Gaussians of a map.
 #[derive(Clone, Debug)]
@@ -17,9 +18,8 @@ pub(crate) fn map_sides(sides: [u32; 2]) -> [u32; 2] {
 }
 
 /// All steps of the layer in `tXTR`.
-pub(crate) fn steps(step: f32) -> [f32; 7] {
-    let [position, size, ratio, slant] = [1.2_f64, 0.6, 0.75, 3.0].map(|x| x.sqrt() as f32);
-    [position, size, ratio, slant, step, step, step]
+pub(crate) fn steps(step: f32) -> Vec<f32> {
+    [&steps::usual_geometry()[..], &[step; 3]].concat()
 }
 
 /// The colour axes of a Gaussian that adds this much to the sums: the columns of the matrix of section 7.5 are
@@ -47,22 +47,29 @@ impl Texture {
     /// The payload of `tXTR` in a picture with these sides.
     pub(crate) fn payload(&self, sides: [u32; 2]) -> Vec<u8> {
         let ops = entropy::write(map_sides(sides), &steps(self.step), &mut self.codes.clone());
-        let count = (self.codes.len() as u32).to_le_bytes();
-        [&self.step.to_le_bytes()[..], &count, &rans::encode(&ops)].concat()
+        with_count(self.step, self.codes.len() as u32, &rans::encode(&ops))
     }
+}
+
+/// The payload of `tXTR` with this step, number of Gaussians, and bytes in which they are coded.
+pub(crate) fn with_count(step: f32, count: u32, bytes: &[u8]) -> Vec<u8> {
+    [&steps::code(step).to_le_bytes()[..], &number(count), bytes].concat()
 }
 
 /// The components of the map's Gaussians.
 pub(crate) fn read(sides: [u32; 2], payload: &[u8]) -> Result<Vec<Vec<f32>>, Flaw> {
-    let (step, layer) = payload.split_first_chunk().ok_or("no step")?;
-    let step = f32::from_le_bytes(*step);
-    if !(2_f32.powi(-20)..=2_f32.powi(10)).contains(&step) {
+    let (code, rest) = payload.split_first_chunk().ok_or("no step")?;
+    let code = u16::from_le_bytes(*code);
+    if code > steps::MOST {
         return Err("a step out of range");
     }
+    let (count, bytes) = read_number(rest).ok_or("no count")?;
     let sides = map_sides(sides);
-    let values = entropy::read(sides, &steps(step), layer)?.values;
-    if values.len() as u64 > u64::from(sides[0]) * u64::from(sides[1]) {
+    if count == 0 {
+        return Err("no Gaussians");
+    }
+    if u64::from(count) > u64::from(sides[0]) * u64::from(sides[1]) {
         return Err("more Gaussians than nodes");
     }
-    Ok(values)
+    Ok(entropy::read(sides, &steps(steps::step(code)), count, bytes)?.values)
 }

@@ -2,16 +2,17 @@
 
 use super::common::entropy::{self, Code, Grid};
 use super::common::rans::{self, Op};
+use super::common::steps::{at_most, ratio, usual_geometry};
 use super::common::{
-    COVARIANCE, EXPONENTIAL, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks,
-    steps,
+    EXPONENTIAL, File, GRAY, GRAY_ALPHA, Header, RGB, RGBA, Random, chunk, number, of_chunks,
+    offsets, payload,
 };
 use super::{Rendering, Vector, header};
 
-/// The steps of position, size, ratio, slant, and of every colour axis.
+/// The usual steps of geometry, and the same step for every colour axis.
 fn usual_steps(color: u8) -> Vec<f32> {
-    let mut steps = vec![1.25, 0.66, 0.9, 1.9];
-    steps.resize(5 + usize::from(color), 0.1);
+    let mut steps = usual_geometry().to_vec();
+    steps.resize(5 + usize::from(color), at_most(0.1));
     steps
 }
 
@@ -19,14 +20,14 @@ const LEAST_STEP: f32 = 1.0 / 1_048_576.0;
 const MOST_STEP: f32 = 1024.0;
 
 /// A Gaussian of step exponent 2 at a point of the picture, as large as its cell lets expect, not slanted.
-fn at(header: &Ghdr, point: [f32; 2], first: i32) -> Code {
+fn at(header: &Header, point: [f32; 2], first: i32) -> Code {
     let mut axes = vec![0; header.channels()];
     axes[0] = first;
     Code { exponent: 2, axes, center: Grid::new(header.sides()).units(point), ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the picture.
-fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
+fn scatter(seed: u64, header: &Header, count: usize) -> Vec<Code> {
     let mut random = Random(seed);
     let grid = Grid::new(header.sides());
     let sides = [header.width as f32, header.height as f32];
@@ -42,16 +43,15 @@ fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
     (0..count).map(one).collect()
 }
 
-pub(super) fn scattered(seed: u64, header: Ghdr, count: usize) -> File {
+pub(super) fn scattered(seed: u64, header: Header, count: usize) -> File {
     let codes = scatter(seed, &header, count);
     File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
 }
 
-/// Equal Gaussians without colour: 216 of them take 54 bytes behind their number, and so do 217.
+/// Equal Gaussians without colour: 216 of them take 54 bytes, and so do 217.
 fn dense(count: usize) -> File {
     let header = header(GRAY, 24, 16);
-    let mut steps = usual_steps(GRAY);
-    steps[0] = MOST_STEP;
+    let steps = vec![MOST_STEP, 0.75, 0.75, 1.75, at_most(0.1)];
     let code = Code { exponent: 1, ..at(&header, [4.0, 8.0], 0) };
     File::of_entropy_coded(header, steps, vec![vec![code; count]])
 }
@@ -60,9 +60,9 @@ pub(super) fn valid() -> Vec<Vector> {
     let gray = header(GRAY, 24, 16);
     let sharp = |color| {
         let header = header(color, 24, 16);
-        Ghdr { depth: 16, kernel: EXPONENTIAL, cutoff: 11.082_527, ..header }
+        Header { depth: 16, kernel: EXPONENTIAL, cutoff: 11.082_527, ..header }
     };
-    let usual = |header: Ghdr, codes| {
+    let usual = |header: Header, codes| {
         File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
     };
     let layers = {
@@ -163,8 +163,8 @@ pub(super) fn valid() -> Vec<Vector> {
             Code { size: -150, ..sound(5.0) },
             Code { size: 60, ratio: -40, ..sound(8.0) },
             Code { size: -36, ratio: 40, ..sound(11.0) },
-            Code { size: 80, slant: 65_542, ..sound(14.0) },
-            Code { size: -30, axes: vec![65_549], exponent: 0, ..sound(17.0) },
+            Code { size: 64, slant: 65_542, ..sound(14.0) },
+            Code { size: -4, axes: vec![65_549], exponent: 0, ..sound(17.0) },
             sound(20.0),
         ];
         usual(gray, codes)
@@ -198,9 +198,32 @@ pub(super) fn valid() -> Vec<Vector> {
         codes[2].axes = vec![0, 1, 0];
         File::of_entropy_coded(sides, vec![MOST_STEP; 7], vec![codes])
     };
-    let pixel = Ghdr { width: 1, height: 1, ..gray };
-    let long = Ghdr { width: 2000, height: 3, ..gray };
-    let high = Ghdr { width: 1, height: 300, color: RGB, ..gray };
+    let other_geometry = |color| {
+        let header = header(color, 24, 16);
+        let mut steps = usual_steps(color);
+        steps[..4].copy_from_slice(&[1.25, 0.656_25, 0.906_25, 1.906_25]);
+        File::of_entropy_coded(header, steps, vec![scatter(183, &header, 20)])
+    };
+    let other_ratios = |first: f32, ratios: [u8; 3]| {
+        let header = header(RGBA, 24, 16);
+        let mut steps = usual_geometry().to_vec();
+        steps.push(first);
+        steps.extend(ratios.map(|code| first * ratio(code)));
+        File::of_entropy_coded(header, steps, vec![scatter(184, &header, 20)])
+    };
+    let two = File::of_entropy_coded(
+        gray,
+        usual_steps(GRAY),
+        vec![scatter(185, &gray, 5), scatter(186, &gray, 200)],
+    );
+    let bounds_late = {
+        let mut chunks = layers.chunks();
+        chunks.insert(3, chunk(b"bNDS", &layers.bounds()));
+        (layers.clone(), chunks)
+    };
+    let pixel = Header { width: 1, height: 1, ..gray };
+    let long = Header { width: 2000, height: 3, ..gray };
+    let high = Header { width: 1, height: 300, color: RGB, ..gray };
     let gray_alpha = header(GRAY_ALPHA, 17, 9);
     vec![
         Vector::valid("entropy-gray8", "entropy coding: gray, 8 bits", scattered(160, gray, 20))
@@ -267,6 +290,39 @@ pub(super) fn valid() -> Vec<Vector> {
             Rendering::Region(30, 17, 10, 7),
             Rendering::SizeAndRegion((400, 7), (120, 1, 9, 5)),
         ]),
+        Vector::valid_chunks(
+            "entropy-bounds-late",
+            "entropy coding: bNDS between two layers",
+            bounds_late.0,
+            &bounds_late.1,
+        )
+        .also(&[Rendering::Region(1, 2, 3, 4), Rendering::Region(30, 17, 10, 7)]),
+        Vector::valid(
+            "entropy-two",
+            "entropy coding: two layers, of which the last has 200 Gaussians and does not say so",
+            two,
+        )
+        .also(&[Rendering::Prefix(5), Rendering::Prefix(100)]),
+        Vector::valid(
+            "entropy-geometry",
+            "entropy coding: the header has steps of position, size, ratio and slant",
+            other_geometry(GRAY),
+        ),
+        Vector::valid(
+            "entropy-geometry-rgb8",
+            "entropy coding: the header has steps of geometry behind those of three axes",
+            other_geometry(RGB),
+        ),
+        Vector::valid(
+            "entropy-ratios",
+            "entropy coding: every colour axis has a step of its own",
+            other_ratios(at_most(0.1), [136, 123, 141]),
+        ),
+        Vector::valid(
+            "entropy-ratios-extreme",
+            "entropy coding: the least and the largest ratio of the step of a colour axis to the first",
+            other_ratios(0.031_25, [0, 255, 128]),
+        ),
         Vector::valid(
             "entropy-exponents",
             "entropy coding: all step exponents; the higher ones have plain bits below their symbols",
@@ -329,7 +385,7 @@ pub(super) fn valid() -> Vec<Vector> {
 }
 
 pub(super) fn invalid() -> Vec<Vector> {
-    let gray = Ghdr { color: GRAY, ..Ghdr::default() };
+    let gray = Header { color: GRAY, ..Header::default() };
     let second = {
         let mut codes: Vec<Code> = (0..39).map(|n| at(&gray, [n as f32 * 0.4, 3.3], 2)).collect();
         codes.push(at(&gray, [4.0, 12.0], 5));
@@ -339,7 +395,7 @@ pub(super) fn invalid() -> Vec<Vector> {
     let file = File::of_entropy_coded(gray, usual_steps(GRAY), vec![first, second.clone()]);
     let chunks = file.chunks();
     let usual_steps = usual_steps(GRAY);
-    // GHDR, QNTZ, two layers, GEND; the second is damaged.
+    // H, two layers, E; the second layer is damaged.
     let replaced = |at: usize, chunk: Vec<u8>| {
         let mut chunks = chunks.clone();
         chunks[at] = chunk;
@@ -347,21 +403,25 @@ pub(super) fn invalid() -> Vec<Vector> {
     };
     // A layer that the oracle refuses as well, and says why.
     let refused = |name, shows, payload: &[u8], flaw: &str| {
-        let found = entropy::read(gray.sides(), &usual_steps, payload);
+        let found = entropy::read(gray.sides(), &usual_steps, second.len() as u32, payload);
         assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
-        Vector::invalid(name, shows, replaced(3, chunk(b"GAUS", payload)))
+        Vector::invalid(name, shows, replaced(2, chunk(b"L", payload)))
     };
-    let with_step = |at: usize, step: f32| {
-        let mut changed = usual_steps.clone();
-        changed[at] = step;
-        replaced(1, chunk(b"QNTZ", &steps(&changed)))
-    };
-    let with_header = |change: &dyn Fn(&mut Ghdr)| {
+    let with_header = |change: &dyn Fn(&mut Header)| {
         let mut header = file.header;
         change(&mut header);
-        replaced(0, chunk(b"GHDR", &header.payload()))
+        replaced(0, header.chunk(&file.dequantizer()))
     };
-    let payload = chunks[3][8..chunks[3].len() - 4].to_vec();
+    // The first layer with these bytes as its number.
+    let with_number =
+        |number: &[u8]| replaced(1, chunk(b"L", &[number, &payload(&chunks[1])[1..]].concat()));
+    // A header for three channels with these codes of steps, and of those of geometry if there are any.
+    let with_steps = |axes: (u16, [u8; 2]), geometry: &[u16]| {
+        let header = Header { color: RGB, form: u8::from(!geometry.is_empty()), ..file.header };
+        let geometry: Vec<u8> = geometry.iter().flat_map(|code| code.to_le_bytes()).collect();
+        replaced(0, header.chunk(&[&axes.0.to_le_bytes()[..], &axes.1, &geometry].concat()))
+    };
+    let payload = payload(&chunks[2]).to_vec();
     let changed = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut payload = payload.clone();
         change(&mut payload);
@@ -371,8 +431,7 @@ pub(super) fn invalid() -> Vec<Vector> {
     let with_ops = |change: &dyn Fn(&mut Vec<Op>)| {
         let mut ops = entropy::write(gray.sides(), &usual_steps, &mut second.clone());
         change(&mut ops);
-        let count = (second.len() as u32).to_le_bytes();
-        [&count[..], &rans::encode(&ops)].concat()
+        rans::encode(&ops)
     };
     let with_symbol = |found: &dyn Fn(u32) -> bool, wrong: u32| {
         with_ops(&|ops| {
@@ -383,40 +442,70 @@ pub(super) fn invalid() -> Vec<Vector> {
             *symbols.last().expect("such a symbol") = wrong;
         })
     };
-    let next = |step: f32, change: i32| f32::from_bits(step.to_bits().wrapping_add_signed(change));
-    let start = 8 + chunks[..3].iter().map(Vec::len).sum::<usize>();
+    let start = offsets(&chunks)[2];
     let invalid = Vector::invalid;
     vec![
         invalid(
-            "xentropy-parameterization",
-            "entropy coding: a parameterization other than Cholesky",
-            with_header(&|h| h.parameterization = COVARIANCE),
+            "xentropy-form-2",
+            "entropy coding: an unknown form of steps, 2",
+            with_header(&|h| h.form = 2),
         ),
-        invalid("xentropy-length-quantizers", "entropy coding: one step too few", {
-            replaced(1, chunk(b"QNTZ", &steps(&usual_steps[1..])))
+        invalid(
+            "xentropy-form-3",
+            "entropy coding: an unknown form of steps, 3",
+            with_header(&|h| h.form = 3),
+        ),
+        invalid("xentropy-steps-fewer", "entropy coding: steps of geometry that are not there", {
+            with_header(&|h| h.form = 1)
         }),
-        invalid("xentropy-step-nan", "entropy coding: a step of NaN", {
-            with_step(0, f32::from_bits(0x7FC0_0000))
+        invalid(
+            "xentropy-steps-more",
+            "entropy coding: one step more than there are colour axes",
+            replaced(0, file.header.chunk(&[&file.dequantizer()[..], &[128]].concat())),
+        ),
+        invalid("xentropy-step-over", "entropy coding: a step of the first axis just over 2^10", {
+            with_steps((0xF001, [0, 0]), &[])
         }),
-        invalid("xentropy-step-zero", "entropy coding: a step of zero", with_step(1, 0.0)),
-        invalid("xentropy-step-negative", "entropy coding: a negative step", with_step(2, -0.5)),
-        invalid("xentropy-step-under", "entropy coding: a step just under 2^-20", {
-            with_step(3, next(LEAST_STEP, -1))
+        invalid("xentropy-step-most", "entropy coding: the largest code of a step of geometry", {
+            with_steps((0xA000, [128, 128]), &[0xA000, 0xA000, 0xA000, 0xFFFF])
         }),
-        invalid("xentropy-step-over", "entropy coding: a step just over 2^10", {
-            with_step(4, next(MOST_STEP, 1))
-        }),
+        invalid(
+            "xentropy-ratio-under",
+            "entropy coding: a ratio that makes a step less than 2^-20",
+            with_steps((0x0800, [112, 111]), &[]),
+        ),
+        invalid(
+            "xentropy-ratio-over",
+            "entropy coding: a ratio that makes a step more than 2^10",
+            with_steps((0xE800, [144, 145]), &[]),
+        ),
         invalid("xentropy-count-more", "entropy coding: one Gaussian more than declared", {
             with_header(&|h| h.gaussians -= 1)
         }),
         invalid("xentropy-count-fewer", "entropy coding: one Gaussian fewer than declared", {
             with_header(&|h| h.gaussians += 1)
         }),
-        refused(
-            "xentropy-empty",
-            "entropy coding: a layer without Gaussians",
-            &changed(&|payload| payload[0] = 0),
-            "no Gaussians",
+        invalid("xentropy-empty", "entropy coding: a layer without Gaussians", with_number(&[0])),
+        invalid(
+            "xentropy-number-needless",
+            "entropy coding: a layer whose number has a byte that it does not need",
+            with_number(&[0x82, 0]),
+        ),
+        invalid("xentropy-number-over", "entropy coding: a layer whose number has 33 bits", {
+            with_number(&[0x82, 0x80, 0x80, 0x80, 0x10])
+        }),
+        invalid(
+            "xentropy-number-all",
+            "entropy coding: a layer that leaves no Gaussian for the next one",
+            with_number(&number(file.header.gaussians)),
+        ),
+        invalid("xentropy-number-none", "entropy coding: a layer that ends before its number", {
+            replaced(1, chunk(b"L", &[]))
+        }),
+        invalid(
+            "xentropy-number-last",
+            "entropy coding: a last layer that begins with its number",
+            replaced(2, chunk(b"L", &[&number(second.len() as u32)[..], &payload].concat())),
         ),
         invalid("xentropy-dense", "entropy coding: more than four Gaussians for each byte", {
             dense(217).bytes()
@@ -452,20 +541,17 @@ pub(super) fn invalid() -> Vec<Vector> {
         ),
         refused(
             "xentropy-short",
-            "entropy coding: a layer too short for its number of Gaussians",
-            &payload[..3],
-            "no count",
+            "entropy coding: more Gaussians than a layer's bytes can have",
+            &payload[..9],
+            "more than four Gaussians for each byte",
         ),
-        refused(
-            "xentropy-short-state",
-            "entropy coding: a layer too short for the state",
-            &[&[1, 0, 0, 0], &payload[4..6]].concat(),
-            "no state",
-        ),
+        invalid("xentropy-short-state", "entropy coding: a layer too short for the state", {
+            replaced(1, chunk(b"L", &[&[2], &payload[..3]].concat()))
+        }),
         refused(
             "xentropy-state",
             "entropy coding: an initial state below 2^16",
-            &changed(&|payload| payload[6..8].fill(0)),
+            &changed(&|payload| payload[2..4].fill(0)),
             "the state begins below 2^16",
         ),
         refused(

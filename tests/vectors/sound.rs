@@ -1,15 +1,19 @@
 //! The test vectors of everything but the entropy coding.
 
 use super::common::{
-    COVARIANCE, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, ROTATION_SCALE,
-    Random, chunk,
+    COVARIANCE, ENTROPY, EXPONENTIAL, Entry, File, GRAY, GRAY_ALPHA, Header, RGB, RGBA,
+    ROTATION_SCALE, Random, chunk,
 };
 use super::{Rendering, Vector, header};
 use image_gip::ColorModel;
 
+/// Exif data with one entry, the orientation.
+pub(super) const TURNED: &[u8] = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+const UPRIGHT: &[u8] = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x01\0\0\0\0\0\0";
+
 /// A header of a gray picture on black.
-fn gray() -> Ghdr {
-    Ghdr { width: 24, height: 16, ..Ghdr::default() }
+fn gray() -> Header {
+    Header { width: 24, height: 16, ..Header::default() }
 }
 
 /// The paper's bit depths over a picture of this size: 12 for positions, 10 for shapes, 6 for
@@ -27,21 +31,21 @@ pub(super) fn packed(color: u8, size: (u32, u32)) -> Vec<Entry> {
 }
 
 /// Random codes for `count` Gaussians.
-fn codes(seed: u64, entries: &[Entry], count: usize) -> Vec<u32> {
+pub(super) fn codes(seed: u64, entries: &[Entry], count: usize) -> Vec<u32> {
     let mut random = Random(seed);
     let code = |entry: &Entry| (random.next() & ((1 << entry.bits) - 1)) as u32;
     entries.iter().cycle().take(count * entries.len()).map(code).collect()
 }
 
 /// A packed file of random Gaussians.
-pub(super) fn random_file(seed: u64, header: Ghdr, count: usize) -> File {
+pub(super) fn random_file(seed: u64, header: Header, count: usize) -> File {
     let entries = packed(header.color, (header.width, header.height));
     let codes = codes(seed, &entries, count);
     File::new(header, entries, vec![codes])
 }
 
 /// A gray file of floats on black.
-fn floats(header: Ghdr, rows: &[[f32; 6]]) -> File {
+fn floats(header: Header, rows: &[[f32; 6]]) -> File {
     File::of_floats(header, &rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())
 }
 
@@ -99,13 +103,13 @@ fn color_models() -> Vec<Vector> {
         Vector::valid(
             "gray16",
             "gray, 16 bits",
-            random_file(64, Ghdr { depth: 16, ..header(GRAY, 24, 16) }, 20),
+            random_file(64, Header { depth: 16, ..header(GRAY, 24, 16) }, 20),
         )
         .also(&[Rendering::Size(9, 6), Rendering::Color(ColorModel::Rgba)]),
         Vector::valid(
             "rgba16",
             "RGBA, 16 bits",
-            random_file(65, Ghdr { depth: 16, ..header(RGBA, 16, 16) }, 20),
+            random_file(65, Header { depth: 16, ..header(RGBA, 16, 16) }, 20),
         )
         .also(&[Rendering::Size(6, 1)]),
     ]
@@ -122,12 +126,8 @@ fn parameterizations() -> Vec<Vector> {
         entries[4] = Entry::log(10, 0.004_882_812_5, -2.0);
         entries
     };
-    let paper = Ghdr {
-        parameterization: COVARIANCE,
-        kernel: EXPONENTIAL,
-        cutoff: 11.082_527,
-        ..header(RGB, 40, 24)
-    };
+    let paper =
+        Header { form: COVARIANCE, kernel: EXPONENTIAL, cutoff: 11.082_527, ..header(RGB, 40, 24) };
     vec![
         Vector::valid(
             "paper",
@@ -143,7 +143,7 @@ fn parameterizations() -> Vec<Vector> {
             "parameterization-covariance",
             "covariance parameterization in floats; four of the six matrices are not positive definite",
             floats(
-                Ghdr { parameterization: COVARIANCE, ..gray },
+                Header { form: COVARIANCE, ..gray },
                 &[
                     [6.0, 5.0, 4.0, 1.5, 2.0, 0.8],
                     [12.0, 8.0, 9.0, -5.9, 4.0, 0.5],
@@ -159,7 +159,7 @@ fn parameterizations() -> Vec<Vector> {
             "rotation and scale in floats: angles in all quadrants, of many turns, and over 1024; negative \
              scales",
             floats(
-                Ghdr { parameterization: ROTATION_SCALE, ..gray },
+                Header { form: ROTATION_SCALE, ..gray },
                 &[
                     rotated(5.0, 0.7, 0.0),
                     rotated(5.0, 0.7, 0.5),
@@ -185,7 +185,7 @@ fn kernels() -> Vec<Vector> {
             "kernel-cutoff-2",
             "exponential kernel with cut-off 2, which leaves an edge; pixel centres exactly on it are drawn",
             floats(
-                Ghdr { kernel: EXPONENTIAL, cutoff: 2.0, ..gray },
+                Header { kernel: EXPONENTIAL, cutoff: 2.0, ..gray },
                 &[[8.5, 8.5, 1.0, 0.0, 1.0, 0.7], [16.0, 7.0, 4.0, 1.0, 3.0, 0.4]],
             ),
         ),
@@ -193,7 +193,7 @@ fn kernels() -> Vec<Vector> {
             "kernel-cutoff-64",
             "exponential kernel with the largest cut-off",
             floats(
-                Ghdr { kernel: EXPONENTIAL, cutoff: 64.0, depth: 16, ..gray },
+                Header { kernel: EXPONENTIAL, cutoff: 64.0, depth: 16, ..gray },
                 &[[8.5, 8.5, 1.0, 0.0, 1.0, 0.7], [16.0, 7.0, 4.0, 1.0, 3.0, 0.4]],
             ),
         ),
@@ -247,7 +247,7 @@ fn chunks() -> Vec<Vector> {
     };
     let described = random_file(80, header(GRAY, 16, 16), 6)
         .with(b"iCCP", b"not a real ICC profile; decoders hand it over as it is")
-        .with(b"eXIf", b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0")
+        .with(b"eXIf", TURNED)
         .with(b"xMPd", b"<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"/>")
         .with(b"tEXt", "Title\0Dämmerung über dem Meer".as_bytes())
         .with(b"tEXt", b"Comment\0")
@@ -255,17 +255,36 @@ fn chunks() -> Vec<Vector> {
     let ancillary = {
         let file = random_file(81, header(GRAY_ALPHA, 16, 16), 6);
         let mut chunks = file.chunks();
-        chunks.insert(3, chunk(b"tEXt", b"known, but late and so skipped unread"));
-        chunks.insert(3, chunk(b"zzZz", b""));
-        chunks.insert(2, chunk(b"prVt", b"private and safe to copy"));
+        chunks.insert(2, chunk(b"zzZz", b""));
+        chunks.insert(1, chunk(b"prVt", b"private and safe to copy"));
         chunks.insert(1, chunk(b"abcd", b"reserved bit set: unknown, and skipped"));
         (file, chunks)
     };
-    let unquantized = {
-        let file = floats(Ghdr { base: [0x1234, 0, 0, 0], ..gray }, &[]);
-        let chunks = vec![chunk(b"GHDR", &file.header.payload()), chunk(b"GEND", &[])];
+    // With all kinds of metadata, of which the ICC profile alone stands before a layer.
+    let late = {
+        let entries = packed(GRAY, (24, 16));
+        let layers = [3, 4, 2].into_iter().zip(76..);
+        let layers = layers.map(|(count, seed)| codes(seed, &entries, count)).collect();
+        let file = File::new(header(GRAY, 24, 16), entries, layers);
+        let mut chunks = file.chunks();
+        chunks.insert(4, chunk(b"tEXt", b"Comment\0after the last layer"));
+        chunks.insert(4, chunk(b"prVt", b"unknown, and skipped"));
+        chunks.insert(4, chunk(b"xMPd", b"<x:xmpmeta xmlns:x=\"adobe:ns:meta/\"/>"));
+        chunks.insert(3, chunk(b"eXIf", UPRIGHT));
+        chunks.insert(2, chunk(b"tEXt", b"Title\0after the first layer"));
+        chunks.insert(1, chunk(b"iCCP", b"not a real ICC profile"));
         (file, chunks)
     };
+    let long = {
+        let entries = vec![Entry::linear(3, 2.0, 1.0); 6];
+        let layers = [127, 128, 1, 300].into_iter().zip(85..);
+        let layers = layers.map(|(count, seed)| codes(seed, &entries, count)).collect();
+        File::new(gray, entries, layers).with(b"tEXt", &[b"Comment\0", &[b'.'; 200][..]].concat())
+    };
+    let uncut =
+        Header { kernel: EXPONENTIAL, cutoff: 4.0, base: [0x1234, 0, 0, 0], depth: 16, ..gray };
+    let empty = |header: Header| File::of_floats(header, &[]);
+    let entropy_coded = Header { coding: ENTROPY, form: 1, base: [0x6060, 0, 0, 0], ..gray };
     vec![
         Vector::valid("layers", "four layers; pictures of the first Gaussians only", layered).also(
             &[
@@ -278,23 +297,36 @@ fn chunks() -> Vec<Vector> {
         Vector::valid("metadata", "an ICC profile, Exif, XMP and three texts", described),
         Vector::valid_chunks(
             "ancillary",
-            "unknown ancillary chunks wherever they may stand, and a known one after a layer: all are skipped",
+            "unknown ancillary chunks wherever they may stand: all are skipped",
             ancillary.0,
             &ancillary.1,
         ),
+        Vector::valid_chunks(
+            "metadata-late",
+            "metadata between and after the layers: text, XMP, Exif that does not turn the picture",
+            late.0,
+            &late.1,
+        ),
+        Vector::valid(
+            "layers-long",
+            "layers of 127, 128, 1 and 300 Gaussians and a text of 208 bytes: numbers of one byte and of two",
+            long,
+        )
+        .also(&[Rendering::Prefix(127), Rendering::Prefix(256)]),
         Vector::valid(
             "no-gaussians",
-            "no Gaussians: the base colour alone",
-            File::of_floats(
-                Ghdr { color: RGBA, base: [0, 0x7FFF, 0x8000, 0xFFFF], ..Ghdr::default() },
-                &[],
-            ),
+            "no Gaussians: the base colour alone, and no quantizers",
+            empty(Header { color: RGBA, base: [0, 0x7F7F, 0x8080, 0xFFFF], ..Header::default() }),
         ),
-        Vector::valid_chunks(
-            "no-quantizers",
-            "without a layer, QNTZ may be absent: the smallest file",
-            unquantized.0,
-            &unquantized.1,
+        Vector::valid(
+            "no-gaussians16",
+            "no Gaussians, 16 bits, exponential kernel, whose cut-off is there all the same",
+            empty(uncut),
+        ),
+        Vector::valid(
+            "no-gaussians-entropy",
+            "no Gaussians: no steps either, though the format says that those of geometry are there",
+            empty(entropy_coded),
         ),
     ]
 }
@@ -309,7 +341,7 @@ fn shapes() -> Vec<Vector> {
         Vector::valid(
             "one-pixel",
             "a picture of one pixel",
-            floats(Ghdr { width: 1, height: 1, ..gray }, &[[0.25, 0.75, 0.5, 0.1, 0.4, 0.9]]),
+            floats(Header { width: 1, height: 1, ..gray }, &[[0.25, 0.75, 0.5, 0.1, 0.4, 0.9]]),
         )
         .also(&[Rendering::Size(16, 16)]),
         Vector::valid(
@@ -415,7 +447,7 @@ fn sums() -> Vec<Vector> {
             "order",
             "amplitudes of 100 and more that cancel, so that the order of summation shows",
             floats(
-                Ghdr { depth: 16, ..gray },
+                Header { depth: 16, ..gray },
                 &[
                     [9.0, 8.0, 5.0, 1.0, 4.0, 100.0],
                     [9.01, 8.0, 5.0, 1.0, 4.0, -100.0],

@@ -1,22 +1,23 @@
 //! The test vectors of texture.
 
 use super::common::entropy::{Code, Grid};
-use super::common::texture::{self, Texture, map_sides};
-use super::common::{File, GRAY, GRAY_ALPHA, Ghdr, RGB, RGBA, Random, chunk, of_chunks};
+use super::common::steps::at_most;
+use super::common::texture::{self, Texture, map_sides, with_count};
+use super::common::{File, GRAY, GRAY_ALPHA, Header, RGB, RGBA, Random, chunk, of_chunks, offsets};
 use super::entropy::scattered;
-use super::sound::random_file;
+use super::sound::{codes, packed, random_file};
 use super::{Rendering, Vector, header};
 
 /// A Gaussian of step exponent 2 at a point of a map, as large as its cell lets expect, not slanted, with
 /// about this much of each sum.
-fn at(header: &Ghdr, point: [f32; 2], colors: [f32; 3]) -> Code {
+fn at(header: &Header, point: [f32; 2], colors: [f32; 3]) -> Code {
     let center = Grid::new(map_sides(header.sides())).units(point);
     let axes = texture::axes(colors).map(|axis| axis.round() as i32).to_vec();
     Code { exponent: 2, axes, center, ..Code::default() }
 }
 
 /// Random Gaussians with small codes in the map.
-fn scatter(seed: u64, header: &Ghdr, count: usize) -> Vec<Code> {
+fn scatter(seed: u64, header: &Header, count: usize) -> Vec<Code> {
     let mut random = Random(seed);
     let sides = map_sides(header.sides()).map(|side| side as f32);
     let one = |_| {
@@ -37,16 +38,16 @@ fn with(file: File, texture: &Texture) -> File {
 /// A file with random texture.
 fn textured(seed: u64, file: File, count: usize) -> File {
     let codes = scatter(seed, &file.header, count);
-    with(file, &Texture { step: 0.4, codes })
+    with(file, &Texture { step: at_most(0.4), codes })
 }
 
 /// A gray picture without Gaussians.
 fn empty(width: u32, height: u32) -> File {
-    File::new(header(GRAY, width, height), super::sound::packed(GRAY, (width, height)), vec![])
+    File::new(header(GRAY, width, height), packed(GRAY, (width, height)), vec![])
 }
 
 pub(super) fn valid() -> Vec<Vector> {
-    let nodes = |header: &Ghdr| {
+    let nodes = |header: &Header| {
         let [columns, rows] = map_sides(header.sides());
         (0..rows).flat_map(move |row| (0..columns).map(move |column| [column, row]))
     };
@@ -58,7 +59,7 @@ pub(super) fn valid() -> Vec<Vector> {
             at(&file.header, point, [9.0, 5.0 * sign, 5.0 * sign])
         };
         let codes = nodes(&file.header).map(code).collect();
-        with(file.clone(), &Texture { step: 0.3, codes })
+        with(file.clone(), &Texture { step: at_most(0.3), codes })
     };
     let beyond = {
         let file = random_file(201, header(RGB, 40, 24), 8);
@@ -79,7 +80,7 @@ pub(super) fn valid() -> Vec<Vector> {
         let sound = at(&file.header, [1.5, 1.5], [9.0, 9.0, 0.0]);
         let codes =
             vec![Code { size: 400, ..sound.clone() }, sound.clone(), Code { size: -400, ..sound }];
-        with(file, &Texture { step: 0.3, codes })
+        with(file, &Texture { step: at_most(0.3), codes })
     };
     let constant = |name, shows, direction| {
         let file = empty(40, 24);
@@ -91,16 +92,14 @@ pub(super) fn valid() -> Vec<Vector> {
             Rendering::Size(16, 10),
         ])
     };
-    let late = {
-        let file = textured(202, random_file(202, header(GRAY, 24, 16), 12), 4);
+    let moved = |name, shows, behind: usize| {
+        let entries = packed(GRAY, (24, 16));
+        let layers = [202, 207].map(|seed| codes(seed, &entries, 6)).to_vec();
+        let file = textured(202, File::new(header(GRAY, 24, 16), entries, layers), 4);
         let mut chunks = file.chunks();
-        chunks.insert(4, chunk(b"tXTR", b"?"));
-        Vector::valid_chunks(
-            "texture-late",
-            "a second tXTR, after a layer, which is skipped",
-            file,
-            &chunks,
-        )
+        let texture = chunks.remove(1);
+        chunks.insert(1 + behind, texture);
+        Vector::valid_chunks(name, shows, file, &chunks).also(&[Rendering::Plain])
     };
     let bounded = {
         let file = scattered(203, header(RGBA, 70, 45), 20);
@@ -141,7 +140,7 @@ pub(super) fn valid() -> Vec<Vector> {
         Vector::valid(
             "texture-rgb16",
             "texture of a picture of the entropy coding with 16 bits",
-            textured(205, scattered(205, Ghdr { depth: 16, ..header(RGB, 50, 31) }, 15), 12),
+            textured(205, scattered(205, Header { depth: 16, ..header(RGB, 50, 31) }, 15), 12),
         )
         .also(&[Rendering::Plain, Rendering::Size(75, 60), Rendering::Size(13, 8)]),
         Vector::valid(
@@ -174,21 +173,22 @@ pub(super) fn valid() -> Vec<Vector> {
         ),
         Vector::valid("texture-step-most", "the largest step of a map, 2^10", steps(1024.0, [1.0, 1.0, -1.0])),
         Vector::valid("texture-not-drawn", "a map of one Gaussian that is drawn and two that are not", not_drawn),
-        late,
+        moved("texture-between", "tXTR between two layers", 1),
+        moved("texture-late", "tXTR after the last layer", 2),
     ]
 }
 
 pub(super) fn invalid() -> Vec<Vector> {
-    // GHDR, QNTZ, tXTR, a layer and GEND.
+    // H, tXTR, a layer and E.
     let sides = [16, 16];
     let file = random_file(206, header(GRAY, 16, 16), 4);
     let header = file.header;
-    let map = |count| Texture { step: 0.4, codes: scatter(206, &header, count) };
+    let map = |count| Texture { step: at_most(0.4), codes: scatter(206, &header, count) };
     let sound = map(9).payload(sides);
     let file = file.with(b"tXTR", &sound);
     let replaced = |payload: &[u8]| {
         let mut chunks = file.chunks();
-        chunks[2] = chunk(b"tXTR", payload);
+        chunks[1] = chunk(b"tXTR", payload);
         of_chunks(&chunks)
     };
     // The oracle refuses it as well, and says why.
@@ -197,25 +197,46 @@ pub(super) fn invalid() -> Vec<Vector> {
         assert_eq!(found.map(|_| ()), Err(flaw), "{name}");
         Vector::invalid(name, shows, replaced(payload))
     };
-    let with_step = |name, shows, step: f32| {
-        let payload = [&step.to_le_bytes()[..], &sound[4..]].concat();
+    let with_step = |name, shows, code: u16| {
+        let payload = [&code.to_le_bytes()[..], &sound[2..]].concat();
         refused(name, shows, &payload, "a step out of range")
     };
+    // The bytes of the nine Gaussians, behind the step and the number.
+    let coded = &sound[3..];
+    let with_number = |number: &[u8]| [&sound[..2], number, coded].concat();
     let changed = |change: &dyn Fn(&mut Vec<u8>)| {
         let mut payload = sound.clone();
         change(&mut payload);
         payload
     };
-    let start = of_chunks(&file.chunks()[..2]).len();
-    let [least, most] = [1.0 / 1_048_576.0, 1024.0_f32];
+    let start = offsets(&file.chunks())[1];
+    let late = {
+        let mut chunks = file.chunks();
+        chunks.insert(3, chunk(b"tXTR", &sound));
+        of_chunks(&chunks)
+    };
     vec![
-        refused("xtexture-short", "tXTR too short for the step", &sound[..3], "no step"),
-        refused("xtexture-no-layer", "tXTR without a layer", &sound[..4], "no count"),
-        with_step("xtexture-step-nan", "tXTR with a step of NaN", f32::from_bits(0x7FC0_0000)),
-        with_step("xtexture-step-zero", "tXTR with a step of zero", 0.0),
-        with_step("xtexture-step-negative", "tXTR with a negative step", -0.4),
-        with_step("xtexture-step-under", "tXTR with a step just under 2^-20", least.next_down()),
-        with_step("xtexture-step-over", "tXTR with a step just over 2^10", most.next_up()),
+        refused("xtexture-short", "tXTR too short for the step", &sound[..1], "no step"),
+        refused("xtexture-no-number", "tXTR that ends after its step", &sound[..2], "no count"),
+        refused(
+            "xtexture-no-layer",
+            "tXTR that ends after its number",
+            &sound[..3],
+            "more than four Gaussians for each byte",
+        ),
+        refused(
+            "xtexture-number-needless",
+            "tXTR whose number has a byte that it does not need",
+            &with_number(&[0x89, 0]),
+            "no count",
+        ),
+        refused(
+            "xtexture-number-over",
+            "tXTR whose number has 33 bits",
+            &with_number(&[0x89, 0x80, 0x80, 0x80, 0x10]),
+            "no count",
+        ),
+        with_step("xtexture-step-over", "tXTR with a step just over 2^10", 0xF001),
         refused(
             "xtexture-many",
             "tXTR with ten Gaussians for nine nodes",
@@ -225,13 +246,13 @@ pub(super) fn invalid() -> Vec<Vector> {
         refused(
             "xtexture-empty",
             "tXTR whose layer has no Gaussians",
-            &changed(&|payload| payload[4] = 0),
+            &with_number(&[0]),
             "no Gaussians",
         ),
         refused(
             "xtexture-state",
             "tXTR whose layer has an initial state below 2^16",
-            &changed(&|payload| payload[10..12].fill(0)),
+            &changed(&|payload| payload[5..7].fill(0)),
             "the state begins below 2^16",
         ),
         refused(
@@ -247,6 +268,13 @@ pub(super) fn invalid() -> Vec<Vector> {
             "words left",
         ),
         Vector::invalid("xtexture-twice", "two tXTR", file.clone().with(b"tXTR", &sound).bytes()),
+        Vector::invalid("xtexture-late", "a second tXTR, after the layer", late),
+        refused(
+            "xtexture-dense",
+            "tXTR with nine Gaussians in two bytes",
+            &with_count(at_most(0.4), 9, &[0, 0]),
+            "more than four Gaussians for each byte",
+        ),
         Vector::invalid("xtexture-crc", "a flipped bit in tXTR", {
             let mut bytes = file.bytes();
             bytes[start + 20] ^= 4;
