@@ -209,9 +209,7 @@ impl Fields<'_> {
     fn side(&mut self, name: &'static str) -> Result<u32, DecodeError> {
         match self.varint()? {
             0 => Err(self.malformed(alloc::format!("the {name} is zero"))),
-            side if side > MAX_SIDE => {
-                Err(self.malformed(alloc::format!("the {name} is over 2^20")))
-            }
+            side if side > MAX_SIDE => Err(self.unsupported(name, side)),
             side => Ok(side),
         }
     }
@@ -221,7 +219,9 @@ impl Fields<'_> {
         match self.varint()? {
             0 => Err(self.malformed("Gaussians, but no layer")),
             layers if layers > gaussians => Err(self.malformed("more layers than Gaussians")),
-            layers => u16::try_from(layers).map_err(|_| self.malformed("more than 65535 layers")),
+            layers => {
+                u16::try_from(layers).map_err(|_| self.unsupported("number of layers", layers))
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use super::layers;
 use crate::chunk::{ChunkType, SIGNATURE, VERSION};
 use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes, steps};
 use crate::coding::layer_count::LayerCount;
-use crate::coding::packed::PackedCodes;
+use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::color::SampleDepth;
 use crate::container::{ChunkWriter, Coding, Dequantizer, Header, Metadata};
 use crate::encode::error::{OptionError, Result};
@@ -96,7 +96,8 @@ impl<'a> FileLayout<'a> {
         let layers = u16::from(gaussians > 0);
         let header = Header { gaussians, layers, ..self.header.clone() };
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(None)]);
+        let quantizers = Dequantizer::Packed(vec![Quantizer::Float; header.components()]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(Some(&quantizers))]);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &[&payload]);
         }
