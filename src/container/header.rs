@@ -8,7 +8,7 @@ use super::fields::Fields;
 #[cfg(feature = "encode")]
 use super::varint;
 use crate::chunk::{ChunkType, VERSION};
-use crate::coding::entropy::Quantization;
+use crate::coding::entropy::{LayerCoder, Quantization};
 use crate::coding::packed::Quantizer;
 use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
@@ -194,6 +194,11 @@ impl Header {
     /// The base colour, where 1.0 is a full sample.
     pub(crate) fn base(&self) -> [f32; 4] {
         self.base_color.map(|value| f32::from(value) / 65535.0)
+    }
+
+    /// What reads and writes entropy-coded layers of the picture.
+    pub(crate) fn layer_coder<'a>(&self, quantization: &'a Quantization) -> LayerCoder<'a> {
+        LayerCoder::new(quantization, [self.width, self.height], self.color)
     }
 
     /// The number of stored components of a Gaussian: two of position, three of shape, one per

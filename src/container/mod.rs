@@ -1,7 +1,7 @@
 //! The container of a file: signature, chunks, header and metadata (spec, sections 4 and 5).
 
 mod exif;
-mod fields;
+pub(crate) mod fields;
 mod header;
 mod metadata;
 mod parser;
@@ -13,7 +13,6 @@ mod writer;
 
 #[cfg(feature = "metadata")]
 pub(crate) use exif::{ByteOrder, Directory, Entry};
-pub(crate) use fields::Fields;
 pub(crate) use header::Dequantizer;
 #[cfg(feature = "encode")]
 pub(crate) use header::MAX_SIDE;

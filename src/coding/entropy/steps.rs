@@ -3,7 +3,7 @@
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-use crate::container::Fields;
+use crate::container::fields::Fields;
 use crate::error::DecodeError;
 
 /// Steps of position, size, ratio and slant.
