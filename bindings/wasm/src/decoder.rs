@@ -1,7 +1,6 @@
 //! The push decoder and its renderings.
 
 use image_gip::{DecodeError, Limits, Orientation, RenderOptions, StreamDecoder};
-use js_sys::{Float32Array, Uint8ClampedArray, Uint16Array};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{exception, too_many_pixels};
@@ -103,7 +102,7 @@ impl Decoder {
 
     /// The Gaussians from `start` to before `end` that have arrived: for each of them x and y of
     /// the centre, l11, l21 and l22 of the Cholesky factor, and four amplitudes.
-    pub fn gaussians(&self, start: usize, end: usize) -> Float32Array {
+    pub fn gaussians(&self, start: usize, end: usize) -> Vec<f32> {
         let all = self.stream.gaussians();
         let end = end.min(all.len());
         let chosen = &all[start.min(end)..end];
@@ -113,12 +112,12 @@ impl Decoder {
             numbers.extend_from_slice(&gaussian.cholesky);
             numbers.extend_from_slice(&gaussian.color);
         }
-        Float32Array::from(numbers.as_slice())
+        numbers
     }
 
     /// The planes of the texture's map, as stored; `undefined` without texture.
     #[wasm_bindgen(js_name = textureMap)]
-    pub fn texture_map(&self) -> Result<Option<Float32Array>, JsValue> {
+    pub fn texture_map(&self) -> Result<Option<Vec<f32>>, JsValue> {
         let Some(map) = self.stream.picture().and_then(|picture| picture.texture_map()) else {
             return Ok(None);
         };
@@ -127,23 +126,22 @@ impl Decoder {
             let mut sums = vec![0.0; length];
             map.render_planes(&options, &mut sums).map(|()| sums)
         });
-        sums.map(|sums| Some(Float32Array::from(sums.as_slice())))
-            .map_err(|error| exception(&error))
+        sums.map(Some).map_err(|error| exception(&error))
     }
 
-    /// Renders interleaved 8-bit samples. See [`Request::new`] for the numbers.
-    pub fn render8(&mut self, request: &[u32]) -> Result<Uint8ClampedArray, JsValue> {
+    /// Renders interleaved 8-bit samples, a `Uint8ClampedArray`. See [`Request::new`] for the numbers.
+    pub fn render8(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         self.render::<u8>(request)
     }
 
-    /// Renders interleaved 16-bit samples. See [`Request::new`] for the numbers.
-    pub fn render16(&mut self, request: &[u32]) -> Result<Uint16Array, JsValue> {
+    /// Renders interleaved 16-bit samples, a `Uint16Array`. See [`Request::new`] for the numbers.
+    pub fn render16(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         self.render::<u16>(request)
     }
 }
 
 impl Decoder {
-    fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
+    fn render<T: Sample>(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         let Some(header) = self.stream.header() else { return Err(no_header()) };
         let numbers = request.try_into().map_err(|_| JsValue::from("ten numbers"))?;
         let orientation = self.stream.orientation().unwrap_or_default();
@@ -159,7 +157,9 @@ impl Decoder {
         if request.pixels() > self.max_output {
             return Err(too_many_pixels(request.pixels(), self.max_output));
         }
-        samples::render::<T>(&picture, &request).map_err(|error| exception(&error))
+        let samples =
+            samples::render::<T>(&picture, &request).map_err(|error| exception(&error))?;
+        Ok(samples.into())
     }
 }
 
