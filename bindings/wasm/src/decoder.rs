@@ -4,7 +4,7 @@ use image_gip::{DecodeError, Limits, Orientation, RenderOptions, StreamDecoder};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{exception, too_many_pixels};
-use crate::layer_extents::LayerExtents;
+use crate::layer_extents::{CRC, LayerExtents};
 use crate::objects;
 use crate::request::Request;
 use crate::samples::{self, Sample};
@@ -84,6 +84,18 @@ impl Decoder {
         self.stream.orientation().map(Orientation::to_exif)
     }
 
+    /// Whether an ICC profile has arrived.
+    #[wasm_bindgen(js_name = hasProfile)]
+    pub fn has_profile(&self) -> bool {
+        self.stream.metadata().icc_profile.is_some()
+    }
+
+    /// Whether the texture has arrived.
+    #[wasm_bindgen(js_name = hasTexture)]
+    pub fn has_texture(&self) -> bool {
+        self.stream.picture().is_some_and(|picture| picture.texture_map().is_some())
+    }
+
     /// The metadata that has arrived.
     pub fn metadata(&self) -> JsValue {
         objects::metadata(self.stream.metadata())
@@ -92,6 +104,30 @@ impl Decoder {
     /// Chunks, layers, bits and steps of what has arrived.
     pub fn statistics(&self) -> JsValue {
         objects::statistics(&self.stream, self.layer_extents.extents())
+    }
+
+    /// How many Gaussians the first `bytes` of the file have, as far as its layers have arrived.
+    #[wasm_bindgen(js_name = gaussiansIn)]
+    pub fn gaussians_in(&self, bytes: f64) -> u32 {
+        let mut bits = 0;
+        for quantizer in self.stream.quantizers() {
+            bits += u32::from(quantizer.bits());
+        }
+        let bits = f64::from(bits);
+        let mut count = 0;
+        for (&gaussians, &(_, end)) in self.stream.layers().iter().zip(self.layer_extents.extents())
+        {
+            if bytes >= end {
+                count += gaussians;
+            } else if bits > 0.0 {
+                let codes = (f64::from(gaussians) * bits / 8.0).ceil();
+                // The CRC comes after them.
+                let missing = end - CRC as f64 - bytes;
+                // The cast clamps.
+                count += (((codes - missing) * 8.0 / bits) as u32).min(gaussians);
+            }
+        }
+        count
     }
 
     /// How many Gaussians are enough for an output of this size; 0 until the header has arrived.

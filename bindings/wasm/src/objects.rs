@@ -90,7 +90,7 @@ pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -
     let chunks: Array = (stream.chunks().iter())
         .map(|chunk| {
             object([
-                ("type", chunk.kind.to_string().into()),
+                ("type", chunk.kind.letters().to_string().into()),
                 ("count", chunk.count.into()),
                 ("bytes", (chunk.bytes as f64).into()),
             ])
