@@ -131,8 +131,11 @@ impl Header {
         let dequantizer = match coding {
             _ if gaussians == 0 => None,
             Coding::Packed => {
-                let quantizers = (0..header.components()).map(|_| Quantizer::parse(&mut fields));
-                Some(Dequantizer::Packed(quantizers.collect::<Result<_, _>>()?))
+                let mut quantizers = Vec::new();
+                for _ in 0..header.components() {
+                    quantizers.push(Quantizer::parse(&mut fields)?);
+                }
+                Some(Dequantizer::Packed(quantizers))
             }
             Coding::Entropy => {
                 let channels = color.channels();
