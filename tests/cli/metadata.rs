@@ -188,7 +188,7 @@ fn a_size_that_metadata_alone_exceeds_names_the_way_out() {
 
     // What is too small without metadata, too, is as small as can be.
     let report =
-        room.json(&["encode", "a.jpg", "b.gip", "--bytes", "50", "--effort", "1", "--json"]);
+        room.json(&["encode", "a.jpg", "b.gip", "--bytes", "20", "--effort", "1", "--json"]);
     let reason = report["shortfall"].as_str().expect("it says why");
     assert!(reason.contains("are metadata"), "{reason}");
     let (_, errors) = room.batch(3, &["a.jpg", "--out", "out", "--bytes", "5000", "--effort", "1"]);
