@@ -1,10 +1,12 @@
 //! `.gip` through the `image` crate: hooks, decoder, encoder.
 
+mod common;
 mod pictures;
 
 use std::io::Cursor;
 use std::path::PathBuf;
 
+use common::{SIGNATURE, chunk};
 use image::error::{LimitErrorKind, UnsupportedErrorKind};
 use image::metadata::Orientation;
 use image::{
@@ -175,6 +177,28 @@ fn metadata_is_carried() {
     assert_eq!(decoder.exif_metadata().unwrap().as_deref(), Some(EXIF_ROTATE_90));
     assert_eq!(decoder.xmp_metadata().unwrap(), None);
     assert_eq!(decoder.orientation().unwrap(), Orientation::Rotate90);
+}
+
+#[test]
+fn metadata_after_the_layers_is_found() {
+    let file = encode(ColorType::L8);
+    let (layers, end) = file.split_at(file.len() - chunk(b"E", &[]).len());
+    let exif = b"II\x2a\0\x08\0\0\0\0\0\0\0\0\0";
+    let late = [(b"iCCP", &b"a profile"[..]), (b"eXIf", exif), (b"xMPd", b"<x/>")];
+    let late = late.map(|(kind, payload)| chunk(kind, payload)).concat();
+    let late = [layers, &late, end].concat();
+    let mut decoder = GipDecoder::new(&late[..]).unwrap();
+    assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
+    assert_eq!(decoder.icc_profile().unwrap().as_deref(), Some(&b"a profile"[..]));
+    assert_eq!(decoder.exif_metadata().unwrap().as_deref(), Some(&exif[..]));
+    assert_eq!(decoder.xmp_metadata().unwrap().as_deref(), Some(&b"<x/>"[..]));
+    assert_eq!(read_all(decoder), reference(&file));
+
+    // The orientation is known when the first layer begins, the rest is not.
+    let header = SIGNATURE.len() + 2 + usize::from(late[SIGNATURE.len() + 1]) + 4;
+    let mut decoder = GipDecoder::new(&late[..=header]).unwrap();
+    assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
+    assert!(matches!(decoder.icc_profile(), Err(ImageError::Decoding(_))));
 }
 
 #[test]
