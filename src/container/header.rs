@@ -1,6 +1,7 @@
 //! The header, the chunk `H`: all that a decoder must know before it allocates memory, and what turns the codes
 //! of Gaussians into values (spec, section 5.1).
 
+#[cfg(feature = "encode")]
 use alloc::vec;
 use alloc::vec::Vec;
 
