@@ -1,6 +1,10 @@
 //! Files with any Gaussians: the packed coding with 32-bit floats (spec, sections 4 to 7.2).
 
-use image_gip::ColorModel;
+use std::fs;
+
+use image_gip::{ChunkType, ColorModel};
+
+use super::decode;
 
 /// A picture of Gaussians that no encoder would write.
 #[derive(Clone, Debug)]
@@ -13,22 +17,23 @@ pub(crate) struct Scene {
     pub(crate) gaussians: Vec<[f32; 9]>,
 }
 
-/// A texture for a picture of 96 x 64 pixels, in all octaves and directions (spec, section 5.7).
-#[rustfmt::skip]
-const TEXTURE: [u8; 43] = [
-    0xcd, 0x7c, 0x05, 0x16, 0xcf, 0x39, 0x02, 0x89, 0xde, 0x2e, 0xfa,
-    0xff, 0x32, 0xb0, 0xf9, 0x62, 0x89, 0x3d, 0x66, 0x5a, 0xc3, 0xfc,
-    0x6f, 0x28, 0x46, 0x95, 0xd1, 0x5f, 0x64, 0xd4, 0x82, 0x0c, 0x80,
-    0xc6, 0xb1, 0xa7, 0x7b, 0xb2, 0xd5, 0x80, 0xde, 0xc5, 0x60,
-];
-
 /// The size of the pictures that [`with_texture`] takes.
-pub(crate) const TEXTURED_SIZE: (u32, u32) = (96, 64);
+pub(crate) const TEXTURED_SIZE: (u32, u32) = (61, 43);
 
-/// A file with a texture as well, right before its end.
+/// A test vector of this size, with a texture in all octaves and directions.
+const TEXTURED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../spec/vectors/texture-gray8.gip");
+
+/// A file with the texture of the test vector as well, right before its end.
 pub(crate) fn with_texture(mut file: Vec<u8>) -> Vec<u8> {
+    let vector = fs::read(TEXTURED).expect("a test vector");
+    let decoder = decode(&vector);
+    let header = decoder.header().expect("a valid file");
+    assert_eq!((header.width, header.height), TEXTURED_SIZE);
+    let texture = decoder.chunks().iter().find(|chunk| chunk.kind == ChunkType::TXTR);
+    let length = texture.expect("it has a texture").bytes as usize;
+    let start = vector.windows(4).position(|letters| letters == b"tXTR").expect("as before");
     let end = file.len() - chunk(b"E", &[]).len();
-    file.splice(end..end, chunk(b"tXTR", &TEXTURE));
+    file.splice(end..end, vector[start..start + length].iter().copied());
     file
 }
 
