@@ -148,8 +148,10 @@ def read_quantizer(fields):
 
 def read_side(fields):
     side = fields.number()
-    if not 1 <= side <= LARGEST_SIDE:
-        raise Malformed("a width or height out of range")
+    if side == 0:
+        raise Malformed("a width or height of 0")
+    if side > LARGEST_SIDE:
+        raise Unsupported("a width or height over 2^20")
     return side
 
 
@@ -173,8 +175,10 @@ def read_header(payload):
     layers = 0
     if gaussians > 0:
         layers = fields.number()
-        if not 1 <= layers <= min(MOST_LAYERS, gaussians):
+        if not 1 <= layers <= gaussians:
             raise Malformed("a number of layers out of range")
+        if layers > MOST_LAYERS:
+            raise Unsupported("more than 65535 layers")
     # u8 in 1/255 is the same number as 257 times it in 1/65535, and so is the rounded quotient (section 9.4).
     if depth == 8:
         base = [F(fields.u8()) / F(255) for _ in range(CHANNELS[model])]
