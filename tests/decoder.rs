@@ -566,7 +566,8 @@ fn one_call_gives_the_picture_at_its_own_depth() {
 #[test]
 fn one_call_refuses_what_is_not_a_whole_sound_file() {
     for (name, bytes) in files() {
-        let cuts = (0..80).chain([bytes.len() / 2]).chain(bytes.len().saturating_sub(40)..bytes.len());
+        let cuts =
+            (0..80).chain([bytes.len() / 2]).chain(bytes.len().saturating_sub(40)..bytes.len());
         for length in cuts.filter(|&length| length < bytes.len()) {
             let error = image_gip::decode(&bytes[..length]).expect_err("a part of a file");
             assert!(error.is_unexpected_end(), "{name}, {length} bytes: {error}");
