@@ -1,10 +1,15 @@
 //! Files with any Gaussians: the packed coding with 32-bit floats (spec, sections 4 to 7.2).
 
+#[allow(dead_code, reason = "files are written here, not read")]
+#[path = "../../../tests/common/numbers.rs"]
+mod numbers;
+
 use std::fs;
 
 use image_gip::{ChunkType, ColorModel};
 
 use super::decode;
+use numbers::number;
 
 /// A picture of Gaussians that no encoder would write.
 #[derive(Clone, Debug)]
@@ -93,15 +98,4 @@ impl Scene {
 fn chunk(kind: &[u8], payload: &[u8]) -> Vec<u8> {
     let checked = [kind, &number(payload.len() as u32), payload].concat();
     [checked.as_slice(), &crc32fast::hash(&checked).to_le_bytes()].concat()
-}
-
-/// A number as a file has it: seven bits in each byte, the lowest first (spec, section 2).
-fn number(mut value: u32) -> Vec<u8> {
-    let mut bytes = vec![];
-    while value >= 0x80 {
-        bytes.push(value as u8 | 0x80);
-        value >>= 7;
-    }
-    bytes.push(value as u8);
-    bytes
 }
