@@ -37,6 +37,14 @@ impl LayerCount {
         bytes
     }
 
+    /// Takes the bytes of the number from a payload that has arrived as a whole.
+    pub(crate) fn take(self, payload: &mut &[u8]) -> Result<u32, DecodeError> {
+        let count = self.read(&mut varint::Arriving::default(), payload)?;
+        count.ok_or_else(|| {
+            DecodeError::malformed(ChunkType::LAYER, "too short for a number of Gaussians")
+        })
+    }
+
     /// Takes the bytes of the number from `input`, if there are any. `None` until all of them have arrived.
     pub(crate) fn read(
         self,

@@ -62,12 +62,12 @@ impl Metadata {
     /// that Exif knows. The decoder's samples are not turned.
     #[must_use]
     pub fn orientation(&self) -> Orientation {
-        self.exif.as_deref().map(Self::orientation_of).unwrap_or_default()
+        self.exif.as_deref().and_then(exif::orientation).unwrap_or_default()
     }
 
-    /// What Exif data say of the orientation.
-    pub(crate) fn orientation_of(exif: &[u8]) -> Orientation {
-        exif::orientation(exif).unwrap_or_default()
+    /// Whether Exif data say that the picture is to be turned.
+    pub(crate) fn turns(exif: &[u8]) -> bool {
+        exif::orientation(exif).unwrap_or_default() != Orientation::NoTransforms
     }
 
     /// Makes Exif say that the picture is upright. One that says nothing stays as it is.
@@ -101,7 +101,7 @@ impl Metadata {
     pub(crate) fn is_of_display(chunk: ChunkType, payload: &[u8]) -> bool {
         match chunk {
             ChunkType::ICCP => true,
-            ChunkType::EXIF => Self::orientation_of(payload) != Orientation::NoTransforms,
+            ChunkType::EXIF => Self::turns(payload),
             _ => false,
         }
     }

@@ -6,9 +6,8 @@ use alloc::vec::Vec;
 use super::header::{Dequantizer, Header};
 use super::metadata::Metadata;
 use super::parser::{Event, Parser};
-use super::varint;
 use super::writer::ChunkWriter;
-use crate::chunk::{ChunkType, SIGNATURE};
+use crate::chunk::ChunkType;
 use crate::coding::layer_count::LayerCount;
 use crate::error::DecodeError;
 
@@ -113,10 +112,7 @@ impl<'a> Prefixes<'a> {
                 let later = declared - self.layers.len() - 1;
                 let mut bytes = payload;
                 let declared = LayerCount::new(self.header.gaussians - gaussians_before, later);
-                let count = declared.read(&mut varint::Arriving::default(), &mut bytes)?;
-                let too_short =
-                    || DecodeError::malformed(chunk, "too short for a number of Gaussians");
-                let gaussians = count.ok_or_else(too_short)?;
+                let gaussians = declared.take(&mut bytes)?;
                 self.layers.push(Layer { gaussians, bytes, end, gaussians_before, bytes_before });
             }
             _ if Metadata::is_of_display(chunk, payload) => {
@@ -184,12 +180,7 @@ impl<'a> Prefixes<'a> {
         let kept = self.kept.iter().filter(|(layers, ..)| *layers <= before);
         let kept = kept.map(|(_, kind, payload)| kind.framed(payload.len())).sum::<usize>();
         let header = self.header(before + 1, last.gaussians_before + last.gaussians);
-        SIGNATURE.len()
-            + ChunkType::HEADER.framed(header.len())
-            + kept
-            + last.bytes_before
-            + last.framed(true)
-            + ChunkType::END.framed(0)
+        ChunkWriter::length(header.len(), kept + last.bytes_before + last.framed(true))
     }
 
     /// The payload of the header of so many layers and Gaussians.

@@ -20,6 +20,11 @@ impl ChunkWriter {
         Self { file: SIGNATURE.to_vec() }
     }
 
+    /// Bytes of a file with a header of such a payload, and chunks of so many bytes between it and the end.
+    pub(crate) fn length(header: usize, chunks: usize) -> usize {
+        SIGNATURE.len() + ChunkType::HEADER.framed(header) + chunks + ChunkType::END.framed(0)
+    }
+
     /// Appends a chunk, whose payload is these parts and has at most [`MAX_CHUNK_LENGTH`] bytes.
     pub(crate) fn chunk(&mut self, kind: ChunkType, payload: &[&[u8]]) {
         let length = payload.iter().map(|part| part.len()).sum::<usize>();

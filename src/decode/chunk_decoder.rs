@@ -14,7 +14,6 @@ use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::layers::bounds::LayerBounds;
 use crate::limits::Limits;
-use crate::orientation::Orientation;
 #[cfg(feature = "std")]
 use crate::render::RenderOptions;
 use crate::texture::Texture;
@@ -252,8 +251,8 @@ impl ChunkDecoder {
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
                 // What has been shown is not turned afterwards.
-                let turns = |exif| Metadata::orientation_of(exif) != Orientation::NoTransforms;
-                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turns(&payload) {
+                let is_late_exif = chunk == ChunkType::EXIF && !self.layers.is_empty();
+                if is_late_exif && Metadata::turns(&payload) {
                     let reason = "an orientation after the first layer";
                     return Err(DecodeError::malformed(chunk, reason));
                 }

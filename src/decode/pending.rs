@@ -4,11 +4,10 @@
 
 use alloc::vec::Vec;
 
-use crate::chunk::ChunkType;
 use crate::coding::entropy::{AttributeBits, LayerCoder, Quantization};
 use crate::coding::layer_count::LayerCount;
 use crate::color::ColorModel;
-use crate::container::{Header, varint};
+use crate::container::Header;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::threads::{self, Threads};
@@ -58,10 +57,7 @@ impl PendingLayers {
         number: usize,
     ) -> Result<u32, DecodeError> {
         let mut bytes = &payload[..];
-        let Some(count) = declared.read(&mut varint::Arriving::default(), &mut bytes)? else {
-            let reason = "too short for a number of Gaussians";
-            return Err(DecodeError::malformed(ChunkType::LAYER, reason));
-        };
+        let count = declared.take(&mut bytes)?;
         LayerCoder::check_count(count, bytes)?;
         let start = payload.len() - bytes.len();
         self.count += count as usize;

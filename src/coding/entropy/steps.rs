@@ -84,6 +84,12 @@ pub(crate) fn rounded_ratio(value: f32) -> f32 {
     ratio(number_of_ratio(value))
 }
 
+/// Bytes of the steps of so many colour axes, where those of geometry are the usual ones.
+#[cfg(feature = "encode")]
+pub(crate) const fn usual_length(channels: usize) -> usize {
+    size_of::<u16>() + channels - 1
+}
+
 /// Appends a step that a file can have.
 #[cfg(feature = "encode")]
 pub(crate) fn write(step: f32, out: &mut Vec<u8>) {

@@ -8,7 +8,7 @@ use super::symbol::SYMBOLS;
 use super::tables;
 use crate::chunk::ChunkType;
 use crate::coding::layer_count::LayerCount;
-use crate::container::{Dequantizer, Event, Header, Parser, varint};
+use crate::container::{Dequantizer, Event, Header, Parser};
 
 /// How often each symbol of each context was coded.
 type SymbolCounts = Vec<[f64; SYMBOLS]>;
@@ -72,8 +72,7 @@ fn counts(file: &[u8]) -> SymbolCounts {
         let mut models = tables::initial_models();
         let mut bytes = &payload[..];
         let declared = LayerCount::new(left, layers.len() - 1 - number);
-        let count = declared.read(&mut varint::Arriving::default(), &mut bytes);
-        let count = count.expect("a valid layer").expect("a whole layer");
+        let count = declared.take(&mut bytes).expect("a valid layer");
         left -= count;
         let decoder = RansDecoder::new(bytes, &mut models);
         let mut counter = SymbolCounter { coder: decoder, counts };

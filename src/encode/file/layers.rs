@@ -96,15 +96,14 @@ fn divide<'a>(
     let first = room.map_or(0, |room| count_within(coder, codes, room));
     let (first, mut rest) = codes.split_at_mut(first);
     let mut parts = Vec::new();
-    let mut shared = 0;
+    let (mut shared, mut before) = (0, first.len());
     for share in plan::first_entropy_layers(count) {
-        // The Gaussians of the first layer belong to the usual ones.
+        // The Gaussians of the first layer belong to the usual ones. One with few others is left out.
         shared += share;
-        let before = first.len() + parts.iter().map(|part: &&mut [Code]| part.len()).sum::<usize>();
-        if first.is_empty() || shared > 2 * before {
+        if shared > 2 * before {
             let (part, later) = rest.split_at_mut(shared - before);
             parts.push(part);
-            rest = later;
+            (rest, before) = (later, shared);
         }
     }
     parts.push(rest);
@@ -119,11 +118,12 @@ fn count_within(coder: &LayerCoder<'_>, codes: &[Code], room: usize) -> usize {
     let fits = |count: usize| {
         codes.get(..count).is_some_and(|codes| coder.write(&mut codes.to_vec()).bytes.len() <= room)
     };
-    let mut step = 1;
-    while fits(step) {
-        step *= 2;
-    }
+    // The largest power of two that fits, and from there in steps of half of the one before.
     let mut count = 0;
+    while fits((2 * count).max(1)) {
+        count = (2 * count).max(1);
+    }
+    let mut step = count / 2;
     while step > 0 {
         if fits(count + step) {
             count += step;

@@ -1,7 +1,7 @@
 //! The chunks of a file, around its layers (spec, sections 4 and 5).
 
 use super::layers;
-use crate::chunk::{ChunkType, SIGNATURE, VERSION};
+use crate::chunk::{ChunkType, VERSION};
 use crate::coding::entropy::{Code, EncodedLayer, Quantization, QuantizedCodes, steps};
 use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{PackedCodes, Quantizer};
@@ -110,11 +110,7 @@ impl<'a> FileLayout<'a> {
         let header =
             Header { gaussians: gaussians as u32, layers: layers as u16, ..self.header.clone() };
         let header = header.to_payload(Some(&Dequantizer::Packed(quantizers.to_vec())));
-        let rest = SIGNATURE.len()
-            + ChunkType::HEADER.framed(header.len())
-            + self.metadata_length()
-            + ChunkType::END.framed(0);
-        rest as u64 + length
+        ChunkWriter::length(header.len(), self.metadata_length()) as u64 + length
     }
 
     /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
@@ -160,21 +156,15 @@ impl<'a> FileLayout<'a> {
 
     /// Bytes of a file of one layer, and of what says how the picture is shown, less those of the coded Gaussians.
     fn least_prefix(&self) -> usize {
-        let colors = vec![steps::rounded(1.0); self.header.color.channels()];
-        let quantization = Quantization::new(steps::USUAL_GEOMETRY, colors);
-        let header =
-            Header { coding: Coding::Entropy, gaussians: 1, layers: 1, ..self.header.clone() };
-        let header = header.to_payload(Some(&Dequantizer::Entropy(quantization)));
+        // With Gaussians, it has their steps as well, and a byte for the number of layers.
+        let header = self.header.to_payload(None).len();
+        let header = header + steps::usual_length(self.header.color.channels()) + 1;
         let shown = self
             .metadata
             .chunks()
             .filter(|(kind, payload)| Metadata::is_of_display(*kind, payload));
-        SIGNATURE.len()
-            + ChunkType::HEADER.framed(header.len())
-            + shown.map(|(kind, payload)| kind.framed(payload.len())).sum::<usize>()
-            + ChunkType::LAYER.framed(0)
-            + ChunkType::END.framed(0)
-            + BYTES_OF_NUMBERS
+        let shown = shown.map(|(kind, payload)| kind.framed(payload.len())).sum::<usize>();
+        ChunkWriter::length(header, shown + ChunkType::LAYER.framed(0)) + BYTES_OF_NUMBERS
     }
 
     /// Refuses a first layer that has no room for a Gaussian.
