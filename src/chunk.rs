@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-#[cfg(any(feature = "encode", feature = "std"))]
+#[cfg(feature = "encode")]
 use crate::container::varint;
 
 /// The bytes before the version, with which every file begins: a byte that no text starts with, the letters `GIP`,
@@ -70,6 +70,12 @@ impl ChunkType {
         if first.is_ascii_lowercase() { 4 } else { 1 }
     }
 
+    /// The letters of the type, without what it stands for: `H`, `bNDS`. What is no letter, in the error that says so,
+    /// is escaped.
+    pub fn letters(&self) -> impl fmt::Display {
+        self.bytes().escape_ascii()
+    }
+
     /// The bytes in the file.
     pub(crate) fn bytes(&self) -> &[u8] {
         &self.0[..Self::length_from(self.0[0])]
@@ -96,9 +102,7 @@ impl ChunkType {
 /// The letters, and for those of this document that are a single one what it stands for.
 impl fmt::Display for ChunkType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for byte in self.bytes() {
-            fmt::Display::fmt(&byte.escape_ascii(), f)?;
-        }
+        self.letters().fmt(f)?;
         match *self {
             Self::HEADER => f.write_str(" (header)"),
             Self::LAYER => f.write_str(" (layer)"),

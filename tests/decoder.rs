@@ -984,11 +984,11 @@ fn errors_name_the_field_of_the_header_and_the_rule() {
         (&|h| (h.coding, h.form) = (ENTROPY, 3), "unsupported: form of steps 3"),
         (&|h| h.width = 0, "the width is zero"),
         (&|h| h.height = 0, "the height is zero"),
-        (&|h| h.width = (1 << 20) + 1, "the width is over 2^20"),
-        (&|h| h.height = u32::MAX, "the height is over 2^20"),
+        (&|h| h.width = (1 << 20) + 1, "unsupported: width 1048577"),
+        (&|h| h.height = u32::MAX, "unsupported: height 4294967295"),
         (&|h| h.layers = 0, "Gaussians, but no layer"),
         (&|h| h.layers = 2, "more layers than Gaussians"),
-        (&|h| (h.gaussians, h.layers) = (1 << 16, 1 << 16), "more than 65535 layers"),
+        (&|h| (h.gaussians, h.layers) = (1 << 16, 1 << 16), "unsupported: number of layers 65536"),
         (&|h| (h.kernel, h.cutoff) = (0, 0.0), "a cut-off that is not in (0, 64]"),
         (&|h| (h.kernel, h.cutoff) = (0, -1.0), "a cut-off that is not in (0, 64]"),
         (&|h| (h.kernel, h.cutoff) = (0, 64.5), "a cut-off that is not in (0, 64]"),
@@ -1041,7 +1041,7 @@ fn errors_name_the_field_of_the_header_and_the_rule() {
         (fields(&[0x90, 0x80, 0x80, 0x80, 0], &[]), "a number with more bytes than it needs"),
         (fields(&[0x90, 0x80, 0x80, 0x80, 0x10], &[]), "a number of more than 32 bits"),
         (fields(&[0x90, 0x80, 0x80, 0x80, 0x80, 0], &[]), "a number of more than 32 bits"),
-        (fields(&[0x90, 0x80, 0x80, 0x80, 0x0F], &[]), "the width is over 2^20"),
+        (fields(&[0x90, 0x80, 0x80, 0x80, 0x0F], &[]), "unsupported: width 4026531856"),
     ] {
         let expected = format!("chunk H (header): {expected}");
         check_refused(&after(chunk(b"H", &payload)), &expected);

@@ -383,6 +383,21 @@ fn hard_pictures_become_sound_files() {
     }
 }
 
+/// Stronger Gaussians would be such that show between the centres of pixels, or cancel each other: what is left of
+/// them in the picture would be rounding errors.
+#[test]
+fn no_gaussian_is_much_stronger_than_white() {
+    let checker: Vec<u8> = (0..64 * 64).map(|i| ((i % 64 + i / 64) % 2 * 255) as u8).collect();
+    let source = Source::new_u8(64, 64, ColorModel::Gray, &checker).expect("a picture");
+    for tune in [Tune::Visual, Tune::Psnr] {
+        let encoder = quick(Target::BitsPerPixel(4.0)).with_tune(tune).with_texture(0);
+        let stream = decode(&encoder.encode(&source).expect("the options are valid").bytes);
+        let strongest = stream.gaussians().iter().map(|gaussian| gaussian.color[0].abs());
+        let strongest = strongest.fold(0.0, f32::max);
+        assert!((0.3..3.0).contains(&strongest), "{strongest}");
+    }
+}
+
 #[test]
 fn one_bright_pixel_is_found() {
     let mut samples = vec![20; 64 * 48];

@@ -168,6 +168,40 @@ fn texture_takes_memory_as_it_arrives() {
 }
 
 #[test]
+fn what_follows_the_layers_needs_no_more_memory_side_by_side() {
+    let _alone = alone();
+    let sides = [256, 256];
+    let header = Header { width: 256, height: 256, ..Header::default() };
+    let grid = Grid::new(header.sides());
+    let mut random = common::Random(9);
+    let mut code = |_| {
+        let axes = vec![(random.next() % 4000) as i32];
+        let center = grid.units([random.range(0.0, 256.0), random.range(0.0, 256.0)]);
+        Code { exponent: 7, axes, center, ..Code::default() }
+    };
+    let layers = (0..20).map(|_| (0..100).map(&mut code).collect()).collect();
+    let file = File::of_entropy_coded(header, vec![1.0, 1.0, 1.0, 1.0, 0.125], layers);
+    let texture = map(sides, 1000, 0).payload(sides);
+    let metadata = [b"xMPd".to_vec(), vec![b'x'; 40_000]];
+    for (kind, payload) in [(&b"tXTR"[..], &texture), (&metadata[0], &metadata[1])] {
+        let mut chunks = file.chunks();
+        chunks.insert(chunks.len() - 1, chunk(kind, payload));
+        let bytes = of_chunks(&chunks);
+        let mut refused = 0;
+        for max_memory in (10..130).map(|step| step * 4000) {
+            let limits = limits(|l| l.max_memory = max_memory);
+            let (_, one_by_one) = decode_pieces([bytes.as_slice()], limits.clone());
+            let side_by_side = image_gip::Decoder::new_with_limits(bytes.as_slice(), limits)
+                .and_then(|mut decoder| decoder.read_to_end());
+            let found = [one_by_one, side_by_side].map(ending);
+            assert_eq!(found[0], found[1], "{max_memory}");
+            refused += usize::from(found[0] == "bytes of memory");
+        }
+        assert!((1..119).contains(&refused), "{refused} of 120");
+    }
+}
+
+#[test]
 fn a_map_of_large_gaussians_is_refused_by_its_work() {
     let _alone = alone();
     let header = Header { width: 2048, height: 2048, ..Header::default() };

@@ -6,7 +6,7 @@ mod common;
 use common::oracle::{self, Request};
 use common::rans::Op;
 use common::synthesis::{Block, Node, Synthesis, map_sums};
-use common::{File, Ghdr, decode_valid, entropy, texture};
+use common::{File, Header, decode_valid, entropy, texture};
 use image_gip::{Gaussian, Picture, RenderOptions};
 
 const SPECIFICATION: &str = include_str!("../spec/gip.md");
@@ -127,7 +127,8 @@ fn the_integer_holds_the_codes() {
             [first, last, row[2]].map(|n| n.parse::<u32>().expect("a number"));
         assert_eq!(integer >> first & ((1 << (last - first + 1)) - 1), code.into(), "{row:?}");
     }
-    let start = packed().file().len() - 12 - (12 + 22) - 4 - 9;
+    // Before the end, the second layer, and the CRC of the first.
+    let start = packed().file().len() - 6 - 24 - 4 - 9;
     let bytes = integer.to_le_bytes();
     assert_eq!(packed().file()[start..start + 9], bytes[..9]);
 }
@@ -168,10 +169,10 @@ fn the_hex_of_the_entropy_coding_decodes_to_what_is_printed() {
 #[test]
 fn the_symbols_of_the_entropy_coding_are_those_in_the_bytes() {
     let file = entropy_coded().file();
-    let (quantizers, layer) = (8 + 48 + 8, 8 + 48 + 40 + 8);
-    let steps = file[quantizers..quantizers + 28].as_chunks().0;
-    let steps: Vec<f32> = steps.iter().map(|step| f32::from_le_bytes(*step)).collect();
-    let layer = entropy::read([6, 4], &steps, &file[layer..layer + 20]);
+    // After the signature and the header.
+    let layer = 8 + 26 + 2;
+    let steps = [1.0, 0.5, 0.5, 0.5, 0.125, 0.125, 0.125];
+    let layer = entropy::read([6, 4], &steps, 2, &file[layer..layer + 16]);
     let layer = layer.expect("a sound layer");
     let found = layer.ops.iter().zip(&layer.states[1..]).filter_map(|(op, state)| {
         let (read, value) = match op {
@@ -200,14 +201,14 @@ const SIDES: [u32; 2] = [6, 4];
 /// The payload of `tXTR`.
 fn payload() -> Vec<u8> {
     let file = textured().file();
-    let start = 8 + 48 + 8;
-    file[start..start + 16].to_vec()
+    let start = 8 + 11 + 5;
+    file[start..start + 11].to_vec()
 }
 
 /// The file for the oracle.
 fn textured_file() -> File {
     let [width, height] = SIDES;
-    let header = Ghdr { width, height, base: [0x8080, 0, 0, 0], ..Ghdr::default() };
+    let header = Header { width, height, base: [0x8080, 0, 0, 0], ..Header::default() };
     File::of_floats(header, &[]).with(b"tXTR", &payload())
 }
 
@@ -239,10 +240,9 @@ fn the_hex_of_the_texture_decodes_to_what_is_printed() {
 
 #[test]
 fn the_map_of_the_texture_is_what_is_printed() {
-    let step: [u8; 4] = payload()[..4].try_into().expect("four bytes");
-    let step = f32::from_le_bytes(step);
-    let steps = texture::steps(step);
-    let layer = entropy::read(texture::map_sides(SIDES), &steps, &payload()[4..]);
+    // After a step and a number.
+    let steps = texture::steps(0.125);
+    let layer = entropy::read(texture::map_sides(SIDES), &steps, 1, &payload()[3..]);
     let layer = layer.expect("a sound layer");
     let code = &layer.codes[0];
     assert_eq!((code.exponent, &code.axes[..], code.size), (2, &[7, 0, 2][..], 0));

@@ -50,6 +50,8 @@ run(
   '-O2',
   // Once more while the module shrinks: it is 2 kB smaller when compressed.
   '--converge',
+  // What several branches end with is there once: 0.7 kB less.
+  '--code-folding',
   '--strip-debug',
   '--strip-producers',
   '--strip-target-features',

@@ -49,6 +49,8 @@ pub(crate) fn butteraugli_3_norm(
 
 /// The display that CVVDP assumes: 24 inches of full HD, of 200 cd/m² in an office, seen from 60 cm.
 const DISPLAY: &str = "standard_fhd";
+/// What CVVDP may take for its work, in bytes: a GiB, its default, is too little for pictures of three megapixels.
+const CVVDP_MEMORY: usize = 4 << 30;
 
 /// ColorVideoVDP in JOD: 10 for equal pictures; of two pictures that are 1 apart, three of four
 /// people prefer the one with more. Below 4 x 4 pixels it is not defined: NaN.
@@ -60,7 +62,8 @@ pub(crate) fn cvvdp(source: &[u8], decoded: &[u8], width: u32, height: u32) -> R
         let samples = samples.iter().map(|&sample| f32::from(sample) / 255.0).collect();
         Image::new(width as usize, height as usize, 3, samples)
     };
-    let metric = Cvvdp::new(DisplayModel::from_name(DISPLAY)?, Options::default().with_memory_limit_bytes(4 << 30))?;
+    let options = Options::default().with_memory_limit_bytes(CVVDP_MEMORY);
+    let metric = Cvvdp::new(DisplayModel::from_name(DISPLAY)?, options)?;
     let prediction = metric.predict_image(&image(decoded)?, &image(source)?, Color::Srgb)?;
     Ok(prediction.jod.into())
 }

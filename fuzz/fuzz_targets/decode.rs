@@ -10,6 +10,7 @@ fuzz_target!(|bytes: &[u8]| {
     let fed = decoder.feed(bytes);
     assert_eq!(fed.is_ok() && decoder.is_complete(), decoder.finish().is_ok());
     image_gip_fuzz::check(&decoder);
+    image_gip_fuzz::check_prefixes(bytes, &decoder);
     let _orientation = decoder.orientation();
     image_gip_fuzz::decode_region(bytes);
 });

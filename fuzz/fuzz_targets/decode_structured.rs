@@ -12,4 +12,5 @@ fuzz_target!(|file: File| {
     let error = decoder.feed(&bytes).err();
     file.check(&decoder, error.as_ref());
     image_gip_fuzz::check(&decoder);
+    image_gip_fuzz::check_prefixes(&bytes, &decoder);
 });

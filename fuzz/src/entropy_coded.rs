@@ -4,23 +4,28 @@ use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
 use crate::entropy::{self, Code, Grid};
+use crate::number;
 use crate::rans;
+use crate::steps;
 use crate::texture::{self, map_sides};
 
 /// What an entropy-coded file has instead of quantizers and packed codes.
 #[derive(Arbitrary, Debug)]
 pub struct EntropyCoded {
-    steps: [Step; 8],
+    /// Of the first colour axis.
+    step: Step,
+    /// Of the steps of the other colour axes to it, in the code of section 5.3.
+    ratios: [u8; 3],
+    /// Of position, size, ratio and slant, if they are not the usual ones.
+    geometry: Option<[Step; 4]>,
     layers: Vec<Layer>,
 }
 
+/// In the code of section 5.3, in which the upper ones are over 2^10.
 #[derive(Arbitrary, Debug)]
-struct Step {
-    exponent: u8,
-    mantissa: u8,
-}
+struct Step(u16);
 
-/// What `tXTR` holds, whose layer is one of the entropy coding.
+/// What `tXTR` holds, whose Gaussians are coded as those of a layer of the entropy coding.
 #[derive(Arbitrary, Debug)]
 pub struct Map {
     step: Step,
@@ -30,7 +35,7 @@ pub struct Map {
 #[derive(Arbitrary, Debug)]
 enum Layer {
     Gaussians(Vec<Gaussian>),
-    /// What follows a count of one more.
+    /// One Gaussian more than the number says, in any bytes.
     Bytes(u8, Vec<u8>),
 }
 
@@ -51,17 +56,25 @@ struct Gaussian {
 struct Number(i8);
 
 impl EntropyCoded {
-    /// The payload of `QNTZ`.
-    pub fn quantizers(&self, channels: usize) -> Vec<u8> {
-        self.steps(channels).into_iter().flat_map(f32::to_le_bytes).collect()
+    /// Whether the header says the steps of geometry.
+    pub fn has_geometry(&self) -> bool {
+        self.geometry.is_some()
     }
 
-    /// The payloads of `GAUS`, each with its number of Gaussians.
+    /// The steps in the header.
+    pub fn fields(&self, channels: usize) -> Vec<u8> {
+        let mut fields = self.step.bytes().to_vec();
+        fields.extend(&self.ratios[..channels - 1]);
+        fields.extend(self.geometry.iter().flatten().flat_map(Step::bytes));
+        fields
+    }
+
+    /// The number of Gaussians in each layer, and the bytes in which they are coded.
     pub fn layers(&self, sides: [u32; 2], channels: usize) -> Vec<(u32, Vec<u8>)> {
         let steps = self.steps(channels);
         let filled = |layer: &&Layer| !matches!(layer, Layer::Gaussians(all) if all.is_empty());
         let layers = self.layers.iter().filter(filled);
-        layers.map(|layer| layer.payload(sides, &steps, channels)).collect()
+        layers.map(|layer| layer.coded(sides, &steps, channels)).collect()
     }
 
     /// Checks that a decoder made of the layers what the tests' coder makes of them.
@@ -75,10 +88,15 @@ impl EntropyCoded {
         if matches!(error, Some(DecodeError::Limit { .. })) {
             return;
         }
-        let steps = self.steps(channels);
+        let (steps, layers) = (self.steps(channels), self.layers(sides, channels));
+        let range = steps::step(steps::LEAST)..=steps::step(steps::MOST);
+        if !layers.is_empty() && !steps.iter().all(|step| range.contains(step)) {
+            assert!(error.is_some(), "a step that is out of range was not noticed");
+            return;
+        }
         let (mut values, mut flaw) = (Vec::new(), None);
-        for (_, payload) in self.layers(sides, channels) {
-            match entropy::read(sides, &steps, &payload) {
+        for (count, bytes) in layers {
+            match entropy::read(sides, &steps, count, &bytes) {
                 Ok(layer) => values.extend(layer.values.concat()),
                 Err(found) => {
                     flaw = Some(found);
@@ -95,15 +113,22 @@ impl EntropyCoded {
         assert!(!differs, "the Gaussians differ");
     }
 
+    /// All steps, of which some may be out of range.
     fn steps(&self, channels: usize) -> Vec<f32> {
-        self.steps[..4 + channels].iter().map(Step::value).collect()
+        let first = self.step.value();
+        let geometry = match &self.geometry {
+            Some(steps) => steps.each_ref().map(Step::value),
+            None => steps::usual_geometry(),
+        };
+        let related = self.ratios[..channels - 1].iter().map(|&code| first * steps::ratio(code));
+        geometry.into_iter().chain([first]).chain(related).collect()
     }
 }
 
 impl Layer {
-    /// Its number of Gaussians, and its payload.
-    fn payload(&self, sides: [u32; 2], steps: &[f32], channels: usize) -> (u32, Vec<u8>) {
-        let (count, bytes) = match self {
+    /// Its number of Gaussians, and the bytes in which they are coded.
+    fn coded(&self, sides: [u32; 2], steps: &[f32], channels: usize) -> (u32, Vec<u8>) {
+        match self {
             Self::Bytes(count, bytes) => (u32::from(*count) + 1, bytes.clone()),
             Self::Gaussians(gaussians) => {
                 let code = |gaussian: &Gaussian| gaussian.code(sides, channels);
@@ -111,17 +136,16 @@ impl Layer {
                 let ops = entropy::write(sides, steps, &mut codes);
                 (codes.len() as u32, rans::encode(&ops))
             }
-        };
-        (count, [&count.to_le_bytes()[..], &bytes].concat())
+        }
     }
 }
 
 impl Map {
     /// The payload of `tXTR` in a picture with these sides.
     pub fn payload(&self, sides: [u32; 2]) -> Vec<u8> {
-        let step = self.step.value();
-        let (_, layer) = self.layer.payload(map_sides(sides), &texture::steps(step), 3);
-        [&step.to_le_bytes()[..], &layer].concat()
+        let steps = texture::steps(self.step.value());
+        let (count, bytes) = self.layer.coded(map_sides(sides), &steps, 3);
+        [&self.step.bytes()[..], &number(count), &bytes].concat()
     }
 
     /// Whether the tests' coder reads it.
@@ -131,10 +155,12 @@ impl Map {
 }
 
 impl Step {
-    /// From 2^-20 to 2^10.
+    fn bytes(&self) -> [u8; 2] {
+        self.0.to_le_bytes()
+    }
+
     fn value(&self) -> f32 {
-        let exponent = i32::from(self.exponent % 31) - 20;
-        ((1.0 + f32::from(self.mantissa) / 256.0) * (exponent as f32).exp2()).min(1024.0)
+        steps::step(self.0)
     }
 }
 

@@ -7,8 +7,15 @@ use arbitrary::Arbitrary;
 use image_gip::{DecodeError, StreamDecoder};
 
 use crate::entropy_coded::{EntropyCoded, Map};
+use crate::number;
 
-const SIGNATURE: &[u8] = b"\xC7GIP\r\n\x1A\n";
+/// With the version, 1.
+const SIGNATURE: &[u8] = b"\xC7GIP\r\n\x01\n";
+/// An Exif of one entry, up to the value of its orientation.
+const EXIF: &[u8] = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0";
+
+/// Types that any letters of an extra may happen to be.
+const KNOWN: [&[u8]; 5] = [b"H", b"L", b"E", b"bNDS", b"tXTR"];
 
 /// What a file is made of.
 #[derive(Arbitrary, Debug)]
@@ -29,7 +36,8 @@ pub struct File {
     layers: Vec<Vec<u8>>,
     extras: Vec<Extra>,
     flaw: Option<Flaw>,
-    texture: Option<Map>,
+    /// Before which of the other chunks, and what it holds.
+    texture: Option<(u8, Map)>,
 }
 
 #[derive(Arbitrary, Debug)]
@@ -91,10 +99,16 @@ struct Extra {
 enum ExtraKind {
     IccProfile,
     Exif,
+    /// An Exif with an orientation of 0 to 9, in place of the payload.
+    Orientation(u8),
     Xmp,
     Text,
+    /// A critical chunk has the first letter alone.
     Other([u8; 4]),
 }
+
+/// Type and payload.
+type Chunk = (Vec<u8>, Vec<u8>);
 
 /// One changed byte.
 #[derive(Arbitrary, Debug)]
@@ -106,23 +120,14 @@ struct Flaw {
 impl File {
     /// The bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let layers = self.layers();
-        let quantizers = match &self.entropy_coded {
-            None => self.quantizers().iter().flat_map(|quantizer| quantizer.entry()).collect(),
-            Some(entropy_coded) => entropy_coded.quantizers(self.channels()),
-        };
-        let mut chunks = vec![(*b"GHDR", self.header(&layers)), (*b"QNTZ", quantizers)];
-        chunks.extend(self.texture.iter().map(|map| (*b"tXTR", map.payload(self.sides()))));
-        chunks.extend(layers.into_iter().map(|(_, payload)| (*b"GAUS", payload)));
-        chunks.push((*b"GEND", Vec::new()));
-        for extra in &self.extras {
-            // Never before the header: that is one error, found at once.
-            let place = 1 + usize::from(extra.place) % (chunks.len() - 1);
-            chunks.insert(place, (extra.kind.name(), extra.payload.clone()));
-        }
         let mut file = SIGNATURE.to_vec();
-        for (kind, payload) in chunks {
-            write_chunk(&mut file, kind, &payload);
+        for (kind, payload) in self.chunks() {
+            let start = file.len();
+            file.extend(kind);
+            file.extend(number(payload.len() as u32));
+            file.extend(payload);
+            let crc = crc32fast::hash(&file[start..]);
+            file.extend(crc.to_le_bytes());
         }
         if let Some(flaw) = &self.flaw {
             let place = usize::from(flaw.place) % file.len();
@@ -134,11 +139,16 @@ impl File {
     /// Checks that a decoder refused this file only where it had a reason, and that it found what
     /// the file says. (Floats are not promised to be finite.)
     pub fn check(&self, decoder: &StreamDecoder, error: Option<&DecodeError>) {
-        if !self.extras.is_empty() || self.flaw.is_some() {
+        if self.flaw.is_some() {
             return;
         }
+        let Some(has_sound_extras) = self.has_sound_extras() else { return };
         assert_eq!(error.is_none(), decoder.is_complete());
-        if let Some(map) = &self.texture
+        if !has_sound_extras {
+            assert!(error.is_some(), "a flaw of a chunk was not noticed");
+            return;
+        }
+        if let Some((_, map)) = &self.texture
             && !map.is_sound(self.sides())
         {
             assert!(error.is_some(), "a flaw of the texture was not noticed");
@@ -154,7 +164,62 @@ impl File {
         }
     }
 
-    /// The payloads of layers that are not empty, each with its number of Gaussians.
+    fn chunks(&self) -> Vec<Chunk> {
+        let layers = self.layers();
+        let mut chunks = vec![(b"H".to_vec(), self.header(&layers))];
+        let later = (0..layers.len()).rev();
+        chunks.extend(layers.into_iter().zip(later).map(|((count, codes), later)| {
+            // The last layer has all that remain.
+            let count = if later > 0 { number(count) } else { Vec::new() };
+            (b"L".to_vec(), [count, codes].concat())
+        }));
+        chunks.push((b"E".to_vec(), Vec::new()));
+        // Never before the header: that is one error, found at once.
+        let mut insert = |place: u8, chunk| {
+            chunks.insert(1 + usize::from(place) % (chunks.len() - 1), chunk);
+        };
+        if let Some((place, map)) = &self.texture {
+            insert(*place, (b"tXTR".to_vec(), map.payload(self.sides())));
+        }
+        for Extra { place, kind, payload } in &self.extras {
+            insert(*place, (kind.name(), kind.payload(payload)));
+        }
+        chunks
+    }
+
+    /// Whether the extras break no rule; `None` for some of which it is not known here.
+    fn has_sound_extras(&self) -> Option<bool> {
+        let known = |extra: &Extra| match extra.kind {
+            ExtraKind::Other(_) => KNOWN.contains(&&extra.kind.name()[..]),
+            _ => false,
+        };
+        if self.extras.iter().any(known) {
+            return None;
+        }
+        let chunks = self.chunks();
+        let first_layer = chunks.iter().position(|(kind, _)| kind == b"L");
+        let mut is_sound = true;
+        for (place, (kind, payload)) in chunks.iter().enumerate() {
+            let appears_twice = chunks[..place].iter().any(|(earlier, _)| earlier == kind);
+            is_sound &= match &kind[..] {
+                b"H" | b"L" | b"E" | b"tXTR" => true,
+                b"tEXt" => is_text(payload),
+                b"iCCP" | b"xMPd" => !appears_twice,
+                b"eXIf" if first_layer.is_none_or(|layer| place < layer) => !appears_twice,
+                // Arbitrary bytes may turn the picture, or not.
+                b"eXIf" => match payload.strip_prefix(EXIF)? {
+                    [orientation, 0, 0, 0, 0, 0, 0, 0] => {
+                        !appears_twice && !(2..=8).contains(orientation)
+                    }
+                    _ => return None,
+                },
+                kind => kind.len() > 1,
+            };
+        }
+        Some(is_sound)
+    }
+
+    /// The number of Gaussians in each layer that is not empty, and the bytes in which they are coded.
     fn layers(&self) -> Vec<(u32, Vec<u8>)> {
         if let Some(entropy_coded) = &self.entropy_coded {
             return entropy_coded.layers(self.sides(), self.channels());
@@ -178,26 +243,34 @@ impl File {
     }
 
     fn header(&self, layers: &[(u32, Vec<u8>)]) -> Vec<u8> {
-        let (kernel, cutoff) = match self.kernel {
-            Kernel::Exponential(cutoff) => (0, (f32::from(cutoff) + 1.0) / 1024.0),
-            Kernel::Quartic => (1, 4.0),
+        let (coding, form) = match &self.entropy_coded {
+            None => (0, self.parameterization as u8),
+            Some(entropy_coded) => (1, u8::from(entropy_coded.has_geometry())),
         };
+        let kernel = u8::from(matches!(self.kernel, Kernel::Quartic));
+        let depth = u8::from(self.sixteen_bit);
+        let mut payload =
+            vec![self.color as u8 | depth << 2 | coding << 3 | kernel << 4 | form << 5];
         let gaussians: u32 = layers.iter().map(|&(count, _)| count).sum();
-        let depth = if self.sixteen_bit { 16 } else { 8 };
-        let (coding, parameterization) = match self.entropy_coded {
-            None => (0, self.parameterization),
-            Some(_) => (1, Parameterization::Cholesky),
-        };
-        let mut payload = vec![1, coding, self.color as u8, depth];
-        payload.extend(self.sides().into_iter().flat_map(u32::to_le_bytes));
-        payload.extend(gaussians.to_le_bytes());
-        payload.extend((layers.len() as u16).to_le_bytes());
-        payload.extend([kernel, parameterization as u8]);
-        payload.extend(cutoff.to_le_bytes());
-        payload.extend([0; 4]);
-        for (channel, value) in self.base_color.iter().enumerate() {
-            let value = if channel <= self.color as usize { *value } else { 0 };
-            payload.extend(value.to_le_bytes());
+        payload.extend(self.sides().into_iter().chain([gaussians]).flat_map(number));
+        if gaussians > 0 {
+            payload.extend(number(layers.len() as u32));
+        }
+        for value in &self.base_color[..self.channels()] {
+            match self.sixteen_bit {
+                false => payload.push((value >> 8) as u8),
+                true => payload.extend(value.to_le_bytes()),
+            }
+        }
+        if let Kernel::Exponential(cutoff) = self.kernel {
+            payload.extend(((f32::from(cutoff) + 1.0) / 1024.0).to_le_bytes());
+        }
+        match &self.entropy_coded {
+            _ if gaussians == 0 => {}
+            None => {
+                payload.extend(self.quantizers().iter().flat_map(|quantizer| quantizer.entry()))
+            }
+            Some(entropy_coded) => payload.extend(entropy_coded.fields(self.channels())),
         }
         payload
     }
@@ -220,17 +293,14 @@ impl Quantizer {
         }
     }
 
-    fn entry(&self) -> [u8; 12] {
-        let (kind, scale, offset) = match self {
-            Self::Float => (0, 1.0, 0.0),
-            Self::Linear(steps) => (1, steps.scale(), steps.offset()),
-            Self::Log(steps) => (2, steps.scale(), steps.offset()),
+    fn entry(&self) -> Vec<u8> {
+        let (kind, steps) = match self {
+            Self::Float => (0, None),
+            Self::Linear(steps) => (1, Some(steps)),
+            Self::Log(steps) => (2, Some(steps)),
         };
-        let mut entry = [0; 12];
-        (entry[0], entry[1]) = (kind, self.bits());
-        entry[4..8].copy_from_slice(&scale.to_le_bytes());
-        entry[8..].copy_from_slice(&offset.to_le_bytes());
-        entry
+        let numbers = steps.into_iter().flat_map(|steps| [steps.scale(), steps.offset()]);
+        [kind, self.bits()].into_iter().chain(numbers.flat_map(f32::to_le_bytes)).collect()
     }
 }
 
@@ -247,38 +317,48 @@ impl Steps {
 }
 
 impl ExtraKind {
-    fn name(&self) -> [u8; 4] {
-        match *self {
+    fn name(&self) -> Vec<u8> {
+        let name = match *self {
             Self::IccProfile => *b"iCCP",
-            Self::Exif => *b"eXIf",
+            Self::Exif | Self::Orientation(_) => *b"eXIf",
             Self::Xmp => *b"xMPd",
             Self::Text => *b"tEXt",
             Self::Other(name) => {
                 name.map(|byte| if byte & 1 == 0 { b'a' } else { b'A' } + byte % 26)
             }
+        };
+        let length = if name[0].is_ascii_lowercase() { 4 } else { 1 };
+        name[..length].to_vec()
+    }
+
+    fn payload(&self, payload: &[u8]) -> Vec<u8> {
+        match *self {
+            // The value fills four bytes, and no other directory follows.
+            Self::Orientation(value) => [EXIF, &[value % 10, 0, 0, 0], &[0; 4]].concat(),
+            _ => payload.to_vec(),
         }
     }
 }
 
-/// The number of Gaussians that `codes` has bits for, and the payload of their layer.
+/// Whether it is a keyword of 1 to 79 bytes, a NUL byte and a text without one, both in UTF-8.
+fn is_text(payload: &[u8]) -> bool {
+    let mut parts = payload.split(|&byte| byte == 0);
+    let (keyword, text, rest) = (parts.next(), parts.next(), parts.next());
+    let is_utf8 = |part: &[u8]| str::from_utf8(part).is_ok();
+    keyword.is_some_and(|keyword| (1..80).contains(&keyword.len()) && is_utf8(keyword))
+        && text.is_some_and(is_utf8)
+        && rest.is_none()
+}
+
+/// The number of Gaussians that `codes` has bits for, and the codes of as many.
 fn layer(codes: &[u8], bits: usize) -> (u32, Vec<u8>) {
     let count = codes.len() * 8 / bits;
     let used = count * bits;
-    let mut payload = (count as u32).to_le_bytes().to_vec();
-    payload.extend_from_slice(&codes[..used.div_ceil(8)]);
+    let mut codes = codes[..used.div_ceil(8)].to_vec();
     if !used.is_multiple_of(8)
-        && let Some(last) = payload.last_mut()
+        && let Some(last) = codes.last_mut()
     {
         *last &= (1 << (used % 8)) - 1;
     }
-    (count as u32, payload)
-}
-
-fn write_chunk(file: &mut Vec<u8>, kind: [u8; 4], payload: &[u8]) {
-    file.extend((payload.len() as u32).to_le_bytes());
-    let start = file.len();
-    file.extend(kind);
-    file.extend(payload);
-    let crc = crc32fast::hash(&file[start..]);
-    file.extend(crc.to_le_bytes());
+    (count as u32, codes)
 }

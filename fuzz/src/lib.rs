@@ -9,17 +9,23 @@ mod entropy_coded;
 #[path = "../../tests/common/exp.rs"]
 mod exp;
 pub mod file;
+#[path = "../../tests/common/numbers.rs"]
+mod numbers;
 #[path = "../../tests/common/rans.rs"]
 mod rans;
+#[path = "../../tests/common/steps.rs"]
+#[allow(dead_code, reason = "the tests use more of it")]
+mod steps;
 #[path = "../../tests/common/texture.rs"]
 #[allow(dead_code, reason = "the tests use more of it")]
 mod texture;
 
 use fearless_simd::Level;
 use image_gip::{
-    ChunkStatistics, ChunkType, DecodeError, Decoder, Limits, Picture, Region, RenderOptions,
-    StreamDecoder, Threads,
+    ChunkStatistics, ChunkType, DecodeError, Decoder, Gaussian, Limits, Picture, Prefixes, Region,
+    RenderOptions, StreamDecoder, Threads,
 };
+use numbers::{number, read_number};
 
 /// Bounds that leave room for every branch and keep one input to a few milliseconds.
 pub fn limits() -> Limits {
@@ -61,6 +67,37 @@ pub fn check(decoder: &StreamDecoder) {
 
     check_backend(&picture, &middle);
     check_backend(&picture, &large);
+}
+
+/// Makes files of the first layers of one from which `decoder` read what it could: they are as long as was said, and
+/// a decoder accepts and finds in them what it found in the whole file.
+pub fn check_prefixes(bytes: &[u8], decoder: &StreamDecoder) {
+    let Ok(prefixes) = Prefixes::new(bytes) else {
+        assert!(!decoder.is_complete(), "a sound file has no prefixes");
+        return;
+    };
+    let found = decoder.gaussians();
+    let last = prefixes.iter().len().saturating_sub(1);
+    for (number, prefix) in prefixes.iter().enumerate() {
+        // The work would grow with the square of the layers.
+        if number > 2 && number < last {
+            continue;
+        }
+        let file = prefixes.file(prefix);
+        assert_eq!(file.len(), prefix.bytes, "the length that was said");
+        let Some(expected) = found.get(..prefix.gaussians as usize) else { break };
+        let mut first = StreamDecoder::new().with_limits(limits());
+        let fed = first.feed(&file).expect("a part of what was sound");
+        assert_eq!(fed, file.len(), "a file without its end");
+        assert!(first.is_complete() && bits(first.gaussians()).eq(bits(expected)));
+    }
+}
+
+/// All values of Gaussians, by their bits.
+fn bits(gaussians: &[Gaussian]) -> impl Iterator<Item = u32> + '_ {
+    let values =
+        |gaussian: &Gaussian| [&gaussian.center[..], &gaussian.cholesky, &gaussian.color].concat();
+    gaussians.iter().flat_map(values).map(f32::to_bits)
 }
 
 /// Decodes the middle of a file from the layers that show in it: the same as from all of them, where

@@ -8,7 +8,7 @@ use super::fields::Fields;
 #[cfg(feature = "encode")]
 use super::varint;
 use crate::chunk::{ChunkType, VERSION};
-use crate::coding::entropy::Quantization;
+use crate::coding::entropy::{LayerCoder, Quantization};
 use crate::coding::packed::Quantizer;
 use crate::color::{ColorModel, SampleDepth};
 use crate::error::DecodeError;
@@ -131,8 +131,11 @@ impl Header {
         let dequantizer = match coding {
             _ if gaussians == 0 => None,
             Coding::Packed => {
-                let quantizers = (0..header.components()).map(|_| Quantizer::parse(&mut fields));
-                Some(Dequantizer::Packed(quantizers.collect::<Result<_, _>>()?))
+                let mut quantizers = Vec::new();
+                for _ in 0..header.components() {
+                    quantizers.push(Quantizer::parse(&mut fields)?);
+                }
+                Some(Dequantizer::Packed(quantizers))
             }
             Coding::Entropy => {
                 let channels = color.channels();
@@ -196,6 +199,11 @@ impl Header {
         self.base_color.map(|value| f32::from(value) / 65535.0)
     }
 
+    /// What reads and writes entropy-coded layers of the picture.
+    pub(crate) fn layer_coder<'a>(&self, quantization: &'a Quantization) -> LayerCoder<'a> {
+        LayerCoder::new(quantization, [self.width, self.height], self.color)
+    }
+
     /// The number of stored components of a Gaussian: two of position, three of shape, one per
     /// channel.
     #[must_use]
@@ -209,9 +217,7 @@ impl Fields<'_> {
     fn side(&mut self, name: &'static str) -> Result<u32, DecodeError> {
         match self.varint()? {
             0 => Err(self.malformed(alloc::format!("the {name} is zero"))),
-            side if side > MAX_SIDE => {
-                Err(self.malformed(alloc::format!("the {name} is over 2^20")))
-            }
+            side if side > MAX_SIDE => Err(self.unsupported(name, side)),
             side => Ok(side),
         }
     }
@@ -221,7 +227,9 @@ impl Fields<'_> {
         match self.varint()? {
             0 => Err(self.malformed("Gaussians, but no layer")),
             layers if layers > gaussians => Err(self.malformed("more layers than Gaussians")),
-            layers => u16::try_from(layers).map_err(|_| self.malformed("more than 65535 layers")),
+            layers => {
+                u16::try_from(layers).map_err(|_| self.unsupported("number of layers", layers))
+            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod color_space;
 mod exif;
-mod fields;
+pub(crate) mod fields;
 mod header;
 mod metadata;
 mod parser;
@@ -15,7 +15,6 @@ mod writer;
 pub use color_space::{Cicp, ContentLight, MasteringDisplay};
 #[cfg(feature = "metadata")]
 pub(crate) use exif::{ByteOrder, Directory, Entry};
-pub(crate) use fields::Fields;
 pub(crate) use header::Dequantizer;
 #[cfg(feature = "encode")]
 pub(crate) use header::MAX_SIDE;

@@ -251,13 +251,13 @@ impl ChunkDecoder {
             }
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
-                self.metadata.insert(chunk, payload)?;
                 // What has been shown is not turned afterwards.
-                let turned = self.metadata.orientation() != Orientation::NoTransforms;
-                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turned {
+                let turns = |exif| Metadata::orientation_of(exif) != Orientation::NoTransforms;
+                if chunk == ChunkType::EXIF && !self.layers.is_empty() && turns(&payload) {
                     let reason = "an orientation after the first layer";
                     return Err(DecodeError::malformed(chunk, reason));
                 }
+                self.metadata.insert(chunk, payload)?;
             }
             (_, Stage::Layer(layer, before)) => {
                 layer.finish()?;
@@ -288,14 +288,26 @@ impl ChunkDecoder {
 
     /// Decodes the texture, if there is memory for it and for all Gaussians.
     fn insert_texture(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
-        let Some(header) = &self.header else { return Ok(()) };
+        self.texture = match self.texture_of(payload) {
+            Err(DecodeError::Limit { .. }) if self.pending.count() > 0 => {
+                // Decoding the pending layers frees their memory.
+                self.decode_pending(Threads::One)?;
+                self.texture_of(payload)?
+            }
+            texture => texture?,
+        };
+        Ok(())
+    }
+
+    /// The texture of a payload. `None` before the header.
+    fn texture_of(&self, payload: &[u8]) -> Result<Option<Texture>, DecodeError> {
+        let Some(header) = &self.header else { return Ok(None) };
         let texture = Texture::parse(payload, header, |count| {
             self.limits.check_gaussians(count)?;
             let gaussians = u64::from(count) * size_of::<Gaussian>() as u64;
             self.check_memory(payload.len() as u64 + gaussians)
         })?;
-        self.texture = Some(texture);
-        Ok(())
+        Ok(Some(texture))
     }
 
     /// Decodes the pending layers up to the first that is malformed.

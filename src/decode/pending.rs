@@ -121,7 +121,7 @@ impl SelectedLayers<'_> {
         let mut valid = gaussians.len();
         gaussians.resize(valid + self.count, Gaussian::NOTHING);
         let mut free = &mut gaussians[valid..];
-        let coder = LayerCoder::new(quantization, header);
+        let coder = header.layer_coder(quantization);
         let mut results: Vec<_> = self.layers.iter().map(|_| Ok(())).collect();
         let mut work = Vec::with_capacity(self.layers.len());
         for (&layer, result) in self.layers.iter().zip(&mut results) {

@@ -8,9 +8,10 @@ use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
 use crate::coding::entropy::Code;
 use crate::coding::entropy::{LayerCoder, Quantization, steps};
+use crate::container::Header;
+use crate::container::fields::Fields;
 #[cfg(feature = "encode")]
 use crate::container::varint;
-use crate::container::{Fields, Header};
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 
@@ -46,7 +47,7 @@ impl Texture {
         let bytes = fields.rest();
         LayerCoder::check_count(count, bytes).map_err(named)?;
         check(count)?;
-        let coder = LayerCoder::new(&quantization, &header);
+        let coder = header.layer_coder(&quantization);
         let mut gaussians = vec![Gaussian::NOTHING; count as usize];
         coder.read_gaussians(bytes, None, header.color, &mut gaussians).map_err(named)?;
         Ok(Self { header, gaussians })
@@ -57,7 +58,7 @@ impl Texture {
     #[cfg(feature = "encode")]
     pub(crate) fn to_payload(codes: &mut [Code], step: f32, picture: &Header) -> Vec<u8> {
         let quantization = quantization(step);
-        let layer = LayerCoder::new(&quantization, &map::header(picture)).write(codes);
+        let layer = map::header(picture).layer_coder(&quantization).write(codes);
         let mut payload = Vec::new();
         steps::write(step, &mut payload);
         varint::write(codes.len() as u32, &mut payload);

@@ -16,6 +16,7 @@ mod metadata;
 mod orientation;
 #[path = "../pictures/mod.rs"]
 mod pictures;
+mod prefix;
 mod room;
 mod square;
 mod tiff;

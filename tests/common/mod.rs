@@ -7,6 +7,7 @@ pub(crate) mod entropy;
 mod exp;
 pub(crate) mod layered;
 pub(crate) mod memory;
+pub(crate) mod numbers;
 pub(crate) mod oracle;
 pub(crate) mod rans;
 pub(crate) mod scenes;
@@ -16,30 +17,10 @@ pub(crate) mod texture;
 
 use entropy::Code;
 use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
+pub(crate) use numbers::{number, read_number};
 
 /// Section 4.1.
 pub(crate) const SIGNATURE: [u8; 8] = [0xC7, 0x47, 0x49, 0x50, 0x0D, 0x0A, 0x01, 0x0A];
-
-/// Section 2.
-pub(crate) fn number(value: u32) -> Vec<u8> {
-    let bytes = (0..5).map(|place| (u64::from(value) >> (7 * place) & 0x7F) as u8);
-    let mut bytes: Vec<u8> = bytes.collect();
-    while bytes.len() > 1 && bytes.last() == Some(&0) {
-        bytes.pop();
-    }
-    let last = bytes.len() - 1;
-    bytes[..last].iter_mut().for_each(|byte| *byte |= 0x80);
-    bytes
-}
-
-/// The `number` at the front of these bytes, and what follows it.
-pub(crate) fn read_number(bytes: &[u8]) -> Option<(u32, &[u8])> {
-    let length = bytes.iter().position(|&byte| byte < 0x80)? + 1;
-    let (found, rest) = bytes.split_at(length);
-    let value = found.iter().rev().fold(0, |value, byte| value << 7 | u64::from(byte & 0x7F));
-    let value = u32::try_from(value).ok()?;
-    (found == number(value)).then_some((value, rest))
-}
 
 /// CRC-32 as in PNG, bit by bit.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {

@@ -48,7 +48,14 @@ pub(super) fn scattered(seed: u64, header: Header, count: usize) -> File {
     File::of_entropy_coded(header, usual_steps(header.color), vec![codes])
 }
 
-/// Equal Gaussians without colour: 216 of them take 54 bytes, and so do 217.
+/// The largest number of Gaussians of which each may take two bits, where one more takes no more bytes.
+fn densest() -> usize {
+    let bytes = |count| payload(&dense(count).chunks()[1]).len();
+    let is_full = |&count: &usize| bytes(count) == count / 4 && bytes(count + 1) == count / 4;
+    (100..1000).step_by(4).find(is_full).expect("they take less than two bits each")
+}
+
+/// Equal Gaussians without colour.
 fn dense(count: usize) -> File {
     let header = header(GRAY, 24, 16);
     let steps = vec![MOST_STEP, 0.75, 0.75, 1.75, at_most(0.1)];
@@ -346,7 +353,7 @@ pub(super) fn valid() -> Vec<Vector> {
         Vector::valid(
             "entropy-dense",
             "entropy coding: four Gaussians for each byte, the most that is allowed",
-            dense(216),
+            dense(densest()),
         ),
         Vector::valid(
             "entropy-outside",
@@ -508,7 +515,7 @@ pub(super) fn invalid() -> Vec<Vector> {
             replaced(2, chunk(b"L", &[&number(second.len() as u32)[..], &payload].concat())),
         ),
         invalid("xentropy-dense", "entropy coding: more than four Gaussians for each byte", {
-            dense(217).bytes()
+            dense(densest() + 1).bytes()
         }),
         refused(
             "xentropy-exponent-8",

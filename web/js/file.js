@@ -1,9 +1,10 @@
 // Reads a .gip file from wherever it comes, and gives it to the decoders as it arrives.
 
-const SIGNATURE = [0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a, 0x1a, 0x0a];
+/** What files of every version of the format begin with. */
+const START = [0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a];
 
 /** Whether bytes begin as a .gip file does. */
-export const isGip = (bytes) => SIGNATURE.every((byte, index) => bytes[index] === byte);
+export const isGip = (bytes) => START.every((byte, index) => bytes[index] === byte);
 
 /** A file of the disk: { name, stream }. */
 export const fromFile = (file) => ({ name: file.name, stream: file.stream() });
@@ -32,12 +33,12 @@ export async function fromUrl(address, signal) {
 }
 
 /**
- * Decodes a file as it arrives. `onProgress` gets { size, picture, gaussians, complete } after each
- * piece, where `size` is that of the file so far; so does the caller in the end, with the `error` that
+ * Decodes a file as it arrives. `onProgress` gets { size, picture, gaussians, edition, complete } after
+ * each piece, where `size` is that of the file so far; so does the caller in the end, with the `error` that
  * a damaged file ends with.
  */
 export async function decode({ stream }, pool, { signal, onProgress }) {
-  let progress = { size: 0, picture: null, gaussians: 0, complete: false, error: null };
+  let progress = { size: 0, picture: null, gaussians: 0, edition: 0, complete: false, error: null };
   const reader = stream.getReader();
   const stop = () => void reader.cancel().catch(() => {});
   signal.addEventListener('abort', stop, { once: true });

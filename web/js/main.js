@@ -85,7 +85,7 @@ function close() {
 }
 
 /** Shows what has arrived of a file. */
-function show({ name }, { picture, gaussians }) {
+function show({ name }, { picture, gaussians, edition }) {
   if (!picture) return;
   if (!stage.hasPicture) {
     document.body.classList.remove('empty');
@@ -95,6 +95,7 @@ function show({ name }, { picture, gaussians }) {
     stageElement.setAttribute('aria-label', `${name}, ${picture.width} by ${picture.height} pixels`);
     stageElement.focus({ preventScroll: true });
   }
+  stage.edition = edition;
   stage.showGaussians(gaussians);
 }
 

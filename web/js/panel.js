@@ -4,10 +4,9 @@ import { element } from './dom.js';
 import { bytes, count, decimal, integer, percent } from './format.js';
 
 const CHUNKS = {
-  GHDR: 'header',
-  QNTZ: 'quantizers',
-  GAUS: 'Gaussians',
-  GEND: 'end',
+  H: 'header',
+  L: 'Gaussians',
+  E: 'end',
   bNDS: 'bounds of the layers',
   tXTR: 'texture',
   iCCP: 'ICC profile',

@@ -26,6 +26,8 @@ export class Stage {
   #picture = null;
   /** How many Gaussians are shown. */
   #gaussians = 0;
+  /** Tells what has arrived apart from Gaussians; see the worker. */
+  #edition = 0;
   #outlines = false;
   #texture = true;
   #isAsked = false;
@@ -64,7 +66,7 @@ export class Stage {
   /** Starts with another file: nothing is shown until `setPicture`. */
   reset() {
     this.#picture = null;
-    this.#gaussians = 0;
+    this.#gaussians = this.#edition = 0;
     this.#gpu = null;
     this.#tiles.reset();
     this.motion.stop();
@@ -85,6 +87,11 @@ export class Stage {
   /** Shows the first Gaussians of the file. */
   showGaussians(count) {
     this.#gaussians = count;
+    this.draw();
+  }
+
+  set edition(edition) {
+    this.#edition = edition;
     this.draw();
   }
 
@@ -135,6 +142,7 @@ export class Stage {
       frame,
       picture: this.#picture,
       gaussians: this.#gaussians,
+      edition: this.#edition,
       texture: this.#texture,
       ratio: this.view.window.ratio,
       kinds: this.#outlines ? ['outlines'] : [],

@@ -31,7 +31,7 @@ export class TilePainter {
   }
 
   /** Paints a frame with what there is of tiles of a kind. */
-  paint({ frame, gaussians }, kind, tiles) {
+  paint({ frame, gaussians, edition }, kind, tiles) {
     const { window } = frame;
     const context = this.#context;
     if (this.#canvas.width !== window.width || this.#canvas.height !== window.height) {
@@ -40,8 +40,9 @@ export class TilePainter {
     } else {
       context.clearRect(0, 0, window.width, window.height);
     }
-    const found = tiles.at(frame, { kind, gaussians });
-    if (found.missing.length > 0) this.#paintStandIns(frame, found.missing, { kind, gaussians }, tiles);
+    const wanted = { kind, gaussians, edition };
+    const found = tiles.at(frame, wanted);
+    if (found.missing.length > 0) this.#paintStandIns(frame, found.missing, wanted, tiles);
     for (const { bitmap, level, region } of found.tiles) {
       const { left, top } = place(frame, level, region);
       context.drawImage(bitmap, left, top);

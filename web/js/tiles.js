@@ -11,6 +11,9 @@ const KEPT_WINDOWS = 4;
 /** The scale must have rested for so many milliseconds before tiles are rendered for it. */
 const REST = 70;
 
+/** Whether a tile or a preview shows what is wanted. */
+const isOf = (tile, wanted) => ['kind', 'gaussians', 'edition'].every((name) => tile[name] === wanted[name]);
+
 const nameOf = ({ width, height }) => `${width}x${height}`;
 
 /** The tiles of a level that are in a region, each as a region. */
@@ -30,7 +33,7 @@ export class Tiles {
   #pool;
   #onArrival;
   #onError;
-  /** By key, the least recently used first: { kind, level, gaussians, region, bitmap }. */
+  /** By key, the least recently used first: { kind, level, gaussians, edition, region, bitmap }. */
   #kept = new Map();
   #queue = [];
   #running = new Set();
@@ -39,7 +42,7 @@ export class Tiles {
   #timer = 0;
   /** Counts files, since answers for an earlier file may still come. */
   #file = 0;
-  /** The whole picture, small, of a kind and with so many Gaussians: { kind, gaussians, bitmap }. */
+  /** The whole picture, small, of a kind and with so many Gaussians: { kind, gaussians, edition, bitmap }. */
   preview = null;
 
   constructor(pool, { onArrival, onError }) {
@@ -74,10 +77,10 @@ export class Tiles {
    * renders the picture, it is absent.
    */
   want(scene) {
-    const { frame, kinds, gaussians } = scene;
+    const { frame, kinds } = scene;
     const level = nameOf(frame.level);
     const kind = kinds.find((kind) => kind !== 'outlines');
-    const hasPreview = !kind || (this.preview?.kind === kind && this.preview.gaussians === gaussians);
+    const hasPreview = !kind || (this.preview && isOf(this.preview, { ...scene, kind }));
     this.#queue = hasPreview ? [] : [this.#previewJob(scene, kind)];
     if (level !== this.#level || this.#timer) {
       if (level !== this.#level) {
@@ -97,35 +100,35 @@ export class Tiles {
     this.#start();
   }
 
-  #previewJob({ frame: { level }, gaussians, picture }, kind) {
+  #previewJob({ frame: { level }, gaussians, edition, picture }, kind) {
     const longest = Math.max(picture.width, picture.height);
     const side = (stored) => Math.max(1, Math.round((stored * PREVIEW) / longest));
     const size = { width: side(picture.width), height: side(picture.height) };
     // A picture that shows small needs no more.
     const whole = level.width < size.width ? level : size;
     const region = { x: 0, y: 0, ...whole };
-    const key = `preview ${kind} ${gaussians}`;
-    return { kind, level: whole, region, gaussians, isPreview: true, key };
+    const key = `preview ${kind} ${gaussians} ${edition}`;
+    return { kind, level: whole, region, gaussians, edition, isPreview: true, key };
   }
 
   /** The tiles that are not there, from the middle of the window outwards. */
-  #missing({ frame, gaussians, ratio }, kind, margin) {
+  #missing({ frame, gaussians, edition, ratio }, kind, margin) {
     const { level, window, left, top } = frame;
     const region = visibleRegion(frame, margin);
     if (!region) return [];
     const jobs = [];
     for (const tile of tilesIn(level, region)) {
-      const key = this.#key(kind, level, gaussians, tile);
+      const key = this.#key({ kind, gaussians, edition }, level, tile);
       if (this.#kept.has(key) || this.#running.has(key) || this.#failed.has(key)) continue;
       const dx = left + tile.x + tile.width / 2 - window.width / 2;
       const dy = top + tile.y + tile.height / 2 - window.height / 2;
-      jobs.push({ key, kind, level, region: tile, gaussians, ratio, distance: Math.hypot(dx, dy) });
+      jobs.push({ key, kind, level, region: tile, gaussians, edition, ratio, distance: Math.hypot(dx, dy) });
     }
     return jobs.sort((a, b) => a.distance - b.distance);
   }
 
-  #key(kind, level, gaussians, { x, y }) {
-    return `${kind} ${nameOf(level)} ${gaussians} ${x},${y}`;
+  #key({ kind, gaussians, edition }, level, { x, y }) {
+    return `${kind} ${nameOf(level)} ${gaussians} ${edition} ${x},${y}`;
   }
 
   #start() {
@@ -160,7 +163,7 @@ export class Tiles {
   #keep(job, bitmap) {
     if (job.isPreview) {
       this.preview?.bitmap.close();
-      this.preview = { kind: job.kind, gaussians: job.gaussians, bitmap };
+      this.preview = { kind: job.kind, gaussians: job.gaussians, edition: job.edition, bitmap };
     } else {
       this.#kept.set(job.key, { ...job, bitmap });
     }
@@ -179,12 +182,12 @@ export class Tiles {
   }
 
   /** What is there of a frame: its tiles, each with its region, and regions without one. */
-  at(frame, { kind, gaussians }) {
+  at(frame, wanted) {
     const found = { tiles: [], missing: [] };
     const region = visibleRegion(frame);
     if (!region) return found;
     for (const tile of tilesIn(frame.level, region)) {
-      const key = this.#key(kind, frame.level, gaussians, tile);
+      const key = this.#key(wanted, frame.level, tile);
       const kept = this.#kept.get(key);
       if (kept) {
         // The last of the map now.
@@ -197,10 +200,10 @@ export class Tiles {
   }
 
   /** Kept tiles of other levels, in groups by level, that of the most similar scale first. */
-  ofOtherLevels(frame, { kind, gaussians }) {
+  ofOtherLevels(frame, wanted) {
     const levels = new Map();
     for (const tile of this.#kept.values()) {
-      if (tile.kind !== kind || tile.gaussians !== gaussians) continue;
+      if (!isOf(tile, wanted)) continue;
       const name = nameOf(tile.level);
       if (!levels.has(name)) levels.set(name, []);
       levels.get(name).push(tile);

@@ -11,12 +11,15 @@ let decoder = null;
 /** The Gaussians for the outlines, when they were last needed. */
 let gaussians = null;
 
-/** What has arrived. `picture` is the header with the size of the upright picture, once that is known. */
+/**
+ * What has arrived. `picture` is the header with the size of the upright picture, once that is known. What was
+ * rendered of an earlier `edition` lacks a profile or a texture that has come since.
+ */
 function progress() {
-  const { header, orientation, gaussians, complete } = decoder.progress;
+  const { header, orientation, gaussians, iccProfile, texture, complete } = decoder.progress;
   const { naturalWidth: width, naturalHeight: height } = decoder;
   const picture = orientation && { ...header, orientation, width, height };
-  return { picture, gaussians, complete };
+  return { picture, gaussians, edition: iccProfile + texture, complete };
 }
 
 const uprightGaussians = () => decoder.gaussians({ orientation: 'from-image' });

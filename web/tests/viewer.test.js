@@ -3,25 +3,53 @@
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';
 
-import { makePicture, texture } from '../../bindings/wasm/tests/picture.js';
+import { leastChunk, makePicture, texture } from '../../bindings/wasm/tests/picture.js';
 import { swappedProfile } from '../../bindings/wasm/tests/profile.js';
 import { assertShows, difference, drop, missing, openViewer, sampleBytes } from './viewer.js';
 import { screenshot, settled, start, vectorBytes, viewOf } from './viewer.js';
 
 const SAMPLE = { width: 576, height: 576 };
+/** What the panel says of it. */
+const SAMPLE_GAUSSIANS = '5,670';
 
 let viewer;
 let sample;
+/** Its bytes, as the page writes the number. */
+let sampleSize;
+
+/** Layers, and what comes after them. */
+const LATE_LAYERS = [40, 160];
+const late = {
+  texture: { chunk: ['tXTR', texture], open: () => {} },
+  profile: { chunk: ['iCCP', swappedProfile()], open: () => {} },
+};
+const lateFile = ({ chunk }) => makePicture({ layers: LATE_LAYERS, later: [[LATE_LAYERS.length, ...chunk]] });
+
+/** Sends the layers, and the rest when the test calls `open`. */
+async function serveLate(found, response) {
+  const bytes = lateFile(found);
+  const opened = new Promise((resolve) => {
+    found.open = resolve;
+  });
+  const layers = makePicture({ layers: LATE_LAYERS }).length - leastChunk;
+  response.writeHead(200, { 'Content-Length': bytes.length });
+  response.write(bytes.subarray(0, layers));
+  await opened;
+  response.end(bytes.subarray(layers));
+}
 
 if (!missing) {
   before(async () => {
     sample = await sampleBytes();
+    sampleSize = sample.length.toLocaleString('en');
     viewer = await start({
       routes: {
         '/missing.gip': (_, response) => response.writeHead(404).end(),
         '/100%.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
         '/%FF%20%C3%A4.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
         '/%C3%A4%20b%25.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
+        '/late-texture.gip': (_, response) => serveLate(late.texture, response),
+        '/late-profile.gip': (_, response) => serveLate(late.profile, response),
         '/rgb.gip': async (_, response) => response.end(await vectorBytes('rgb8.gip')),
       },
     });
@@ -49,7 +77,8 @@ onPage('a file by URL shows whole, with its facts', {}, async (page) => {
   await assertShows(page, await viewOf(page, SAMPLE), sample);
   assert.equal(await page.title(), 'sumac.gip - gip viewer');
   const panel = await page.locator('#panel').innerText();
-  for (const fact of ['26,694 bytes', '576 × 576 pixels', '6,296 in 4 layers', 'GAUS × 4', 'shape', 'position']) {
+  const counts = [`${sampleSize} bytes`, '576 × 576 pixels', `${SAMPLE_GAUSSIANS} in 4 layers`, 'L × 4'];
+  for (const fact of [...counts, 'header', 'Gaussians', 'texture', 'end', 'shape', 'position']) {
     assert.ok(panel.includes(fact), fact);
   }
 });
@@ -143,6 +172,34 @@ onPage('texture is shown, and left out by its button', { path: '/' }, async (pag
   assert.ok(await button.isHidden());
 });
 
+for (const [what, found] of Object.entries(late)) {
+  onPage(`${what} that comes after all Gaussians`, { path: `/?src=late-${what}.gip` }, async (page) => {
+    await page.waitForSelector('body:not(.empty) #stage[aria-busy="false"]');
+    const view = await viewOf(page, { width: 96, height: 64 });
+    const plain = makePicture({ layers: LATE_LAYERS });
+    const { mean } = await difference(page, await screenshot(page), view, plain);
+    assert.ok(mean < 1.5, String(mean));
+    found.open();
+    await settled(page);
+    const after = await screenshot(page);
+    // Red and green are exchanged by the profile.
+    const order = what === 'profile' ? [1, 0, 2] : undefined;
+    const [asWanted, asBefore] = [
+      await difference(page, after, view, lateFile(found), { order }),
+      await difference(page, after, view, plain),
+    ];
+    assert.ok(asWanted.mean < 1.5 && asBefore.mean > 2, `${asWanted.mean}, ${asBefore.mean}`);
+  });
+}
+
+onPage('a file of another version gives a message', { path: '/' }, async (page) => {
+  const bytes = Buffer.from(makePicture());
+  bytes[6] = 2;
+  await drop(page, { name: 'later.gip', bytes });
+  const says = (pattern) => new RegExp(pattern).test(document.querySelector('#message p').textContent);
+  await page.waitForFunction(says, 'later\\.gip: .*H \\(header\\): unsupported: version 2');
+});
+
 onPage('outlines are where the Gaussians are', { path: '/' }, async (page) => {
   const bytes = await vectorBytes('entropy-one.gip');
   await drop(page, { name: 'one.gip', bytes });
@@ -192,9 +249,9 @@ onPage('the slider shows what the first bytes give', {}, async (page) => {
   // In the middle of the next layer there is nothing more.
   await page.locator('#scrubber').fill('5000');
   // The counts come from a worker.
-  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('5,000 of 26,694 bytes'));
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('5,000 of '));
   assert.match(await output.textContent(), / 1 of 4 layers/);
-  await page.locator('#scrubber').fill('26694');
+  await page.locator('#scrubber').fill(String(sample.length));
   await page.waitForFunction(() => document.querySelector('#shown').textContent.includes('4 of 4 layers'));
   await settled(page);
   await assertShows(page, view, sample);
@@ -202,7 +259,7 @@ onPage('the slider shows what the first bytes give', {}, async (page) => {
   await page.keyboard.press('o');
   assert.ok(await page.locator('#outlines').isVisible());
   await page.keyboard.press('Home');
-  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('0 of 26,694'));
+  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('0 of '));
 });
 
 onPage('the file plays from its first byte', {}, async (page) => {
@@ -215,7 +272,8 @@ onPage('the file plays from its first byte', {}, async (page) => {
   // From there to the end.
   await page.locator('#scrubber').fill('22000');
   await page.locator('#play').click();
-  await page.waitForFunction(() => document.querySelector('#shown').textContent.startsWith('26,694 bytes'));
+  const isWhole = (size) => document.querySelector('#shown').textContent.startsWith(`${size} bytes`);
+  await page.waitForFunction(isWhole, sampleSize);
   await settled(page);
   await assertShows(page, await viewOf(page, SAMPLE), sample);
 });
@@ -286,13 +344,13 @@ onPage('damaged and other files give a message', { path: '/' }, async (page) => 
   await drop(page, { name: 'notes.txt', bytes: Buffer.from('not a picture') });
   await says(/neither a \.gip/);
   await drop(page, { name: 'header.gip', bytes: await vectorBytes('xcrc-header.gip') });
-  await says(/header\.gip.*GHDR/);
+  await says(/header\.gip.*H \(header\)/);
   assert.ok(await page.locator('#welcome').isVisible());
   await drop(page, { name: 'tall.gip', bytes: makePicture({ width: 2, height: 65_537, layers: [3] }) });
   await says(/tall\.gip: limit exceeded: height: 65537 required, 65536 allowed\.$/);
   const half = sample.subarray(0, 13_000);
   await drop(page, { name: 'half.gip', bytes: half });
-  await says(/half\.gip.*What is shown came before that: [\d,]+ of 6,296/);
+  await says(/half\.gip.*What is shown came before that: [\d,]+ of [\d,]+ Gaussians/);
   await settled(page);
   await page.locator('#message button').click();
   assert.ok(await message.isHidden());

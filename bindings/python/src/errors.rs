@@ -22,7 +22,7 @@ pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
     let message = error.to_string();
     let of_chunk = |class: &str, chunk: Option<ChunkType>| {
         let exception = exception(py, class, message.clone())?;
-        exception.setattr("chunk", chunk.map(|chunk| chunk.to_string()))?;
+        exception.setattr("chunk", chunk.map(|chunk| chunk.letters().to_string()))?;
         Ok(exception)
     };
     raised(match error {

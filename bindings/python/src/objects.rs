@@ -54,7 +54,7 @@ pub(crate) fn info<'py>(
     let types = py.import("image_gip._types")?;
     let chunk = types.getattr("Chunk")?;
     let chunks = stream.chunks().iter();
-    let chunks = chunks.map(|c| chunk.call1((c.kind.to_string(), c.count, c.bytes)));
+    let chunks = chunks.map(|c| chunk.call1((c.kind.letters().to_string(), c.count, c.bytes)));
     let blob = |blob: &Option<Vec<u8>>| blob.as_ref().map(|bytes| PyBytes::new(py, bytes));
     let texts = metadata.texts.iter().map(|text| (&text.keyword, &text.text));
     let channels = header.color.channels();

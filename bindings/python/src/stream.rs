@@ -174,7 +174,7 @@ impl StreamDecoder {
     }
 
     /// The `Info` of what has arrived; None until the header has. The metadata is complete when the
-    /// first Gaussian has arrived.
+    /// whole file has arrived.
     #[getter]
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let stream = self.lock_attached(py);

@@ -35,7 +35,7 @@ export class Decoder {
   /** The size of the upright picture in pixels; 0 until the orientation is known. */
   readonly naturalWidth: number;
   readonly naturalHeight: number;
-  /** The metadata that has arrived. It is complete when the first Gaussian has arrived. */
+  /** The metadata that has arrived. It is complete when the whole file has arrived. */
   readonly metadata: Metadata;
   readonly progress: Progress;
 

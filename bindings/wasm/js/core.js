@@ -103,11 +103,17 @@ export class Decoder extends Upright {
     return this.#open.metadata();
   }
 
-  /** Header, orientation, number of Gaussians that have arrived, and whether the file is complete. */
+  /** What has arrived; see the declarations. */
   get progress() {
     const native = this.#open;
-    const [gaussians, complete] = [native.arrived(), native.complete()];
-    return { header: this.header, orientation: this.orientation, gaussians, complete };
+    return {
+      header: this.header,
+      orientation: this.orientation,
+      gaussians: native.arrived(),
+      iccProfile: native.hasProfile(),
+      texture: native.hasTexture(),
+      complete: native.complete(),
+    };
   }
 
   /** How many Gaussians are enough for an output of this size in pixels. */
@@ -117,15 +123,7 @@ export class Decoder extends Upright {
 
   /** How many Gaussians the first `bytes` of the file have, as far as the file has arrived. */
   gaussiansIn(bytes) {
-    let count = 0;
-    for (const { gaussians, start, end } of this.#open.statistics().layers) {
-      if (bytes >= end) count += gaussians;
-      else if (this.header.coding === 'packed' && bytes > start) {
-        // Twelve bytes before them, four after them, and all have the same number of bits.
-        count += Math.floor((gaussians * Math.max(0, bytes - start - 12)) / (end - start - 16));
-      }
-    }
-    return count;
+    return this.#open.gaussiansIn(bytes);
   }
 
   /** Nine numbers for each Gaussian; see the declarations. */

@@ -10,7 +10,7 @@ export class GipError extends Error {
     | 'limit'
     | 'network'
     | 'failed';
-  /** The chunk that the error is in, such as `GAUS`; `null` if it is in none. */
+  /** The letters of the chunk that the error is in, such as `L` for a layer; `null` if it is in none. */
   readonly chunk: string | null;
 }
 

@@ -43,8 +43,6 @@ export class GipImageElement extends ImageAttributes {
   #natural = null;
   /** `from-image`, or `none` where the page's styles want it as stored; `null` as long as it is not known. */
   #orientation = null;
-  /** The ICC profile; `undefined` as long as it is not known. */
-  #profile = undefined;
   /** Whether the element is on the screen, or close to it; `undefined` as long as that is not known. */
   #near = undefined;
   /** The content box in CSS pixels, and in pixels of the screen. */
@@ -191,7 +189,6 @@ export class GipImageElement extends ImageAttributes {
     this.#loader?.close();
     this.#loader = null;
     this.#header = this.#natural = this.#orientation = null;
-    this.#profile = undefined;
     this.#state = 'waiting';
     this.#painting.clear();
     this.shadowRoot.replaceChildren(this.#painting.frame);
@@ -316,17 +313,18 @@ export class GipImageElement extends ImageAttributes {
 
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
   #next() {
-    const { arrived, lacking } = this.#loader;
+    const { arrived, iccProfile, texture, lacking } = this.#loader;
     if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
     const plan = this.#plan();
     if (!plan) return null;
     const [old, header] = [this.#painting.drawn, this.#header];
+    const next = { plan, arrived, iccProfile, texture, header };
     if (old && equal(old.plan, plan)) {
       // A file that begins again, since it was replaced, is not shown before it is better.
-      const known = arrived === old.arrived && header === old.header;
-      if (lacking ? arrived < old.arrived * growth : known) return null;
+      const isBetter = arrived >= old.arrived * growth || arrived === header.gaussians;
+      if ((lacking && !isBetter) || (header === old.header && equal(next, old))) return null;
     }
-    return { plan, arrived, header };
+    return next;
   }
 
   async #paint() {
@@ -336,7 +334,7 @@ export class GipImageElement extends ImageAttributes {
       for (let next; this.#loader && (next = this.#next()); ) {
         const loader = this.#loader;
         try {
-          const image = await this.#render(loader, next.plan);
+          const image = await this.#render(loader, next);
           if (this.#loader === loader && this.#near) this.#show(image, next);
         } catch (error) {
           if (this.#loader === loader) this.#fail(error);
@@ -353,19 +351,16 @@ export class GipImageElement extends ImageAttributes {
     }
   }
 
-  async #render(loader, { width, height, region, orientation, texture }) {
-    if (this.#profile === undefined) {
-      const { iccProfile } = await loader.metadata();
-      if (this.#loader === loader) this.#profile = iccProfile;
-    }
+  async #render(loader, { plan, iccProfile }) {
+    const { width, height, region, orientation, texture } = plan;
     const options = { width, height, region, orientation, texture: texture === 'on' };
-    if (!this.#profile) return loader.render(options);
+    if (!iccProfile) return loader.render(options);
     // The browser knows how to convert colours.
     return createImageBitmap(await loader.png(options));
   }
 
   #show(image, drawn) {
-    const wide = this.#profile && matchMedia('(color-gamut: p3)').matches;
+    const wide = drawn.iccProfile && matchMedia('(color-gamut: p3)').matches;
     this.#painting.show(image, drawn, wide ? 'display-p3' : 'srgb');
     this.#place();
   }

@@ -57,7 +57,7 @@ interface Renderable {
   readonly naturalWidth: number;
   readonly naturalHeight: number;
 
-  /** The metadata that has arrived. It is complete when the first Gaussian has arrived. */
+  /** The metadata that has arrived. It is complete when the whole file has arrived. */
   metadata(): Promise<Metadata>;
   /** Chunks, layers, bits per attribute. */
   statistics(): Promise<Statistics>;

@@ -9,6 +9,8 @@ export class Loader {
   header = null;
   orientation = null;
   arrived = 0;
+  iccProfile = false;
+  texture = false;
   complete = false;
   #download;
   #limits;
@@ -43,7 +45,9 @@ export class Loader {
   /** Whether more is to arrive. */
   get lacking() {
     if (this.complete) return false;
-    return this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted;
+    if (this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted) return true;
+    // What comes after all Gaussians, such as texture, is wanted with all of them.
+    return this.#wanted === this.header.gaussians;
   }
 
   /** Begins, or goes on: until header and orientation are there, and what `want` asked for. */
@@ -61,10 +65,6 @@ export class Loader {
       this.#asking -= 1;
     }
     this.start();
-  }
-
-  metadata() {
-    return this.#decoder.metadata();
   }
 
   render(options) {
@@ -107,10 +107,10 @@ export class Loader {
     for await (const { bytes, first } of this.#download.pieces(signal)) {
       if (first && this.#fed) this.#begin();
       this.#fed = true;
-      const { header, orientation, gaussians, complete } = await this.#decoder.feed(bytes);
+      const { header, gaussians, ...progress } = await this.#decoder.feed(bytes);
       if (signal.aborted) return;
       this.header ??= header;
-      Object.assign(this, { orientation, arrived: gaussians, complete });
+      Object.assign(this, progress, { arrived: gaussians });
       await this.#onprogress();
       if (!this.lacking) return;
     }
@@ -121,6 +121,7 @@ export class Loader {
   #begin() {
     this.#decoder.close();
     this.#decoder = new StreamDecoder({ limits: this.#limits });
-    Object.assign(this, { header: null, orientation: null, arrived: 0, complete: false });
+    const nothing = { iccProfile: false, texture: false, complete: false };
+    Object.assign(this, { header: null, orientation: null, arrived: 0, ...nothing });
   }
 }

@@ -9,6 +9,8 @@ export class Painting {
   drawn = null;
   #window = document.createElement('div');
   #canvas = null;
+  /** The colour space of the canvas, which it keeps. */
+  #colorSpace = '';
 
   constructor() {
     this.frame.className = 'frame';
@@ -18,6 +20,8 @@ export class Painting {
 
   /** Shows an `ImageData` or an `ImageBitmap`. */
   show(image, drawn, colorSpace) {
+    if (colorSpace !== this.#colorSpace) this.clear();
+    this.#colorSpace = colorSpace;
     if (!this.#canvas) {
       this.#canvas = document.createElement('canvas');
       this.#canvas.part = 'picture';

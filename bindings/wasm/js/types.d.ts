@@ -46,6 +46,12 @@ export interface Progress {
   orientation: Orientation | null;
   /** The number of Gaussians that have arrived. */
   gaussians: number;
+  /**
+   * Whether an ICC profile has arrived, and whether the texture has. Both may come after Gaussians: a picture that
+   * was rendered before is to be rendered anew.
+   */
+  iccProfile: boolean;
+  texture: boolean;
   /** Whether the whole file has arrived. */
   complete: boolean;
 }
@@ -133,7 +139,7 @@ export type Gaussian9 = Float32Array;
 export type TextureMap = Float32Array;
 
 export interface Statistics {
-  /** The complete chunks by type. `bytes` includes length, type and CRC. */
+  /** The complete chunks by type. `type` are its letters, and `bytes` includes type, length and CRC. */
   chunks: { type: string; count: number; bytes: number }[];
   /** The layers that have arrived: their Gaussians, and where their chunks are in the file. */
   layers: { gaussians: number; start: number; end: number }[];

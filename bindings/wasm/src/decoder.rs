@@ -1,11 +1,10 @@
 //! The push decoder and its renderings.
 
 use image_gip::{DecodeError, Limits, Orientation, RenderOptions, StreamDecoder};
-use js_sys::{Float32Array, Uint8ClampedArray, Uint16Array};
 use wasm_bindgen::prelude::*;
 
 use crate::errors::{exception, too_many_pixels};
-use crate::layer_extents::LayerExtents;
+use crate::layer_extents::{CRC, LayerExtents};
 use crate::objects;
 use crate::request::Request;
 use crate::samples::{self, Sample};
@@ -85,6 +84,18 @@ impl Decoder {
         self.stream.orientation().map(Orientation::to_exif)
     }
 
+    /// Whether an ICC profile has arrived.
+    #[wasm_bindgen(js_name = hasProfile)]
+    pub fn has_profile(&self) -> bool {
+        self.stream.metadata().icc_profile.is_some()
+    }
+
+    /// Whether the texture has arrived.
+    #[wasm_bindgen(js_name = hasTexture)]
+    pub fn has_texture(&self) -> bool {
+        self.stream.picture().is_some_and(|picture| picture.texture_map().is_some())
+    }
+
     /// The metadata that has arrived.
     pub fn metadata(&self) -> JsValue {
         objects::metadata(self.stream.metadata())
@@ -95,6 +106,30 @@ impl Decoder {
         objects::statistics(&self.stream, self.layer_extents.extents())
     }
 
+    /// How many Gaussians the first `bytes` of the file have, as far as its layers have arrived.
+    #[wasm_bindgen(js_name = gaussiansIn)]
+    pub fn gaussians_in(&self, bytes: f64) -> u32 {
+        let mut bits = 0;
+        for quantizer in self.stream.quantizers() {
+            bits += u32::from(quantizer.bits());
+        }
+        let bits = f64::from(bits);
+        let mut count = 0;
+        for (&gaussians, &(_, end)) in self.stream.layers().iter().zip(self.layer_extents.extents())
+        {
+            if bytes >= end {
+                count += gaussians;
+            } else if bits > 0.0 {
+                let codes = (f64::from(gaussians) * bits / 8.0).ceil();
+                // The CRC comes after them.
+                let missing = end - CRC as f64 - bytes;
+                // The cast clamps.
+                count += (((codes - missing) * 8.0 / bits) as u32).min(gaussians);
+            }
+        }
+        count
+    }
+
     /// How many Gaussians are enough for an output of this size; 0 until the header has arrived.
     #[wasm_bindgen(js_name = gaussiansFor)]
     pub fn gaussians_for(&self, width: u32, height: u32) -> u32 {
@@ -103,7 +138,7 @@ impl Decoder {
 
     /// The Gaussians from `start` to before `end` that have arrived: for each of them x and y of
     /// the centre, l11, l21 and l22 of the Cholesky factor, and four amplitudes.
-    pub fn gaussians(&self, start: usize, end: usize) -> Float32Array {
+    pub fn gaussians(&self, start: usize, end: usize) -> Vec<f32> {
         let all = self.stream.gaussians();
         let end = end.min(all.len());
         let chosen = &all[start.min(end)..end];
@@ -113,12 +148,12 @@ impl Decoder {
             numbers.extend_from_slice(&gaussian.cholesky);
             numbers.extend_from_slice(&gaussian.color);
         }
-        Float32Array::from(numbers.as_slice())
+        numbers
     }
 
     /// The planes of the texture's map, as stored; `undefined` without texture.
     #[wasm_bindgen(js_name = textureMap)]
-    pub fn texture_map(&self) -> Result<Option<Float32Array>, JsValue> {
+    pub fn texture_map(&self) -> Result<Option<Vec<f32>>, JsValue> {
         let Some(map) = self.stream.picture().and_then(|picture| picture.texture_map()) else {
             return Ok(None);
         };
@@ -127,23 +162,22 @@ impl Decoder {
             let mut sums = vec![0.0; length];
             map.render_planes(&options, &mut sums).map(|()| sums)
         });
-        sums.map(|sums| Some(Float32Array::from(sums.as_slice())))
-            .map_err(|error| exception(&error))
+        sums.map(Some).map_err(|error| exception(&error))
     }
 
-    /// Renders interleaved 8-bit samples. See [`Request::new`] for the numbers.
-    pub fn render8(&mut self, request: &[u32]) -> Result<Uint8ClampedArray, JsValue> {
+    /// Renders interleaved 8-bit samples, a `Uint8ClampedArray`. See [`Request::new`] for the numbers.
+    pub fn render8(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         self.render::<u8>(request)
     }
 
-    /// Renders interleaved 16-bit samples. See [`Request::new`] for the numbers.
-    pub fn render16(&mut self, request: &[u32]) -> Result<Uint16Array, JsValue> {
+    /// Renders interleaved 16-bit samples, a `Uint16Array`. See [`Request::new`] for the numbers.
+    pub fn render16(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         self.render::<u16>(request)
     }
 }
 
 impl Decoder {
-    fn render<T: Sample>(&mut self, request: &[u32]) -> Result<T::Array, JsValue> {
+    fn render<T: Sample>(&mut self, request: &[u32]) -> Result<JsValue, JsValue> {
         let Some(header) = self.stream.header() else { return Err(no_header()) };
         let numbers = request.try_into().map_err(|_| JsValue::from("ten numbers"))?;
         let orientation = self.stream.orientation().unwrap_or_default();
@@ -159,7 +193,9 @@ impl Decoder {
         if request.pixels() > self.max_output {
             return Err(too_many_pixels(request.pixels(), self.max_output));
         }
-        samples::render::<T>(&picture, &request).map_err(|error| exception(&error))
+        let samples =
+            samples::render::<T>(&picture, &request).map_err(|error| exception(&error))?;
+        Ok(samples.into())
     }
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn exception(error: &DecodeError) -> JsValue {
         DecodeError::Request(_) => ("request", None),
         _ => ("failed", None),
     };
-    new_error(kind, &message, chunk.map(ToString::to_string))
+    new_error(kind, &message, chunk.map(|chunk| chunk.letters().to_string()))
 }
 
 /// The exception for an output with more pixels than this decoder may render at once.

@@ -1,30 +1,29 @@
 //! Where in the file each layer is, so that a part of a file can be told by its length.
 
-use image_gip::ChunkType;
-
 /// Bytes of the signature (spec, section 4.1).
 const SIGNATURE: u64 = 8;
-/// Bytes of a chunk's length and type, and of its CRC (spec, section 4.2).
-const LENGTH_AND_TYPE: usize = 8;
-const CRC: u64 = 4;
+/// Bytes of a chunk's CRC (spec, section 4.2).
+pub(crate) const CRC: u64 = 4;
 
 /// Follows the chunks of a file whose bytes arrive in pieces.
 #[derive(Debug)]
 pub(crate) struct LayerExtents {
     /// The bytes that have arrived.
     position: u64,
-    /// Where the next chunk begins.
-    next: u64,
-    /// The length and the type of the chunk that begins there, and how many bytes of them have
-    /// arrived.
-    word: [u8; LENGTH_AND_TYPE],
-    collected: usize,
+    /// How many more come before the next one that counts.
+    skip: u64,
+    /// Where the current chunk begins, and whether it is a layer.
+    start: u64,
+    is_layer: bool,
+    /// The bits of the current chunk's length that have arrived, and their number; `None` before its type.
+    length: Option<(u64, u32)>,
     extents: Vec<(f64, f64)>,
 }
 
 impl Default for LayerExtents {
     fn default() -> Self {
-        Self { position: 0, next: SIGNATURE, word: [0; _], collected: 0, extents: Vec::new() }
+        let (skip, extents) = (SIGNATURE, Vec::new());
+        Self { position: 0, skip, start: 0, is_layer: false, length: None, extents }
     }
 }
 
@@ -32,27 +31,29 @@ impl LayerExtents {
     /// Takes the next bytes of a file that the decoder has accepted.
     pub(crate) fn feed(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
-        while let Some((&first, after)) = rest.split_first() {
-            if self.position < self.next {
-                let skipped = (self.next - self.position).min(rest.len() as u64);
-                self.position += skipped;
-                rest = &rest[skipped as usize..];
-                continue;
-            }
-            self.word[self.collected] = first;
-            self.collected += 1;
-            self.position += 1;
+        loop {
+            let skipped = self.skip.min(rest.len() as u64);
+            self.skip -= skipped;
+            self.position += skipped;
+            let Some((&byte, after)) = rest[skipped as usize..].split_first() else { return };
             rest = after;
-            if self.collected < LENGTH_AND_TYPE {
-                self.next = self.position;
+            self.position += 1;
+            let Some((bits, count)) = self.length else {
+                self.start = self.position - 1;
+                self.is_layer = byte == b'L';
+                self.skip = if byte.is_ascii_lowercase() { 3 } else { 0 };
+                self.length = Some((0, 0));
+                continue;
+            };
+            let bits = bits | u64::from(byte & 0x7F) << count;
+            if byte >= 0x80 {
+                self.length = Some((bits, count + 7));
                 continue;
             }
-            let [a, b, c, d, kind @ ..] = self.word;
-            self.collected = 0;
-            self.next = self.position + u64::from(u32::from_le_bytes([a, b, c, d])) + CRC;
-            if kind == ChunkType::GAUS.0 {
-                self.extents
-                    .push(((self.position - LENGTH_AND_TYPE as u64) as f64, self.next as f64));
+            self.length = None;
+            self.skip = bits + CRC;
+            if self.is_layer {
+                self.extents.push((self.start as f64, (self.position + self.skip) as f64));
             }
         }
     }

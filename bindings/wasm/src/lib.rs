@@ -9,6 +9,7 @@ compile_error!("relaxed SIMD may fuse operations, but the format specifies every
 
 mod decoder;
 mod errors;
+mod js;
 mod layer_extents;
 mod objects;
 mod request;

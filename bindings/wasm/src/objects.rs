@@ -4,15 +4,15 @@ use image_gip::{
     Coding, ColorModel, Header, Kernel, Metadata, Parameterization, QuantizationSteps,
     StreamDecoder,
 };
-use js_sys::{Array, Float64Array, Object, Reflect, Uint8Array};
 use wasm_bindgen::prelude::*;
+
+use crate::js::{Array, Float64Array, Object, Uint8Array};
 
 /// An object of these properties.
 fn object<const N: usize>(properties: [(&str, JsValue); N]) -> JsValue {
     let object = Object::new();
     for (name, value) in properties {
-        // It fails for objects that cannot be extended, which a new one is not.
-        let _ = Reflect::set(&object, &name.into(), &value);
+        object.set(name, value);
     }
     object.into()
 }
@@ -65,7 +65,7 @@ pub(crate) fn header(header: &Header) -> JsValue {
 /// The metadata. What is absent is `null`.
 pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
     let bytes = |bytes: &Option<Vec<u8>>| {
-        bytes.as_ref().map_or(JsValue::NULL, |bytes| Uint8Array::from(bytes.as_slice()).into())
+        bytes.as_ref().map_or(JsValue::NULL, |bytes| Uint8Array::new(bytes).into())
     };
     let xmp = metadata
         .xmp
@@ -90,7 +90,7 @@ pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -
     let chunks: Array = (stream.chunks().iter())
         .map(|chunk| {
             object([
-                ("type", chunk.kind.to_string().into()),
+                ("type", chunk.kind.letters().to_string().into()),
                 ("count", chunk.count.into()),
                 ("bytes", (chunk.bytes as f64).into()),
             ])
@@ -117,7 +117,7 @@ pub(crate) fn statistics(stream: &StreamDecoder, layer_extents: &[(f64, f64)]) -
             ("size", size.into()),
             ("ratio", ratio.into()),
             ("slant", slant.into()),
-            ("color", Float64Array::from(color.as_slice()).into()),
+            ("color", Float64Array::new(&color).into()),
         ])
     });
     object([

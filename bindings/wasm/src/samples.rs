@@ -1,8 +1,9 @@
 //! Rendering to typed arrays, in strips.
 
 use image_gip::{DecodeError, Orientation, Picture, RenderOptions};
-use js_sys::{Uint8ClampedArray, Uint16Array};
+use wasm_bindgen::JsValue;
 
+use crate::js::{Uint8ClampedArray, Uint16Array};
 use crate::request::Request;
 
 /// Most pixels that are rendered in one go. WebAssembly's memory never shrinks, so that a large
@@ -12,7 +13,7 @@ const STRIP_PIXELS: u64 = 1 << 22;
 /// A sample, 0 to its largest value.
 pub(crate) trait Sample: Copy + Default {
     /// The typed array of such samples.
-    type Array;
+    type Array: Into<JsValue>;
 
     /// Renders to a slice of the right length.
     fn render(
@@ -42,11 +43,11 @@ macro_rules! sample {
             }
 
             fn allocate(length: u32) -> $array {
-                $array::new_with_length(length)
+                $array::new(length)
             }
 
             fn copy(array: &$array, at: u32, samples: &[Self]) {
-                array.subarray(at, at + samples.len() as u32).copy_from(samples);
+                array.set(samples, at);
             }
         }
     };

@@ -98,8 +98,8 @@ test('errors have a class, a kind and a chunk', async () => {
   );
   assert.deepEqual(results, {
     signature: ['SignatureError', 'signature', null, true],
-    malformed: ['MalformedError', 'malformed', 'GAUS', true],
-    end: ['UnexpectedEndError', 'unexpected-end', 'GAUS', true],
+    malformed: ['MalformedError', 'malformed', 'L', true],
+    end: ['UnexpectedEndError', 'unexpected-end', 'L', true],
     network: ['NetworkError', 'network', null, true],
     unreachable: ['NetworkError', 'network', null, true],
     limit: ['LimitError', 'limit', null, true],

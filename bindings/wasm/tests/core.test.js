@@ -7,7 +7,8 @@ import { inflateSync } from 'node:zlib';
 
 import { Decoder, load } from '../dist/core.js';
 import { GipError, LimitError, MalformedError } from '../dist/index.js';
-import { makePicture, texture } from './picture.js';
+import { chunk, exif, leastChunk, makePicture, signature, texture } from './picture.js';
+import { swappedProfile } from './profile.js';
 import { crc32, parseIndex, resultOf, unlimited } from './vectors.js';
 
 const vectors = new URL('../../../spec/vectors/', import.meta.url);
@@ -56,7 +57,7 @@ test('header, metadata and statistics', () => {
     kernel: 'quartic',
     cutoff: 4,
     parameterization: 'cholesky',
-    baseColor: [30000, 32000, 34000],
+    baseColor: [117 * 257, 125 * 257, 132 * 257],
   });
   const { metadata } = decoder;
   assert.equal(metadata.iccProfile, null);
@@ -65,7 +66,8 @@ test('header, metadata and statistics', () => {
   assert.deepEqual(metadata.texts, [{ keyword: 'Title', text: 'A picture' }]);
   const statistics = decoder.statistics();
   const [end] = statistics.layers.slice(-1);
-  assert.equal(end.end + 12, bytes.length, 'all but the last chunk');
+  assert.equal(end.end + leastChunk, bytes.length, 'all but the last chunk');
+  assert.deepEqual(statistics.chunks.map(({ type }) => type), ['H', 'eXIf', 'tEXt', 'xMPd', 'L', 'E']);
   assert.equal(statistics.chunks.reduce((sum, chunk) => sum + chunk.bytes, 8), bytes.length);
   assert.deepEqual(statistics.attributeBits, { position: 448, precision: 0, shape: 672, color: 672 });
   assert.equal(statistics.quantizationSteps, null);
@@ -77,7 +79,8 @@ test('the Gaussians are those of the file', () => {
   const decoder = opened(bytes);
   const numbers = decoder.gaussians();
   assert.equal(numbers.length, 45);
-  const at = bytes.indexOf('GAUS') + 8;
+  // The codes end before the CRC of the layer and the last chunk.
+  const at = bytes.length - leastChunk - 4 - 5 * 32;
   for (let gaussian = 0; gaussian < 5; gaussian += 1) {
     for (let component = 0; component < 8; component += 1) {
       const stored = bytes.readFloatLE(at + gaussian * 32 + component * 4);
@@ -90,15 +93,111 @@ test('the Gaussians are those of the file', () => {
 });
 
 test('what a part of a file has, as a decoder of that part tells', () => {
-  for (const bytes of [makePicture({ layers: [5, 60] }), read('entropy-layers.gip')]) {
+  const between = [[1, 'tEXt', Buffer.from('Title\0A picture')], [3, 'abCd', Buffer.alloc(300)]];
+  const packed = [
+    makePicture({ layers: [5, 60] }),
+    makePicture({ layers: [3, 130, 2], later: between }),
+    read('depths-odd.gip'),
+    read('layers.gip'),
+  ];
+  for (const bytes of [...packed, read('entropy-layers.gip')]) {
     const whole = opened(bytes);
-    for (let length = 0; length <= bytes.length; length += 13) {
+    for (let length = 0; length <= bytes.length; length += 3) {
       const part = new Decoder();
       const { gaussians } = part.feed(bytes.subarray(0, length));
       assert.equal(whole.gaussiansIn(length), gaussians, `${length} bytes`);
       part.close();
     }
     whole.close();
+  }
+});
+
+test('where layers are does not depend on the pieces in which they come', () => {
+  // Types of one and four letters, and lengths of one to three bytes.
+  const lengths = [0, 1, 127, 128, 16_383, 16_384];
+  const chunks = lengths.map((length) => ['abCd', Buffer.alloc(length, 0x4c)]);
+  const later = [...chunks.map((found) => [1, ...found]), ...chunks.map((found) => [2, ...found])];
+  const bytes = makePicture({ layers: [3, 130, 600], chunks, later });
+  const { layers } = opened(bytes).statistics();
+  assert.deepEqual(layers.map(({ gaussians }) => gaussians), [3, 130, 600]);
+  for (const { start, end } of layers) {
+    assert.equal(bytes[start], 'L'.charCodeAt(0));
+    assert.equal(crc32(bytes.subarray(start, end - 4)), bytes.readUInt32LE(end - 4));
+  }
+  for (const piece of [1, 2, 5, 4096]) {
+    const decoder = new Decoder();
+    for (let at = 0; at < bytes.length; at += piece) decoder.feed(bytes.subarray(at, at + piece));
+    assert.deepEqual(decoder.statistics().layers, layers, `pieces of ${piece} bytes`);
+    decoder.close();
+  }
+});
+
+test('what comes after layers is told, and rendered from then on', () => {
+  const layers = [40, 160];
+  const profile = swappedProfile();
+  const later = [
+    [1, 'iCCP', profile],
+    [2, 'tXTR', texture],
+    [2, 'eXIf', exif(1)],
+    [2, 'tEXt', Buffer.from('Title\0A picture')],
+  ];
+  const bytes = makePicture({ layers, later });
+  const decoder = new Decoder();
+  const seen = new Set();
+  for (const byte of bytes) {
+    const { orientation, iccProfile, texture, complete } = decoder.feed(Uint8Array.of(byte));
+    seen.add(String([orientation, iccProfile, texture, complete]));
+    assert.equal(decoder.textureMap() !== null, texture);
+    assert.equal(decoder.metadata.iccProfile !== null, iccProfile);
+  }
+  assert.deepEqual([...seen], [
+    ',false,false,false',
+    '1,false,false,false',
+    '1,true,false,false',
+    '1,true,true,false',
+    '1,true,true,true',
+  ]);
+  const { metadata } = decoder;
+  assert.deepEqual(Buffer.from(metadata.iccProfile), profile);
+  assert.deepEqual(Buffer.from(metadata.exif), exif(1));
+  assert.deepEqual(metadata.texts, [{ keyword: 'Title', text: 'A picture' }]);
+
+  // The same picture as with all of it at the beginning.
+  const early = opened(makePicture({ layers, chunks: later.map(([, ...found]) => found) }));
+  const plain = opened(makePicture({ layers }));
+  assert.deepEqual(decoder.samples(), early.samples());
+  assert.notDeepEqual(decoder.samples(), plain.samples());
+  for (const opened of [decoder, early, plain]) opened.close();
+});
+
+test('an orientation comes before the first layer, or the file is refused', () => {
+  const late = makePicture({ layers: [40, 160], later: [[1, 'eXIf', exif(6)]] });
+  const decoder = new Decoder();
+  assert.throws(() => decoder.feed(late), { name: 'MalformedError', chunk: 'eXIf' });
+  assert.deepEqual([decoder.orientation, decoder.progress.gaussians], [1, 40]);
+  const { width, height } = decoder.render();
+  assert.deepEqual([width, height], [96, 64]);
+  decoder.close();
+});
+
+test('errors name the letters of a chunk, and say what they stand for', () => {
+  const bytes = makePicture({ layers: [3] });
+  const changed = (at, value) => bytes.map((byte, index) => (index === at ? value : byte));
+  const unknown = chunk('X', Buffer.alloc(3));
+  const cases = [
+    // Another version, which is no other file.
+    [changed(6, 2), 'UnsupportedError', 'H', /chunk H \(header\): unsupported: version 2/],
+    [changed(9, 200), 'MalformedError', 'H', /chunk H \(header\): is too long/],
+    [changed(bytes.length - leastChunk - 5, 0), 'MalformedError', 'L', /chunk L \(layer\): the CRC/],
+    [changed(bytes.length - 1, 0), 'MalformedError', 'E', /chunk E \(end\): the CRC/],
+    [Buffer.concat([bytes.subarray(0, -leastChunk), unknown]), 'UnsupportedError', 'X', /chunk X: unsupported/],
+    [changed(bytes.length - leastChunk, 7), 'MalformedError', '\\x07', /chunk \\x07: the type/],
+  ];
+  for (const [file, name, letters, message] of cases) {
+    assert.throws(() => opened(file), { name, chunk: letters, message });
+  }
+  for (const at of signature.keys()) {
+    if (at !== 6) assert.throws(() => opened(changed(at, bytes[at] ^ 1)), { name: 'SignatureError', chunk: null });
   }
 });
 

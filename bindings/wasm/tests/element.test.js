@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
 import { file, harness, script, settled, slow, until, withPage } from './harness.js';
-import { makePicture, texture } from './picture.js';
+import { leastChunk, makePicture, texture } from './picture.js';
+import { swappedProfile } from './profile.js';
 
 const picture = makePicture({ width: 96, height: 64, layers: [40, 160, 400] });
 /** So large that a small display needs a sixth of it. */
@@ -78,10 +79,10 @@ test('texture is shown, and left out and shown again as the attribute says', asy
 });
 
 test('the header gives the size, and pixels follow while they arrive', async () => {
-  // The gate opens as the test goes on.
-  let allowed = 200;
+  // The gate opens as the test goes on: first for the header, and less of a layer than a Gaussian.
+  let allowed = 50;
   const gate = async (sent) => until(() => sent < allowed, 'the next piece');
-  const { route } = slow(picture, { piece: 100, gate });
+  const { route } = slow(picture, { piece: 50, gate });
   harness.routes['/slow.gip'] = route;
   await withPage(element('src="/slow.gip"'), async (page) => {
     const size = () => page.evaluate(() => {
@@ -107,6 +108,101 @@ test('the header gives the size, and pixels follow while they arrive', async () 
     assert.ok(first > second && second > 0, `${first}, ${second}`);
   });
 });
+
+/** Serves a file, of which the part from `at` on waits for the page. `open` lets it go on. */
+function gated(path, bytes, at) {
+  let isOpen = false;
+  harness.routes[path] = async (_, response) => {
+    response.writeHead(200, { 'Content-Length': bytes.length });
+    response.write(bytes.subarray(0, at));
+    await until(() => isOpen, 'the rest');
+    response.end(bytes.subarray(at));
+  };
+  return () => {
+    isOpen = true;
+  };
+}
+
+/** Waits until the canvas shows exactly this file, in which nothing is to come. */
+async function shows(page, path) {
+  const wanted = await page.evaluate(async (path) => {
+    const { decode } = await import('/dist/index.js');
+    const { data } = await decode(path);
+    return { data: [...data] };
+  }, path);
+  await until(async () => {
+    const canvas = await canvasOf(page);
+    return canvas?.data.length === wanted.data.length && difference(canvas, wanted) === 0;
+  }, `the picture of ${path}`);
+}
+
+/** Whether `load` has fired. */
+const isLoaded = (page) => page.evaluate(() => document.querySelector('gip-image').complete);
+
+test('texture that comes after all Gaussians is shown, and waited for', async () => {
+  const layers = [40, 160];
+  const bytes = makePicture({ layers, later: [[2, 'tXTR', texture]] });
+  const plain = makePicture({ layers });
+  harness.routes['/plain.gip'] = file(plain);
+  harness.routes['/late-at-once.gip'] = file(bytes);
+  const open = gated('/late-texture.gip', bytes, plain.length - leastChunk);
+  await withPage(element('src="/late-texture.gip"'), async (page) => {
+    await shows(page, '/plain.gip');
+    assert.equal(await isLoaded(page), false);
+    open();
+    await settled(page);
+    await shows(page, '/late-at-once.gip');
+  });
+});
+
+test('all Gaussians are shown before the metadata after them', async () => {
+  // Of so few more, one waits for more while a picture arrives.
+  const layers = [400, 20];
+  const text = Buffer.concat([Buffer.from('Comment\0'), Buffer.alloc(2000, 97)]);
+  const bytes = makePicture({ layers, later: [[2, 'tEXt', text]] });
+  const plain = makePicture({ layers });
+  harness.routes['/plain-400.gip'] = file(plain);
+  const open = gated('/late-text.gip', bytes, plain.length + 500);
+  await withPage(element('src="/late-text.gip"'), async (page) => {
+    await shows(page, '/plain-400.gip');
+    assert.equal(await isLoaded(page), false);
+    open();
+    await settled(page);
+  });
+});
+
+for (const gamut of ['srgb', 'p3']) {
+  test(`an ICC profile that comes after Gaussians is applied, on a screen of ${gamut}`, async () => {
+    const layers = [40, 160];
+    const profile = ['iCCP', swappedProfile()];
+    const bytes = makePicture({ layers, later: [[2, ...profile]] });
+    const plain = makePicture({ layers });
+    harness.routes['/unprofiled.gip'] = file(plain);
+    harness.routes['/profiled.gip'] = file(makePicture({ layers, chunks: [profile] }));
+    const open = gated('/late-profile.gip', bytes, plain.length - leastChunk);
+    await withPage(element('src="/late-profile.gip"'), async (page) => {
+      const client = await page.context().newCDPSession(page);
+      await client.send('Emulation.setEmulatedMedia', { features: [{ name: 'color-gamut', value: gamut }] });
+      await shows(page, '/unprofiled.gip');
+      open();
+      await settled(page);
+      const spaceOf = () => page.evaluate(() => {
+        const canvas = document.querySelector('gip-image').shadowRoot.querySelector('canvas');
+        return canvas.getContext('2d').getContextAttributes().colorSpace;
+      });
+      assert.equal(await spaceOf(), gamut === 'p3' ? 'display-p3' : 'srgb');
+      // As where the profile came first.
+      const late = await canvasOf(page);
+      await page.evaluate(() => document.querySelector('gip-image').setAttribute('src', '/profiled.gip'));
+      await settled(page);
+      assert.equal(difference(await canvasOf(page), late), 0);
+      await page.evaluate(() => document.querySelector('gip-image').setAttribute('src', '/unprofiled.gip'));
+      await settled(page);
+      assert.ok(difference(await canvasOf(page), late) > 3);
+      assert.equal(await spaceOf(), 'srgb');
+    });
+  });
+}
 
 test('the download stops when the size has what it needs, and goes on when it grows', async () => {
   const { route, log } = slow(large, { piece: 4096, interval: 30 });

@@ -3,12 +3,17 @@
 
 import { crc32 } from './vectors.js';
 
-function chunk(type, payload) {
-  const body = Buffer.concat([Buffer.from(type, 'latin1'), payload]);
-  const out = Buffer.alloc(body.length + 8);
-  out.writeUInt32LE(payload.length, 0);
-  body.copy(out, 4);
-  out.writeUInt32LE(crc32(body), out.length - 4);
+/** A number of one to five bytes (spec, section 2). */
+function number(value) {
+  const bytes = [];
+  for (; value > 127; value = Math.floor(value / 128)) bytes.push((value % 128) + 128);
+  return Buffer.from([...bytes, value]);
+}
+
+/** A chunk (spec, section 4.2). */
+export function chunk(type, payload) {
+  const out = Buffer.concat([Buffer.from(type, 'latin1'), number(payload.length), payload, Buffer.alloc(4)]);
+  out.writeUInt32LE(crc32(out.subarray(0, -4)), out.length - 4);
   return out;
 }
 
@@ -23,7 +28,7 @@ export function exif(orientation) {
  * A texture for pictures of 96 x 64 pixels, in all octaves and directions, as the chunk `['tXTR', texture]`
  * (spec, section 5.7).
  */
-export const texture = Buffer.from('cdcc4c3d0500000016cf390289de2efaff32b0f962893d665ac3fc6f284695d15f64d4820c80c6b1a77bb2d580dec560', 'hex');
+export const texture = Buffer.from('cd7c05073c01003cfb0c06a350f5cc05f66f8f1f9010e87f89cc587d9008fd25020f00acd0a7d15a348c85c560', 'hex');
 
 /** By Exif's values: where a place of a picture of this size, as stored, is in the upright one. */
 export const turns = (width, height) => ({
@@ -57,49 +62,51 @@ function random(seed) {
   };
 }
 
+/** The first eight bytes of a file. */
+export const signature = Buffer.from([0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a, 0x01, 0x0a]);
+
+/** The bytes of a chunk without payload, such as the last one of a file. */
+export const leastChunk = chunk('E', Buffer.alloc(0)).length;
+
 /**
  * A picture of random spots, in layers of `layers` Gaussians each: from large and faint to small.
- * `chunks` are ancillary chunks such as `['iCCP', bytes]`.
+ * `chunks` are ancillary chunks such as `['iCCP', bytes]`, and `later` those that stand after so many layers, such
+ * as `[1, 'iCCP', bytes]`.
  */
-export function makePicture({ width = 96, height = 64, layers = [200], chunks = [], seed = 1 } = {}) {
+export function makePicture(options = {}) {
+  const { width = 96, height = 64, layers = [200], chunks = [], later = [], seed = 1 } = options;
   const next = random(seed);
   const count = layers.reduce((sum, layer) => sum + layer, 0);
-  const header = Buffer.alloc(36);
-  header.set([1, 0, 2, 8]);
-  header.writeUInt32LE(width, 4);
-  header.writeUInt32LE(height, 8);
-  header.writeUInt32LE(count, 12);
-  header.writeUInt16LE(layers.length, 16);
-  header.set([1, 1], 18);
-  header.writeFloatLE(4, 20);
-  header.writeUInt16LE(30000, 28);
-  header.writeUInt16LE(32000, 30);
-  header.writeUInt16LE(34000, 32);
+  const numbers = [width, height, count, ...(count > 0 ? [layers.length] : [])];
+  // RGB, the quartic kernel, and l11, l21, l22 in the packed coding.
+  const format = 2 + 16 + 32;
+  const base = [117, 125, 132];
+  // Kind 0, of 32 bits.
+  const floats = count > 0 ? Array(8).fill([0, 32]).flat() : [];
+  const header = [Buffer.from([format]), ...numbers.map(number), Buffer.from([...base, ...floats])];
 
-  const float = Buffer.alloc(12);
-  float.set([0, 32]);
-  float.writeFloatLE(1, 4);
-
-  const gaus = layers.map((gaussians, layer) => {
+  const after = (layer) =>
+    later.filter(([place]) => place === layer).map(([, type, payload]) => chunk(type, payload));
+  const body = layers.flatMap((gaussians, layer) => {
     const side = (Math.max(width, height) / 4) * 0.6 ** layer;
-    const payload = Buffer.alloc(4 + gaussians * 32);
-    payload.writeUInt32LE(gaussians);
+    const codes = Buffer.alloc(gaussians * 32);
     for (let i = 0; i < gaussians; i += 1) {
       const size = () => 0.5 + next() * side;
       const color = () => (next() - 0.5) * 0.3;
       const values = [next() * width, next() * height, size(), (next() - 0.5) * side, size()];
       [...values, color(), color(), color()].forEach((value, component) => {
-        payload.writeFloatLE(value, 4 + i * 32 + component * 4);
+        codes.writeFloatLE(value, i * 32 + component * 4);
       });
     }
-    return chunk('GAUS', payload);
+    const isLast = layer === layers.length - 1;
+    const payload = isLast ? codes : Buffer.concat([number(gaussians), codes]);
+    return [chunk('L', payload), ...after(layer + 1)];
   });
   return Buffer.concat([
-    Buffer.from([0xc7, 0x47, 0x49, 0x50, 0x0d, 0x0a, 0x1a, 0x0a]),
-    chunk('GHDR', header),
+    signature,
+    chunk('H', Buffer.concat(header)),
     ...chunks.map(([type, payload]) => chunk(type, payload)),
-    chunk('QNTZ', Buffer.concat(Array(8).fill(float))),
-    ...gaus,
-    chunk('GEND', Buffer.alloc(0)),
+    ...body,
+    chunk('E', Buffer.alloc(0)),
   ]);
 }

@@ -7,7 +7,7 @@ use image_gip::{ColorModel, Kernel};
 use crate::gip;
 
 /// The signature (specification, section 4.1).
-const SIGNATURE: [u8; 8] = *b"\xC7GIP\r\n\x1A\n";
+const SIGNATURE: [u8; 8] = *b"\xC7GIP\r\n\x01\n";
 /// Components of a Gaussian in colour.
 pub(super) const COMPONENTS: usize = 8;
 
@@ -50,40 +50,48 @@ impl FloatFile {
         })
     }
 
-    /// The file.
+    /// The file. It is one of 16 bits, as a colour behind the Gaussians may be between those of 8 bits.
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         let count = self.gaussians.len() as u32;
-        let kernel_code = u8::from(self.kernel == Kernel::Quartic);
-        // Version 1, coding 0 (packed), RGB, 8 bits.
-        let mut header = vec![1, 0, 2, 8];
-        header.extend([self.size.0, self.size.1, count].map(u32::to_le_bytes).concat());
-        // One layer, or none.
-        header.extend(u16::from(count > 0).to_le_bytes());
-        // Parameterization 1: Cholesky.
-        header.extend([kernel_code, 1]);
-        header.extend(self.kernel.cutoff().to_le_bytes());
-        header.extend([0; 4]);
+        // RGB, 16 bits, packed coding, this kernel, parameterization 1: Cholesky.
+        let kernel = u8::from(self.kernel == Kernel::Quartic);
+        let mut header = vec![2 | 1 << 2 | kernel << 4 | 1 << 5];
+        header.extend([self.size.0, self.size.1, count].map(number).concat());
+        if count > 0 {
+            header.extend(number(1));
+        }
         header.extend(self.base.map(u16::to_le_bytes).concat());
-        header.extend([0; 2]);
-
-        // Every component: kind 0 (float), 32 bits, scale 1, offset 0.
-        let float = [[0, 32, 0, 0], 1_f32.to_le_bytes(), 0_f32.to_le_bytes()].concat();
-        let mut file = [SIGNATURE.to_vec(), chunk(b"GHDR", &header)].concat();
-        file.extend(chunk(b"QNTZ", &float.repeat(COMPONENTS)));
+        if let Kernel::Exponential { cutoff } = self.kernel {
+            header.extend(cutoff.to_le_bytes());
+        }
+        if count > 0 {
+            // Every component: kind 0 (float), 32 bits.
+            header.extend([0, 32].repeat(COMPONENTS));
+        }
+        let mut file = [SIGNATURE.to_vec(), chunk(b'H', &header)].concat();
         if count > 0 {
             let values = self.gaussians.iter().flatten().flat_map(|value| value.to_le_bytes());
-            let layer: Vec<u8> = count.to_le_bytes().into_iter().chain(values).collect();
-            file.extend(chunk(b"GAUS", &layer));
+            file.extend(chunk(b'L', &values.collect::<Vec<u8>>()));
         }
-        file.extend(chunk(b"GEND", &[]));
+        file.extend(chunk(b'E', &[]));
         file
     }
 }
 
-fn chunk(kind: &[u8; 4], payload: &[u8]) -> Vec<u8> {
-    let body = [kind, payload].concat();
-    let length = (payload.len() as u32).to_le_bytes();
-    [&length[..], &body, &crc32fast::hash(&body).to_le_bytes()].concat()
+fn chunk(kind: u8, payload: &[u8]) -> Vec<u8> {
+    let body = [&[kind], &number(payload.len() as u32)[..], payload].concat();
+    [&body[..], &crc32fast::hash(&body).to_le_bytes()].concat()
+}
+
+/// A number as a file has it: seven bits in each byte, the lowest first (specification, section 2).
+fn number(mut value: u32) -> Vec<u8> {
+    let mut bytes = vec![];
+    while value >= 0x80 {
+        bytes.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+    bytes
 }
 
 #[cfg(test)]
@@ -104,7 +112,7 @@ mod tests {
             (Kernel::Quartic, vec![]),
         ] {
             let written =
-                FloatFile { base: [1, 2, 65_535], ..FloatFile::new((6, 4), kernel, gaussians) };
+                FloatFile { base: [1, 2, 65_535], ..FloatFile::new((300, 4), kernel, gaussians) };
             let bytes = written.to_bytes();
             let mut decoder = StreamDecoder::new();
             decoder.feed(&bytes).expect("a valid file");
@@ -121,11 +129,12 @@ mod tests {
         let sound = [3.0, 2.0, 4.0, 2.0, 2.0, 0.5, 0.0, -0.5];
         let indefinite = [3.0, 2.0, 4.0, 2.0, 0.5, 0.5, 0.0, -0.5];
         let mut bytes = FloatFile::new((6, 4), Kernel::Quartic, vec![sound, indefinite]).to_bytes();
-        // The header's payload begins after the signature, a length and a kind.
-        let (kind, payload, end) = (12, 16, 16 + 36);
-        bytes[payload + 19] = 0;
-        let crc = crc32fast::hash(&bytes[kind..end]).to_le_bytes();
-        bytes[end..end + 4].copy_from_slice(&crc);
+        // After the signature come the letter and the length of the header, and then its format.
+        let (start, format) = (SIGNATURE.len(), SIGNATURE.len() + 2);
+        let crc = format + usize::from(bytes[start + 1]);
+        bytes[format] &= !(0b11 << 5);
+        let corrected = crc32fast::hash(&bytes[start..crc]).to_le_bytes();
+        bytes[crc..crc + 4].copy_from_slice(&corrected);
         let read = FloatFile::read(&bytes).expect("it is RGB");
         assert_eq!(read.gaussians, [[3.0, 2.0, 2.0, 1.0, 1.0, 0.5, 0.0, -0.5]]);
     }

@@ -13,24 +13,22 @@ pub(crate) struct Scene {
     pub(crate) gaussians: Vec<[f32; 9]>,
 }
 
-/// Bytes of the signature and of `GHDR`.
-const HEADER_END: usize = 56;
-
 /// A texture for a picture of 96 x 64 pixels, in all octaves and directions (spec, section 5.7).
 #[rustfmt::skip]
-const TEXTURE: [u8; 48] = [
-    0xcd, 0xcc, 0x4c, 0x3d, 0x05, 0x00, 0x00, 0x00, 0x16, 0xcf, 0x39, 0x02,
-    0x89, 0xde, 0x2e, 0xfa, 0xff, 0x32, 0xb0, 0xf9, 0x62, 0x89, 0x3d, 0x66,
-    0x5a, 0xc3, 0xfc, 0x6f, 0x28, 0x46, 0x95, 0xd1, 0x5f, 0x64, 0xd4, 0x82,
-    0x0c, 0x80, 0xc6, 0xb1, 0xa7, 0x7b, 0xb2, 0xd5, 0x80, 0xde, 0xc5, 0x60,
+const TEXTURE: [u8; 43] = [
+    0xcd, 0x7c, 0x05, 0x16, 0xcf, 0x39, 0x02, 0x89, 0xde, 0x2e, 0xfa,
+    0xff, 0x32, 0xb0, 0xf9, 0x62, 0x89, 0x3d, 0x66, 0x5a, 0xc3, 0xfc,
+    0x6f, 0x28, 0x46, 0x95, 0xd1, 0x5f, 0x64, 0xd4, 0x82, 0x0c, 0x80,
+    0xc6, 0xb1, 0xa7, 0x7b, 0xb2, 0xd5, 0x80, 0xde, 0xc5, 0x60,
 ];
 
 /// The size of the pictures that [`with_texture`] takes.
 pub(crate) const TEXTURED_SIZE: (u32, u32) = (96, 64);
 
-/// A file with a texture as well.
+/// A file with a texture as well, right before its end.
 pub(crate) fn with_texture(mut file: Vec<u8>) -> Vec<u8> {
-    file.splice(HEADER_END..HEADER_END, chunk(b"tXTR", &TEXTURE));
+    let end = file.len() - chunk(b"E", &[]).len();
+    file.splice(end..end, chunk(b"tXTR", &TEXTURE));
     file
 }
 
@@ -39,32 +37,28 @@ impl Scene {
     pub(crate) fn file(&self) -> Vec<u8> {
         let channels = self.color.channels();
         let count = self.gaussians.len() as u32;
-        let mut header = vec![1, 0, channels as u8 - 1, 8];
-        header.extend(self.size.0.to_le_bytes());
-        header.extend(self.size.1.to_le_bytes());
-        header.extend(count.to_le_bytes());
-        header.extend(u16::from(count > 0).to_le_bytes());
-        header.extend([u8::from(self.cutoff.is_none()), 1]);
-        header.extend(self.cutoff.unwrap_or(4.0).to_le_bytes());
-        header.extend([0; 4]);
-        let base = |channel| if channel < channels { 0x7fff_u16 } else { 0 };
-        header.extend((0..4).flat_map(|channel| base(channel).to_le_bytes()));
-
-        let mut quantizer = vec![0, 32, 0, 0];
-        quantizer.extend(1.0_f32.to_le_bytes());
-        quantizer.extend(0.0_f32.to_le_bytes());
-
-        let mut layer = count.to_le_bytes().to_vec();
-        let values = self.gaussians.iter().flat_map(|values| &values[..5 + channels]);
-        layer.extend(values.flat_map(|value| value.to_le_bytes()));
-
-        let mut file = vec![0xc7, b'G', b'I', b'P', b'\r', b'\n', 0x1a, b'\n'];
-        file.extend(chunk(b"GHDR", &header));
-        file.extend(chunk(b"QNTZ", &quantizer.repeat(5 + channels)));
+        // The colour model, 8 bits, packed coding, the kernel, parameterization 1: Cholesky.
+        let kernel = u8::from(self.cutoff.is_none());
+        let mut header = vec![(channels - 1) as u8 | kernel << 4 | 1 << 5];
+        header.extend([self.size.0, self.size.1, count].map(number).concat());
         if count > 0 {
-            file.extend(chunk(b"GAUS", &layer));
+            header.extend(number(1));
         }
-        file.extend(chunk(b"GEND", &[]));
+        header.extend([0x7f].repeat(channels));
+        header.extend(self.cutoff.iter().flat_map(|cutoff| cutoff.to_le_bytes()));
+
+        if count > 0 {
+            // Every component: kind 0 (float), 32 bits.
+            header.extend([0, 32].repeat(5 + channels));
+        }
+        let mut file = vec![0xc7, b'G', b'I', b'P', b'\r', b'\n', 1, b'\n'];
+        file.extend(chunk(b"H", &header));
+        if count > 0 {
+            let values = self.gaussians.iter().flat_map(|values| &values[..5 + channels]);
+            let layer: Vec<u8> = values.flat_map(|value| value.to_le_bytes()).collect();
+            file.extend(chunk(b"L", &layer));
+        }
+        file.extend(chunk(b"E", &[]));
         file
     }
 
@@ -91,8 +85,18 @@ impl Scene {
     }
 }
 
-fn chunk(kind: &[u8; 4], payload: &[u8]) -> Vec<u8> {
-    let checked = [kind, payload].concat();
-    let length = (payload.len() as u32).to_le_bytes();
-    [&length, checked.as_slice(), &crc32fast::hash(&checked).to_le_bytes()].concat()
+fn chunk(kind: &[u8], payload: &[u8]) -> Vec<u8> {
+    let checked = [kind, &number(payload.len() as u32), payload].concat();
+    [checked.as_slice(), &crc32fast::hash(&checked).to_le_bytes()].concat()
+}
+
+/// A number as a file has it: seven bits in each byte, the lowest first (spec, section 2).
+fn number(mut value: u32) -> Vec<u8> {
+    let mut bytes = vec![];
+    while value >= 0x80 {
+        bytes.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+    bytes
 }

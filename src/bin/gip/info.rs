@@ -81,17 +81,21 @@ struct PrefixInfo {
     bytes: usize,
 }
 
-/// The chunks of one type. Their bytes include length, type and CRC.
+/// The chunks of one type. Their bytes include type, length and CRC.
 #[derive(Debug, Serialize)]
 struct Chunk {
+    /// The letters of the type.
     kind: String,
+    /// With what they stand for, for people.
+    #[serde(skip)]
+    name: String,
     count: u32,
     bytes: u64,
 }
 
 #[derive(Debug, Serialize)]
 struct BitsPerGaussian {
-    /// The bits of all `GAUS` chunks, framing included, divided by the number of Gaussians; `None`
+    /// The bits of all layers, framing included, divided by the number of Gaussians; `None`
     /// without Gaussians.
     coded: Option<f64>,
     /// The sum of the attributes below.
@@ -269,7 +273,12 @@ impl FileInfo {
             base_color: header.base_color[..channels].to_vec(),
             chunks: chunks
                 .iter()
-                .map(|c| Chunk { kind: c.kind.to_string(), count: c.count, bytes: c.bytes })
+                .map(|c| Chunk {
+                    kind: c.kind.letters().to_string(),
+                    name: c.kind.to_string(),
+                    count: c.count,
+                    bytes: c.bytes,
+                })
                 .collect(),
             bits_per_gaussian,
             prefixes: prefixes
@@ -405,8 +414,8 @@ impl Display for FileInfo {
             let name = format!("prefix of {layers} layer{plural}");
             row(&name, &format_args!("{gaussians} Gaussians, {bytes} bytes"))?;
         }
-        for Chunk { kind, count, bytes } in &self.chunks {
-            row(&format!("chunk {kind}"), &format_args!("{count}, {bytes} bytes"))?;
+        for Chunk { name, count, bytes, .. } in &self.chunks {
+            row(&format!("chunk {name}"), &format_args!("{count}, {bytes} bytes"))?;
         }
         let MetadataSizes { icc_profile, exif, xmp, texts, .. } = &self.metadata;
         if let Some(ColorSpace { primaries, transfer }) = self.metadata.cicp {

@@ -26,7 +26,6 @@ use super::tables;
 use super::tree_walk::{self, TreeGaussians};
 use crate::chunk::ChunkType;
 use crate::color::ColorModel;
-use crate::container::Header;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 
@@ -62,10 +61,14 @@ pub(crate) struct LayerCoder<'a> {
 }
 
 impl<'a> LayerCoder<'a> {
-    /// For the layers of a file with this header.
-    pub(crate) fn new(quantization: &'a Quantization, header: &Header) -> Self {
-        let grid = CenterGrid::new(header.width, header.height);
-        Self { quantization, grid, channels: header.color.channels() }
+    /// For the layers of a picture of this width, height and colour model.
+    pub(crate) fn new(
+        quantization: &'a Quantization,
+        [width, height]: [u32; 2],
+        color: ColorModel,
+    ) -> Self {
+        let grid = CenterGrid::new(width, height);
+        Self { quantization, grid, channels: color.channels() }
     }
 
     /// Checks that a layer may have `count` Gaussians in these bytes.

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use super::cells::CenterGrid;
 use super::steps;
 use crate::color::ColorModel;
-use crate::container::Fields;
+use crate::container::fields::Fields;
 use crate::error::DecodeError;
 use crate::gaussian::Gaussian;
 use crate::math;

@@ -3,12 +3,13 @@
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-use crate::container::Fields;
+use crate::container::fields::Fields;
 use crate::error::DecodeError;
 
 /// Steps of position, size, ratio and slant.
 pub(crate) type Geometry = [f32; 4];
 
+// Constants: docs/tuning.md, "Rate model".
 /// The steps of geometry that a file has if it does not say others. The quantization of each adds as much distortion
 /// as that of a step of colour, for a Gaussian of norm 1: from integrals of the quartic kernel's derivatives. They are
 /// the roots of 1.2, 0.6, 0.75 and 3.

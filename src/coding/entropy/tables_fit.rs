@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use super::contexts;
-use super::layer::LayerCoder;
 use super::rans::{Model, RansDecoder, SymbolCoder};
 use super::symbol::SYMBOLS;
 use super::tables;
@@ -65,7 +64,7 @@ fn counts(file: &[u8]) -> SymbolCounts {
     let (header, dequantizer) =
         Header::parse(&payloads(file, ChunkType::HEADER)[0]).expect("valid");
     let Some(Dequantizer::Entropy(quantization)) = dequantizer else { panic!("not entropy coded") };
-    let coder = LayerCoder::new(&quantization, &header);
+    let coder = header.layer_coder(&quantization);
     let mut counts = vec![[0.0; SYMBOLS]; contexts::COUNT];
     let mut left = header.gaussians;
     let layers = payloads(file, ChunkType::LAYER);

@@ -4,7 +4,7 @@
 #[cfg(feature = "encode")]
 use alloc::vec::Vec;
 
-use crate::container::Fields;
+use crate::container::fields::Fields;
 use crate::error::DecodeError;
 use crate::math;
 

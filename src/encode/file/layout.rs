@@ -2,9 +2,9 @@
 
 use super::layers;
 use crate::chunk::{ChunkType, SIGNATURE, VERSION};
-use crate::coding::entropy::{Code, EncodedLayer, LayerCoder, Quantization, QuantizedCodes, steps};
+use crate::coding::entropy::{Code, EncodedLayer, Quantization, QuantizedCodes, steps};
 use crate::coding::layer_count::LayerCount;
-use crate::coding::packed::PackedCodes;
+use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::color::SampleDepth;
 use crate::container::{ChunkWriter, Coding, Dequantizer, Header, Metadata};
 use crate::encode::error::{OptionError, Result};
@@ -96,7 +96,8 @@ impl<'a> FileLayout<'a> {
         let layers = u16::from(gaussians > 0);
         let header = Header { gaussians, layers, ..self.header.clone() };
         let mut file = ChunkWriter::new();
-        file.chunk(ChunkType::HEADER, &[&header.to_payload(None)]);
+        let quantizers = Dequantizer::Packed(vec![Quantizer::Float; header.components()]);
+        file.chunk(ChunkType::HEADER, &[&header.to_payload(Some(&quantizers))]);
         for (kind, payload) in self.metadata.chunks() {
             file.chunk(kind, &[&payload]);
         }
@@ -118,7 +119,7 @@ impl<'a> FileLayout<'a> {
         QuantizedCodes { quantization, mut codes }: QuantizedCodes,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers> {
-        let coder = LayerCoder::new(&quantization, &self.header);
+        let coder = self.header.layer_coder(&quantization);
         let room =
             self.first_layer.map(|bytes| (bytes as usize).saturating_sub(self.least_prefix()));
         let layers = layers::write_entropy_layers(&coder, &mut codes, room, observer)?;
@@ -138,7 +139,7 @@ impl<'a> FileLayout<'a> {
             gaussians: codes.len() as u32,
             ..self.header.clone()
         };
-        let coder = LayerCoder::new(quantization, &header);
+        let coder = header.layer_coder(quantization);
         let bounds = layers::bounds_payload(&coder, codes, layers, &header, observer)?;
         let layers = layers.iter().map(|layer| (layer.count(), &layer.bytes[..]));
         Ok(self.write(&header, &Dequantizer::Entropy(quantization.clone()), bounds, layers))

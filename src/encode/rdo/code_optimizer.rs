@@ -3,7 +3,7 @@
 
 use super::coordinate_descent::{CodeContext, CoordinateDescent, touched_tiles};
 use super::residuals::Residuals;
-use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, LayerCoder, QuantizedCodes};
+use crate::coding::entropy::{CenterGrid, Code, EncodedLayer, QuantizedCodes};
 use crate::color::ColorModel;
 use crate::encode::error::Result;
 use crate::encode::file::{CodedLayers, FileLayout};
@@ -111,7 +111,7 @@ impl<'a> CodeOptimizer<'a> {
         self.render(&coded, observer)?;
         let CodedLayers { quantization, codes, layers } = coded;
         let contexts: Vec<CodeContext<'_>> = layers.iter().flat_map(contexts_of).collect();
-        let coder = LayerCoder::new(&quantization, self.layout.header());
+        let coder = self.layout.header().layer_coder(&quantization);
         let bytes: usize = layers.iter().map(|layer| layer.bytes.len()).sum();
         let parts = codes.chunks(PART).zip(contexts.chunks(PART));
         let sums = observer.map(parts, |(codes, contexts)| {

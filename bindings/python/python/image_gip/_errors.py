@@ -10,7 +10,8 @@ class GipError(Exception):
     Wrong arguments are no ``GipError``: they raise ``TypeError`` or ``ValueError``.
     """
 
-    #: The four letters of the chunk in which a file breaks a rule or ends; ``None`` elsewhere.
+    #: The letters of the chunk in which a file breaks a rule or ends, such as ``"L"`` for a layer;
+    #: ``None`` elsewhere.
     chunk: str | None = None
 
 

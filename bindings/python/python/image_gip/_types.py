@@ -69,11 +69,11 @@ class Limits:
 class Chunk:
     """The chunks of one type in a file."""
 
-    #: The type: four letters.
+    #: The type: one letter, such as ``"L"`` for a layer, or four, as in ``"bNDS"``.
     kind: str
     #: The number of chunks.
     count: int
-    #: The bytes of all these chunks, with length, type and checksum.
+    #: The bytes of all these chunks, with type, length and checksum.
     bytes: int
 
 
