@@ -89,15 +89,14 @@ impl Cicp {
 impl MasteringDisplay {
     pub(super) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
         let payload: &[u8; 24] = fixed(ChunkType::MDCV, payload)?;
-        let chromaticity = |at: usize| [0, 2].map(|of| u16::from_be_bytes(part(payload, at + of)));
-        let luminance = |at| u32::from_be_bytes(part(payload, at));
+        let half = |at: usize| u16::from_be_bytes([payload[at], payload[at + 1]]);
         Ok(Self {
-            red: chromaticity(0),
-            green: chromaticity(4),
-            blue: chromaticity(8),
-            white: chromaticity(12),
-            max_luminance: luminance(16),
-            min_luminance: luminance(20),
+            red: [half(0), half(2)],
+            green: [half(4), half(6)],
+            blue: [half(8), half(10)],
+            white: [half(12), half(14)],
+            max_luminance: word(payload, 16),
+            min_luminance: word(payload, 20),
         })
     }
 
@@ -119,8 +118,7 @@ impl MasteringDisplay {
 impl ContentLight {
     pub(super) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
         let payload: &[u8; 8] = fixed(ChunkType::CLLI, payload)?;
-        let level = |at| u32::from_be_bytes(part(payload, at));
-        Ok(Self { max_content: level(0), max_frame_average: level(4) })
+        Ok(Self { max_content: word(payload, 0), max_frame_average: word(payload, 4) })
     }
 
     /// The payload of the chunk `cLLI`, in `.gip` as in PNG.
@@ -136,9 +134,10 @@ fn fixed<const N: usize>(chunk: ChunkType, payload: &[u8]) -> Result<&[u8; N], D
     payload.try_into().map_err(|_| DecodeError::malformed(chunk, "has the wrong length"))
 }
 
-/// The bytes from a place on, all of which are there.
-fn part<const N: usize>(payload: &[u8], at: usize) -> [u8; N] {
-    core::array::from_fn(|index| payload[at + index])
+/// The number of four bytes at a place, all of which are there.
+#[inline(always)]
+fn word<const N: usize>(payload: &[u8; N], at: usize) -> u32 {
+    u32::from_be_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]])
 }
 
 #[cfg(test)]
