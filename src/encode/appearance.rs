@@ -30,16 +30,19 @@ const C3: f64 = 2392.0 / 4096.0 * 32.0;
 const PIECES: usize = 4096;
 
 static OF_PQ: LazyLock<Curve> = LazyLock::new(|| {
-    Curve::new(|code| {
-        srgb(compressed(pq_luminance(code) / REFERENCE_WHITE, PEAK / REFERENCE_WHITE))
-    })
+    let most = PEAK / REFERENCE_WHITE;
+    // Where the curve is flatter, an error counts as much as one of a code of sRGB: a display of high range shows it, and
+    // PQ is about uniform there.
+    Curve::new(1.0, |code| srgb(compressed(pq_luminance(code) / REFERENCE_WHITE, most)))
 });
-static OF_LINEAR: LazyLock<Curve> = LazyLock::new(|| Curve::new(srgb));
+static OF_LINEAR: LazyLock<Curve> = LazyLock::new(|| Curve::new(0.0, srgb));
 
 /// A sample of sRGB for each code, both from 0 to 1.
 #[derive(Debug)]
 pub(crate) struct Curve {
     ends: Vec<f32>,
+    /// The least slope that counts.
+    least_slope: f32,
 }
 
 impl Curve {
@@ -52,9 +55,9 @@ impl Curve {
         }
     }
 
-    fn new(function: impl Fn(f64) -> f64) -> Self {
+    fn new(least_slope: f32, function: impl Fn(f64) -> f64) -> Self {
         let end = |index| function(index as f64 / PIECES as f64) as f32;
-        Self { ends: (0..=PIECES).map(end).collect() }
+        Self { ends: (0..=PIECES).map(end).collect(), least_slope }
     }
 
     /// The piece that a code is in, and where, as a share.
@@ -90,11 +93,10 @@ impl Curve {
         0.5 * (least + most)
     }
 
-    /// How much more the error of a code counts than that of a sample of sRGB. Where the curve is flat it counts as
-    /// much, since a display of high range shows it: PQ is about uniform there.
+    /// How much more the error of a code counts than that of a sample of sRGB.
     pub(crate) fn slope(&self, code: f32) -> f32 {
         let (piece, _) = Self::place(code);
-        ((self.ends[piece + 1] - self.ends[piece]) * PIECES as f32).max(1.0)
+        ((self.ends[piece + 1] - self.ends[piece]) * PIECES as f32).max(self.least_slope)
     }
 }
 

@@ -314,7 +314,8 @@ mod tests {
         let expected = verdict(size, model, None, [&source, &rendering], 32);
         let plain = verdict(size, model, None, [&codes, &rendered], 32);
         let ratio = |verdict: Verdict, of: fn(&Verdict) -> f64| of(&verdict) / of(&expected);
-        for of in [Verdict::worst, |verdict: &Verdict| verdict.blotches] {
+        let distance = |verdict: &Verdict| verdict.distance.unwrap_or(0.0);
+        for of in [distance, |verdict: &Verdict| verdict.blotches] {
             assert!((ratio(found, of) - 1.0).abs() < 0.01, "{found:?}, {expected:?}");
             assert!(ratio(plain, of) < 0.9, "{plain:?}, {expected:?}");
         }
