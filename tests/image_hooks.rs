@@ -198,8 +198,7 @@ fn colour_spaces_are_carried_in_codes() {
         let file = encode(color_space).unwrap();
         let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap();
         assert_eq!(found, color_space);
-        let mut picture =
-            image::DynamicImage::from_decoder(GipDecoder::new(&file[..]).unwrap()).unwrap();
+        let mut picture = DynamicImage::from_decoder(GipDecoder::new(&file[..]).unwrap()).unwrap();
         picture.set_color_space(found).unwrap();
         assert_eq!(picture.color_space(), color_space);
     }

@@ -148,7 +148,7 @@ fn code_points_of_png_are_kept() {
             .collect();
         assert_eq!(said(&room.read("b.png")), expected);
 
-        for name in ["b.jpg", "b.webp", "b.tif", "b.bmp"] {
+        for name in ["b.jpg", "b.webp", "b.bmp"] {
             let warnings = room.warnings(&["decode", "a.gip", name]);
             let reader = ImageReader::open(room.path(name)).expect("it was written");
             let profile = reader.into_decoder().expect("sound").icc_profile().expect("sound");
