@@ -13,7 +13,8 @@ Saving keeps the samples of these modes and those of I;16B, I (from 0 to 65535),
 La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK by its ICC profile.
 
 As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
-turns them; ``save`` stores the ICC profile of the picture by itself, and takes ``icc_profile``,
+turns them; ``save`` stores the ICC profile of the picture by itself, and the colour space of one
+that has ``info["cicp"]``, the two codes of ``image_gip.encode``. It takes ``icc_profile``, ``cicp``,
 ``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``: with ``metadata="none"``,
 turn the picture before, as nothing in the file tells how it is to be turned.
 """
@@ -59,6 +60,8 @@ class GipImageFile(ImageFile.ImageFile):
             raise OSError(str(error)) from error
         self._stored_size = header.size
         self._mode = "I;16" if (header.mode, header.depth) == ("L", 16) else header.mode
+        if header.cicp is not None:
+            self.info["cicp"] = header.cicp
         if header.icc is not None:
             self.info["icc_profile"] = header.icc
         if header.exif is not None:
@@ -214,6 +217,7 @@ def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
         options["exif"] = exif.tobytes() if isinstance(exif, Image.Exif) else exif
     if xmp := asked.get("xmp"):
         options["xmp"] = xmp.encode() if isinstance(xmp, str) else xmp
+    options.setdefault("cicp", _modes.stored_cicp(image))
     samples = _modes.samples(image, profile)
     try:
         encoded = encode(samples, **options)
