@@ -76,7 +76,9 @@ pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
             object([("keyword", text.keyword.as_str().into()), ("text", text.text.as_str().into())])
         })
         .collect();
+    let cicp = metadata.cicp.map(|cicp| vec![cicp.primaries, cicp.transfer]);
     object([
+        ("cicp", bytes(&cicp)),
         ("iccProfile", bytes(&metadata.icc_profile)),
         ("exif", bytes(&metadata.exif)),
         ("xmp", xmp),
