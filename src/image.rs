@@ -11,12 +11,14 @@ use ::image::error::{
     UnsupportedError, UnsupportedErrorKind,
 };
 use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
-use ::image::metadata::{CicpColorPrimaries as Primaries, CicpTransferCharacteristics as Transfer};
+use ::image::metadata::{
+    CicpColorPrimaries as Primaries, CicpTransferCharacteristics as Transfer, Orientation,
+};
 use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
 
 use crate::chunk::MAGIC;
 use crate::color::{ColorModel, SampleDepth};
-use crate::container::Cicp;
+use crate::container::{Cicp, Metadata};
 use crate::decode::Decoder;
 use crate::error::{DecodeError, LimitKind};
 use crate::limits::Limits;
@@ -82,7 +84,7 @@ pub struct GipDecoder<R> {
 }
 
 impl<R: Read> GipDecoder<R> {
-    /// Reads the header and the metadata, with the default [`Limits`].
+    /// Reads the file up to its first layer, with the default [`Limits`].
     ///
     /// # Errors
     /// As [`Decoder::new`].
@@ -90,7 +92,7 @@ impl<R: Read> GipDecoder<R> {
         Self::new_with_limits(reader, Limits::default())
     }
 
-    /// Reads the header and the metadata, with the given limits.
+    /// Reads the file up to its first layer, with the given limits.
     ///
     /// # Errors
     /// As [`Decoder::new_with_limits`].
@@ -119,18 +121,35 @@ impl<R: Read> GipDecoder<R> {
     /// The colour space that the file says in codes, for [`DynamicImage::set_color_space`](::image::DynamicImage::set_color_space);
     /// `image` asks a decoder for an ICC profile alone. It counts before the profile. `None` if there is none, or if
     /// `image` does not know its codes.
-    pub fn color_space(&self) -> Option<::image::metadata::Cicp> {
-        let Cicp { primaries, transfer } = self.decoder.metadata().cicp?;
-        Some(::image::metadata::Cicp {
-            primaries: PRIMARIES.into_iter().find(|&code| code as u8 == primaries)?,
-            transfer: TRANSFERS.into_iter().find(|&code| code as u8 == transfer)?,
-            ..::image::metadata::Cicp::SRGB
+    ///
+    /// # Errors
+    /// When the file is malformed, unsupported or ends too early, as far as it is read: to its end, if there is none
+    /// before the first layer.
+    pub fn color_space(&mut self) -> ImageResult<Option<::image::metadata::Cicp>> {
+        self.metadata_with(|metadata| {
+            let Cicp { primaries, transfer } = metadata.cicp?;
+            Some(::image::metadata::Cicp {
+                primaries: PRIMARIES.into_iter().find(|&code| code as u8 == primaries)?,
+                transfer: TRANSFERS.into_iter().find(|&code| code as u8 == transfer)?,
+                ..::image::metadata::Cicp::SRGB
+            })
         })
     }
 
     /// Whether the picture's texture is rendered; see [`RenderOptions::with_texture`]. Default `true`.
     pub fn set_texture(&mut self, texture: bool) {
         self.texture = texture;
+    }
+
+    /// Part of the metadata. What is not there yet may stand after the layers.
+    fn metadata_with<T>(
+        &mut self,
+        find: impl Fn(&Metadata) -> Option<T>,
+    ) -> ImageResult<Option<T>> {
+        match find(self.decoder.metadata()) {
+            None => Ok(find(self.decoder.read_metadata()?)),
+            found => Ok(found),
+        }
     }
 
     /// Renders a region into rows that begin `row_pitch` bytes apart.
@@ -193,15 +212,21 @@ impl<R: Read> ImageDecoder for GipDecoder<R> {
     }
 
     fn icc_profile(&mut self) -> ImageResult<Option<Vec<u8>>> {
-        Ok(self.decoder.metadata().icc_profile.clone())
+        self.metadata_with(|metadata| metadata.icc_profile.clone())
     }
 
     fn exif_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
-        Ok(self.decoder.metadata().exif.clone())
+        self.metadata_with(|metadata| metadata.exif.clone())
     }
 
     fn xmp_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {
-        Ok(self.decoder.metadata().xmp.clone())
+        self.metadata_with(|metadata| metadata.xmp.clone())
+    }
+
+    fn orientation(&mut self) -> ImageResult<Orientation> {
+        // It stands before the layers.
+        let orientation = Orientation::from_exif(self.decoder.metadata().orientation().to_exif());
+        Ok(orientation.unwrap_or(Orientation::NoTransforms))
     }
 
     /// Checks `max_image_width` and `max_image_height`, and uses `max_alloc` as the limit of all

@@ -1,10 +1,12 @@
 //! `.gip` through the `image` crate: hooks, decoder, encoder.
 
+mod common;
 mod pictures;
 
 use std::io::Cursor;
 use std::path::PathBuf;
 
+use common::{SIGNATURE, chunk};
 use image::error::{LimitErrorKind, UnsupportedErrorKind};
 use image::metadata::Orientation;
 use image::{
@@ -196,19 +198,42 @@ fn colour_spaces_are_carried_in_codes() {
     };
     for color_space in [Cicp::DISPLAY_P3, pq] {
         let file = encode(color_space).unwrap();
-        let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap();
+        let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap().unwrap();
         assert_eq!(found, color_space);
         let mut picture = DynamicImage::from_decoder(GipDecoder::new(&file[..]).unwrap()).unwrap();
         picture.set_color_space(found).unwrap();
         assert_eq!(picture.color_space(), color_space);
     }
     // What a file is in without codes, and codes that have no name.
-    assert_eq!(GipDecoder::new(&encode(Cicp::SRGB).unwrap()[..]).unwrap().color_space(), None);
+    let srgb = encode(Cicp::SRGB).unwrap();
+    assert_eq!(GipDecoder::new(&srgb[..]).unwrap().color_space().unwrap(), None);
     let unknown = &include_bytes!("../spec/vectors/cicp-unknown.gip")[..];
-    assert_eq!(GipDecoder::new(unknown).unwrap().color_space(), None);
+    assert_eq!(GipDecoder::new(unknown).unwrap().color_space().unwrap(), None);
     let matrix = CicpMatrixCoefficients::Bt709;
     let error = encode(Cicp { matrix, ..Cicp::SRGB }).unwrap_err();
     assert!(matches!(error, ImageError::Unsupported(_)), "{error}");
+}
+
+#[test]
+fn metadata_after_the_layers_is_found() {
+    let file = encode(ColorType::L8);
+    let (layers, end) = file.split_at(file.len() - chunk(b"E", &[]).len());
+    let exif = b"II\x2a\0\x08\0\0\0\0\0\0\0\0\0";
+    let late = [(b"iCCP", &b"a profile"[..]), (b"eXIf", exif), (b"xMPd", b"<x/>")];
+    let late = late.map(|(kind, payload)| chunk(kind, payload)).concat();
+    let late = [layers, &late, end].concat();
+    let mut decoder = GipDecoder::new(&late[..]).unwrap();
+    assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
+    assert_eq!(decoder.icc_profile().unwrap().as_deref(), Some(&b"a profile"[..]));
+    assert_eq!(decoder.exif_metadata().unwrap().as_deref(), Some(&exif[..]));
+    assert_eq!(decoder.xmp_metadata().unwrap().as_deref(), Some(&b"<x/>"[..]));
+    assert_eq!(read_all(decoder), reference(&file));
+
+    // The orientation is known when the first layer begins, the rest is not.
+    let header = SIGNATURE.len() + 2 + usize::from(late[SIGNATURE.len() + 1]) + 4;
+    let mut decoder = GipDecoder::new(&late[..=header]).unwrap();
+    assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
+    assert!(matches!(decoder.icc_profile(), Err(ImageError::Decoding(_))));
 }
 
 #[test]
@@ -298,13 +323,14 @@ fn damaged_files_are_errors() {
         assert!(matches!(outcome, Err(ImageError::Decoding(_))), "{length} bytes: {outcome:?}");
     }
 
-    // The first chunk: its length, its type, its payload with the version first, its CRC.
+    // The version is the seventh byte.
     let mut later = file.clone();
-    let end = 16 + u32::from_le_bytes(later[8..12].try_into().unwrap()) as usize;
-    later[16] = 200;
-    let crc = crc32fast::hash(&later[12..end]);
-    later[end..end + 4].copy_from_slice(&crc.to_le_bytes());
+    later[6] = 200;
     assert!(matches!(GipDecoder::new(&later[..]), Err(ImageError::Unsupported(_))));
+    // It is taken for what it is all the same.
+    image_gip::register();
+    let reader = ImageReader::new(Cursor::new(&later)).with_guessed_format().expect("in memory");
+    assert!(matches!(reader.decode(), Err(ImageError::Unsupported(_))));
 
     let mut limits = Limits::default();
     limits.max_height = HEIGHT - 1;

@@ -9,7 +9,9 @@ use common::layered::{
     BEFORE, IN_A_LAYER, LAYERS, SIZE, chunks, damaged, decoded, regions, showing,
 };
 use common::texture::Texture;
-use common::{Random, bits, chunk, decode, decode_valid, of_chunks, payload};
+use common::{
+    Random, bits, chunk, decode, decode_valid, kind, of_chunks, payload, without_last_word,
+};
 use image_gip::{DecodeError, Decoder, Region, RenderOptions};
 
 fn rendered(file: &[u8], options: &RenderOptions) -> Result<Vec<u8>, DecodeError> {
@@ -34,6 +36,30 @@ fn a_region_has_the_texture_of_that_part() {
     let part = RenderOptions::new().with_region(Region { x: 1, y: 2, width: 20, height: 20 });
     let textured = rendered(&bytes, &part).expect("it decodes");
     assert_ne!(rendered(&bytes, &part.with_texture(false)).expect("it decodes"), textured);
+}
+
+#[test]
+fn bounds_and_texture_may_follow_the_layers() {
+    let mut chunks = chunks();
+    let bounds = chunks.remove(BEFORE - 1);
+    // After the first layer, and after the last.
+    for place in [2, LAYERS + 1] {
+        let mut chunks = chunks.clone();
+        let texture = Texture::constant(SIZE.into(), [0.2, 0.3, 0.7]).payload(SIZE.into());
+        drop(chunks.splice(place..place, [bounds.clone(), chunk(b"tXTR", &texture)]));
+        a_region_of(&of_chunks(&chunks));
+        // What does not show is not decoded all the same.
+        let region = Region { x: 280, y: 180, width: 20, height: 20 };
+        let options = RenderOptions::new().with_region(region);
+        let showing = showing(SIZE, region);
+        let layers = (1..chunks.len() - 1).filter(|&at| kind(&chunks[at]) == b"L");
+        for (number, at) in layers.collect::<Vec<_>>().into_iter().enumerate() {
+            let mut damaged = chunks.clone();
+            damaged[at] = without_last_word(&damaged[at]);
+            let found = rendered(&of_chunks(&damaged), &options);
+            assert_eq!(found.is_err(), showing.contains(&number), "{number}");
+        }
+    }
 }
 
 /// Compares regions that are decoded by themselves with renderings of the whole file.

@@ -40,7 +40,7 @@ pub struct Decoder<R> {
 }
 
 impl<R: Read> Decoder<R> {
-    /// Reads the header and the metadata, with the default [`Limits`].
+    /// Reads the file up to its first layer, with the default [`Limits`].
     ///
     /// # Errors
     /// When reading fails, or when the file up to its first layer is malformed, requires something
@@ -49,7 +49,7 @@ impl<R: Read> Decoder<R> {
         Self::new_with_limits(reader, Limits::default())
     }
 
-    /// Reads the header and the metadata, with the given limits.
+    /// Reads the file up to its first layer, with the given limits.
     ///
     /// # Errors
     /// As [`Decoder::new`].
@@ -68,7 +68,8 @@ impl<R: Read> Decoder<R> {
         self.stream.header().expect("`new_with_limits` read it")
     }
 
-    /// The metadata: ICC profile, Exif, XMP and texts.
+    /// The metadata that was read: ICC profile, Exif, XMP and texts. An orientation is always there; the rest may
+    /// stand after layers, so that all of it is known after [`Decoder::read_metadata`] or a `decode_into`.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         self.stream.metadata()
@@ -110,6 +111,16 @@ impl<R: Read> Decoder<R> {
     /// As [`Picture::output_len`].
     pub fn output_len(&self) -> Result<usize, DecodeError> {
         self.decoded().output_len(&self.options)
+    }
+
+    /// Reads the rest of the file, and gives all of its metadata. Layers are left to be decoded when they are
+    /// needed.
+    ///
+    /// # Errors
+    /// As [`Decoder::read_to_end`].
+    pub fn read_metadata(&mut self) -> Result<&Metadata, DecodeError> {
+        self.read_until(StreamDecoder::is_complete)?;
+        Ok(self.metadata())
     }
 
     /// Reads the rest of the file.

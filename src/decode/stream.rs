@@ -211,7 +211,7 @@ impl StreamDecoder {
         self.chunks.quantization.as_ref().map(Quantization::steps)
     }
 
-    /// The metadata that has arrived. It is complete when the first Gaussian has arrived.
+    /// The metadata that has arrived. It is complete when the whole file has arrived.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         &self.chunks.metadata
@@ -253,8 +253,8 @@ impl StreamDecoder {
         Some(picture.with_texture(chunks.texture.as_ref()))
     }
 
-    /// Whether header and metadata are complete, since a layer or the end of the file has arrived,
-    /// at least in part.
+    /// Whether header and orientation are known, since a layer or the end of the file has arrived, at least in
+    /// part.
     pub(super) fn has_reached_layers(&self) -> bool {
         self.chunks.has_reached_layers(self.parser.current())
     }

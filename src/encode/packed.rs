@@ -2,7 +2,7 @@
 
 use super::aim::{Aim, FileAim, PSNR_TOLERANCE, SIZE_TOLERANCE};
 use super::error::{EncodeError, Result};
-use super::file::{FileLayout, packed_layers_length};
+use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
@@ -34,14 +34,13 @@ const MAX_TRIALS: usize = 64;
 
 /// Size in bytes of a file without Gaussians.
 pub(crate) fn least_length(job: &Job<'_>, layout: &FileLayout<'_>) -> u64 {
-    let empty = PackedCodes { quantizers: quantizers(job), codes: Vec::new() };
-    layout.write_packed(&empty).len() as u64
+    layout.packed_length(&quantizers(job), 0)
 }
 
-/// How many Gaussians fit into so many bytes of layers, up to one for each pixel.
-pub(crate) fn count_for_size(bytes: u64, job: &Job<'_>) -> usize {
+/// How many Gaussians a file of so many bytes has, up to one for each pixel.
+pub(crate) fn count_for_size(bytes: u64, job: &Job<'_>, layout: &FileLayout<'_>) -> usize {
     let quantizers = quantizers(job);
-    let fits = |count: usize| packed_layers_length(&quantizers, count) <= bytes;
+    let fits = |count: usize| layout.packed_length(&quantizers, count) <= bytes;
     let (mut low, mut high) = (0, job.pixels() + 1);
     while high - low > 1 {
         let middle = usize::midpoint(low, high);

@@ -230,11 +230,11 @@ fn within_reach(
                 packed::least_length(job, layout)
             };
             layout.check_size(bytes, least)?;
-            let room = bytes.saturating_sub(least);
             let budget = if is_coded {
+                let room = bytes.saturating_sub(least);
                 Budget::Bits { bits: (room * 8) as f64, tune: job.tune }
             } else {
-                Budget::Count(packed::count_for_size(room, job))
+                Budget::Count(packed::count_for_size(bytes, job, layout))
             };
             return Ok((Aim::File(FileAim::Size(bytes.max(least))), budget));
         }

@@ -14,6 +14,9 @@ use crate::{math, render::view::View};
 /// Cells that a picture is divided into along each side.
 #[cfg(any(feature = "encode", feature = "std"))]
 const CELLS: f32 = 256.0;
+/// How far rounding may move the edge of an ellipse when it is rendered, in parts of where it is and of its reach.
+#[cfg(feature = "encode")]
+const ROUNDING: f32 = 1.0 / 262_144.0;
 /// Margin of the bounds in output pixels, which is more than the rounding of ellipses and bounds.
 #[cfg(feature = "std")]
 const MARGIN: f32 = 8.0;
@@ -59,6 +62,7 @@ impl LayerBounds {
                 // The cast clamps: outside of the picture, the nearest cell counts.
                 let cell = |at: f32| (at * CELLS / sides[axis]) as u8;
                 let reach = reach * radius;
+                let reach = reach + ROUNDING * (center[axis].abs() + reach);
                 bounds.first[axis] = bounds.first[axis].min(cell(center[axis] - reach));
                 bounds.last[axis] = bounds.last[axis].max(cell(center[axis] + reach));
             }
@@ -149,6 +153,32 @@ mod tests {
                 prop_assert!(planes.iter().all(|&value| value == 0.0), "{:?}", planes);
             }
         }
+    }
+
+    /// The left edge of a huge Gaussian, far enlarged: rounding moves it by more than a hundred pixels.
+    #[test]
+    fn what_rounding_adds_to_an_edge_is_within_the_bounds() {
+        const SIDE: u32 = 1 << 17;
+        let header = header(1000, 1000);
+        let center = [16_597_549.0, 500.0];
+        let gaussian = Gaussian { center, cholesky: [8_298_372.0, 0.0, 9.0], color: [6e4; 4] };
+        let bounds = LayerBounds::of([gaussian].into_iter(), &header);
+        let edge = ((f64::from(center[0]) - 2.0 * 8_298_372.0) * f64::from(SIDE) / 1000.0) as u32;
+        let limits = Limits::none();
+        let picture = Picture::new(&header, core::slice::from_ref(&gaussian), &limits, 0);
+        let mut beyond = 0;
+        for x in edge - 400..edge {
+            let region = Region { x, y: SIDE / 2, width: 1, height: 1 };
+            let options = RenderOptions::new().with_size(SIDE, SIDE).with_region(region);
+            let mut sample = [0.0];
+            picture.render_planes(&options, &mut sample).expect("there are no limits");
+            if sample != [0.0] {
+                let view = options.view(&header, &limits).expect("the region is inside");
+                assert!(bounds.may_show_in(&view, &header), "{x}");
+                beyond = beyond.max(edge - x);
+            }
+        }
+        assert!(beyond > 100, "{beyond}");
     }
 
     #[test]

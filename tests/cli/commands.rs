@@ -74,6 +74,8 @@ fn encode_info_decode_compare() {
         assert!(!info[field].is_null(), "{field}: {info}");
     }
     let chunks = info["chunks"].as_array().expect("an array");
+    let kinds: Vec<_> = chunks.iter().filter_map(|c| c["kind"].as_str()).collect();
+    assert_eq!((kinds.first(), kinds.last()), (Some(&"H"), Some(&"E")), "letters alone");
     let sum: u64 = chunks.iter().map(|c| c["bytes"].as_u64().expect("a number")).sum();
     assert_eq!(sum + 8, bytes, "the chunks and the signature are the whole file");
     assert_eq!(info["coding"], "entropy");

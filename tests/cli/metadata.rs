@@ -10,6 +10,7 @@ use image::codecs::{jpeg::JpegEncoder, png::PngEncoder, tiff::TiffEncoder, webp:
 use image::{ColorType, ImageDecoder, ImageEncoder, ImageReader};
 use image_gip::{Metadata, StreamDecoder};
 
+use super::common::{SIGNATURE, chunk, kind, payload};
 use super::room::{Room, by_input, text};
 use super::{jpeg, pictures};
 
@@ -153,6 +154,44 @@ fn thumbnails_have_what_is_safe_and_all_else_has_all_unless_asked_otherwise() {
     );
 }
 
+/// The file with its metadata behind the layers.
+fn with_late_metadata(file: &[u8]) -> Vec<u8> {
+    let (mut early, mut late) = (SIGNATURE.to_vec(), Vec::new());
+    let mut rest = &file[SIGNATURE.len()..];
+    while kind(rest) != b"E" {
+        let length = chunk(kind(rest), payload(rest)).len();
+        let (found, later) = rest.split_at(length);
+        rest = later;
+        let place = if kind(found) == b"H" || kind(found) == b"L" { &mut early } else { &mut late };
+        place.extend_from_slice(found);
+    }
+    assert!(!late.is_empty());
+    [early, late, rest.to_vec()].concat()
+}
+
+#[test]
+fn metadata_after_the_layers_is_kept() {
+    let room = Room::new();
+    let xmp = xmp("<dc:title>A lake</dc:title>");
+    room.write("a.jpg", jpeg::with_xmp(&jpeg(Some(camera_exif())), &xmp));
+    room.ok(&[&["encode", "a.jpg", "early.gip"], &FAST[..]].concat());
+    let metadata = room.gip_metadata("early.gip");
+    let kinds = [&metadata.icc_profile, &metadata.exif, &metadata.xmp];
+    assert!(kinds.iter().all(|kind| kind.is_some()));
+    room.write("late.gip", with_late_metadata(&room.read("early.gip")));
+    for file in ["early", "late"] {
+        let gip = format!("{file}.gip");
+        room.warnings(&["decode", &gip, &format!("{file}.png")]);
+        room.ok(&[&["encode", &gip, &format!("{file}.again.gip")], &FAST[..]].concat());
+        room.warnings(&["batch", &gip, "--out", "out", "--decode"]);
+    }
+    assert!(has_secret(&room.read("late.png")));
+    assert_eq!(room.read("late.png"), room.read("early.png"));
+    assert_eq!(room.read("out/late.png"), room.read("out/early.png"));
+    assert_eq!(room.gip_metadata("late.again.gip"), metadata);
+    assert_eq!(room.read("late.again.gip"), room.read("early.again.gip"));
+}
+
 #[test]
 fn exif_that_is_too_long_for_a_jpeg_is_told() {
     let room = Room::new();
@@ -188,7 +227,7 @@ fn a_size_that_metadata_alone_exceeds_names_the_way_out() {
 
     // What is too small without metadata, too, is as small as can be.
     let report =
-        room.json(&["encode", "a.jpg", "b.gip", "--bytes", "50", "--effort", "1", "--json"]);
+        room.json(&["encode", "a.jpg", "b.gip", "--bytes", "20", "--effort", "1", "--json"]);
     let reason = report["shortfall"].as_str().expect("it says why");
     assert!(reason.contains("are metadata"), "{reason}");
     let (_, errors) = room.batch(3, &["a.jpg", "--out", "out", "--bytes", "5000", "--effort", "1"]);

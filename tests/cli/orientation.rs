@@ -90,8 +90,8 @@ fn sizes_and_regions_are_those_of_the_upright_picture() {
             (&width.into(), &height.into())
         );
         let text = room.ok(&["info", "a.gip"]);
-        assert!(text.starts_with("size              30x20, "), "{text}");
-        assert_eq!(text.contains(&format!("\nupright           {width}x{height}")), value != 1);
+        assert!(text.starts_with("size                30x20, "), "{text}");
+        assert_eq!(text.contains(&format!("\nupright             {width}x{height}")), value != 1);
 
         whole.save(room.path("upright.png")).expect("writable");
         assert_eq!(room.ok(&["compare", "a.gip", "upright.png"]), "identical\n");

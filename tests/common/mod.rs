@@ -312,8 +312,10 @@ impl File {
                 for axis in 0..2 {
                     let side = self.header.sides()[axis] as f32;
                     let cell = |at: f32| (at / side * 256.0).floor().clamp(0.0, 255.0) as u8;
-                    bounds[axis] = bounds[axis].min(cell(center[axis] - reach[axis]));
-                    bounds[axis + 2] = bounds[axis + 2].max(cell(center[axis] + reach[axis]));
+                    let rounding = (center[axis].abs() + reach[axis]) / 262_144.0;
+                    let reach = reach[axis] + rounding;
+                    bounds[axis] = bounds[axis].min(cell(center[axis] - reach));
+                    bounds[axis + 2] = bounds[axis + 2].max(cell(center[axis] + reach));
                 }
             }
             all.extend(bounds);

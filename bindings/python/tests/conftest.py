@@ -2,8 +2,9 @@
 
 import io
 import os
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -17,6 +18,55 @@ ROOT = Path(__file__).resolve().parents[3]
 VECTORS = ROOT / "spec" / "vectors"
 
 Picture = NDArray[np.uint8]
+
+#: Bytes of the signature of a file, and of its last chunk.
+SIGNATURE = 8
+LEAST_CHUNK = 6
+
+
+class Chunk(NamedTuple):
+    """A chunk of a file (specification, section 4.2)."""
+
+    kind: str
+    payload: bytes
+
+    @property
+    def bytes(self) -> bytes:
+        length, rest = bytearray(), len(self.payload)
+        while rest > 127:
+            length.append(rest % 128 + 128)
+            rest //= 128
+        body = self.kind.encode() + bytes([*length, rest]) + self.payload
+        return body + zlib.crc32(body).to_bytes(4, "little")
+
+
+def chunks(file: bytes) -> list[Chunk]:
+    """The chunks of a file."""
+    found, at = [], SIGNATURE
+    while at < len(file):
+        letters = 4 if file[at : at + 1].islower() else 1
+        kind, at = file[at : at + letters].decode(), at + letters
+        length = shift = 0
+        while file[at] > 127:
+            length, shift, at = length + (file[at] % 128 << shift), shift + 7, at + 1
+        length, at = length + (file[at] << shift), at + 1
+        found.append(Chunk(kind, file[at : at + length]))
+        at += length + 4
+    assert joined(found) == file
+    return found
+
+
+def joined(parts: list[Chunk]) -> bytes:
+    """The file of these chunks."""
+    return b"\xc7GIP\r\n\x01\n" + b"".join(part.bytes for part in parts)
+
+
+def moved(file: bytes, *kinds: str) -> bytes:
+    """The file with its chunks of these types behind the last layer."""
+    parts = chunks(file)
+    late = [part for part in parts if part.kind in kinds]
+    assert late
+    return joined([part for part in parts[:-1] if part not in late] + late + parts[-1:])
 
 
 def draw(width: int, height: int, channels: int) -> Picture:
@@ -56,6 +106,16 @@ def photo() -> Picture:
 def file(photo: Picture) -> bytes:
     """A file of `photo` with several layers."""
     return image_gip.encode(photo, bpp=4, effort=1)
+
+
+@pytest.fixture(scope="session")
+def textured() -> bytes:
+    """A file with texture, in several layers."""
+    noise = np.random.default_rng(1).normal(0, 20, (128, 192, 1))
+    samples = np.clip(80 + 0.3 * draw(192, 128, 3) + noise, 0, 255).astype(np.uint8)
+    file = image_gip.encode(samples, bpp=0.6, effort=1)
+    assert [part.kind for part in chunks(file)].count("tXTR") == 1
+    return file
 
 
 @pytest.fixture(scope="session")

@@ -239,8 +239,9 @@ def test_info(photo: Picture) -> None:
     assert (info.icc, info.exif, info.xmp, info.texts) == (b"profile", exif, b"<x/>", ())
     assert sum(info.layers) == info.gaussians
     assert len(info.layers) > 1
-    layers = next(chunk for chunk in info.chunks if chunk.kind == "GAUS")
+    layers = next(chunk for chunk in info.chunks if chunk.kind == "L")
     assert layers.count == len(info.layers)
+    assert [chunk.kind for chunk in info.chunks] == ["H", "iCCP", "eXIf", "xMPd", "L", "E"]
     signature = 8
     assert signature + sum(chunk.bytes for chunk in info.chunks) == len(file)
     texts = image_gip.info(VECTORS / "metadata.gip").texts

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import VECTORS, Picture, draw, saved
+from conftest import SIGNATURE, VECTORS, Chunk, Picture, chunks, draw, joined, moved, saved
 from PIL import Image, ImageFile, UnidentifiedImageError
 
 import image_gip
@@ -138,16 +138,64 @@ def test_thumbnails(file: bytes) -> None:
     assert source.furthest < len(file)
 
 
+def test_metadata_after_the_layers(file: bytes) -> None:
+    parts = chunks(file)
+    late = [Chunk("iCCP", b"profile"), Chunk("eXIf", b"II*\0\x08\0\0\0\0\0\0\0\0\0")]
+    texts = [Chunk("tEXt", b"Title\0A disc"), Chunk("tEXt", b"Author\0Emma")]
+    spread = joined([parts[0], texts[0], *parts[1:-1], *late, texts[1], parts[-1]])
+    with Image.open(io.BytesIO(spread)) as opened:
+        assert opened.info == {"texts": (("Title", "A disc"),)}
+        opened.info["mine"] = 1
+        opened.load()
+        assert opened.info == {
+            "mine": 1,
+            "icc_profile": b"profile",
+            "exif": b"Exif\0\0" + late[1].payload,
+            "texts": (("Title", "A disc"), ("Author", "Emma")),
+        }
+    # What a program has removed does not come back.
+    early = joined([parts[0], *late, *parts[1:]])
+    with Image.open(io.BytesIO(early)) as opened:
+        del opened.info["icc_profile"]
+        opened.load()
+        assert opened.info.keys() == {"exif"}
+    # A draft of a part of the Gaussians does without.
+    source = Counted(spread)
+    with Image.open(source) as opened:
+        opened.draft(None, (12, 8))
+        opened.load()
+        assert source.furthest < len(spread)
+        assert "exif" not in opened.info
+
+
+def test_texture_after_the_layers(textured: bytes) -> None:
+    late = moved(textured, "tXTR")
+    expected = image_gip.decode(textured)
+    with Image.open(io.BytesIO(late)) as opened:
+        np.testing.assert_array_equal(np.asarray(opened), expected)
+    # A draft with all Gaussians has their texture.
+    drafts = []
+    for file in (textured, late):
+        with Image.open(io.BytesIO(file)) as opened:
+            opened.draft(None, (120, 80))
+            drafts.append(np.asarray(opened))
+    assert drafts[0].shape == (80, 120, 3)
+    np.testing.assert_array_equal(drafts[0], drafts[1])
+
+
 @pytest.mark.parametrize("damage", ["truncated", "changed"])
 def test_damaged_files(file: bytes, damage: str) -> None:
     damaged = file[:-20] if damage == "truncated" else file[:-20] + bytes(8) + file[-12:]
     with (
         Image.open(io.BytesIO(damaged)) as opened,
-        pytest.raises(OSError, match="chunk GAUS") as raised,
+        pytest.raises(OSError, match=r"chunk L \(layer\)") as raised,
     ):
         opened.load()
     assert isinstance(raised.value.__cause__, image_gip.GipError)
-    with Image.open(io.BytesIO(damaged)) as opened, pytest.raises(OSError, match="chunk GAUS"):
+    with (
+        Image.open(io.BytesIO(damaged)) as opened,
+        pytest.raises(OSError, match=r"chunk L \(layer\)"),
+    ):
         opened.verify()
 
 
@@ -156,8 +204,9 @@ def test_what_there_is_of_a_damaged_file(file: bytes) -> None:
     whole = image_gip.decode(file).astype(int)
     with Image.open(io.BytesIO(file[:-20])) as opened:
         assert 0 < np.abs(np.asarray(opened) - whole).mean() < 20
-    # Nothing but the header and the steps.
-    with Image.open(io.BytesIO(file[:120])) as opened:
+    # Nothing but the signature, the header, and the letter of a layer.
+    header = SIGNATURE + len(chunks(file)[0].bytes)
+    with Image.open(io.BytesIO(file[: header + 1])) as opened:
         assert len(np.unique(np.asarray(opened))) <= 3
     with Image.open(io.BytesIO(file[:300])) as opened:
         opened.thumbnail((12, 8))
@@ -165,8 +214,8 @@ def test_what_there_is_of_a_damaged_file(file: bytes) -> None:
 
 
 def test_files_that_are_not_opened(file: bytes) -> None:
-    with pytest.raises(OSError, match="unexpected end of the file in chunk GHDR"):
-        Image.open(io.BytesIO(file[:30]))
+    with pytest.raises(OSError, match=r"unexpected end of the file in chunk H \(header\)"):
+        Image.open(io.BytesIO(file[:20]))
     with pytest.raises(OSError, match="unsupported: version 2"):
         Image.open(VECTORS / "xversion.gip")
     with pytest.raises(UnidentifiedImageError):

@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from conftest import LEAST_CHUNK, Chunk, chunks, joined, moved
 
 import image_gip
 from image_gip import StreamDecoder
@@ -43,7 +44,7 @@ def test_the_end_is_missing(file: bytes) -> None:
     stream = StreamDecoder().feed(file[:-3])
     with pytest.raises(image_gip.UnexpectedEndError) as raised:
         stream.finish()
-    assert raised.value.chunk == "GEND"
+    assert raised.value.chunk == "E"
     np.testing.assert_array_equal(stream.image(), image_gip.decode(file))
 
 
@@ -51,7 +52,7 @@ def test_after_an_error(file: bytes) -> None:
     damaged = bytearray(file)
     damaged[-30] ^= 1
     stream = StreamDecoder()
-    with pytest.raises(image_gip.MalformedError, match="chunk GAUS"):
+    with pytest.raises(image_gip.MalformedError, match=r"chunk L \(layer\)"):
         stream.feed(damaged)
     assert 0 < stream.arrived < image_gip.info(file).gaussians
     assert stream.image().shape == (64, 96, 3)
@@ -75,16 +76,69 @@ def test_previews(file: bytes) -> None:
 
 def test_one_decoder_for_many_threads(file: bytes) -> None:
     expected = image_gip.decode(file)
-    stream = StreamDecoder().feed(file[:-12])
+    stream = StreamDecoder().feed(file[:-LEAST_CHUNK])
 
     def work(number: int) -> bool:
         if number == 5:
-            stream.feed(file[-12:])
+            stream.feed(file[-LEAST_CHUNK:])
         return bool((stream.image(threads=1 + number % 2) == expected).all())
 
     with ThreadPoolExecutor(4) as pool:
         assert all(pool.map(work, range(40)))
     assert stream.is_complete
+
+
+def test_metadata_after_the_layers(file: bytes) -> None:
+    late = [Chunk("iCCP", b"profile"), Chunk("tEXt", b"Title\0A disc"), Chunk("xMPd", b"<x/>")]
+    parts = chunks(file)
+    first = 1 + [part.kind for part in parts].index("L")
+    spread = joined([*parts[:first], late[0], *parts[first:-1], *late[1:], parts[-1]])
+    stream = StreamDecoder()
+    seen = {}
+    for byte in spread:
+        info = stream.feed(bytes([byte])).info
+        if info is not None and stream.arrived > 0:
+            seen[info.icc, info.texts, info.xmp] = stream.arrived
+    texts = (("Title", "A disc"),)
+    layers = image_gip.info(file).layers
+    assert seen == {
+        (None, (), None): layers[0],
+        (b"profile", (), None): sum(layers),
+        (b"profile", texts, None): sum(layers),
+        (b"profile", texts, b"<x/>"): sum(layers),
+    }
+    assert stream.info == image_gip.info(spread)
+    np.testing.assert_array_equal(stream.image(), image_gip.decode(file))
+
+
+def test_texture_after_the_layers(textured: bytes) -> None:
+    late = moved(textured, "tXTR")
+    texture = next(part for part in chunks(late) if part.kind == "tXTR")
+    end = len(late) - LEAST_CHUNK
+    stream = StreamDecoder().feed(late[: end - len(texture.bytes)])
+    assert stream.arrived == image_gip.info(late).gaussians
+    plain = image_gip.decode(textured, texture=False)
+    np.testing.assert_array_equal(stream.image(), plain)
+    stream.feed(late[end - len(texture.bytes) : end])
+    expected = image_gip.decode(textured)
+    assert np.abs(expected.astype(int) - plain).mean() > 1
+    np.testing.assert_array_equal(stream.image(), expected)
+    np.testing.assert_array_equal(image_gip.decode(late), expected)
+    np.testing.assert_array_equal(image_gip.decode(late, texture=False), plain)
+
+
+def test_an_orientation_after_a_layer(file: bytes) -> None:
+    turned = b"MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0"
+    parts = chunks(file)
+    early = joined([parts[0], Chunk("eXIf", turned), *parts[1:]])
+    assert image_gip.info(early).orientation == 6
+    stream = StreamDecoder()
+    with pytest.raises(image_gip.MalformedError) as raised:
+        stream.feed(moved(early, "eXIf"))
+    assert raised.value.chunk == "eXIf"
+    assert stream.info is not None
+    assert (stream.info.orientation, stream.info.exif) == (1, None)
+    assert stream.arrived == image_gip.info(file).gaussians
 
 
 def test_data_must_be_bytes() -> None:

@@ -40,11 +40,12 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let context = || files::input_name(&args.input);
     let limits = args.limits.limits();
     let mut decoder = Decoder::new_with_limits(file, limits).with_context(context)?;
-    let metadata = decoder.metadata().clone();
-    let options = render_options(args, decoder.header(), &metadata).with_context(context)?;
-    let wanted = Wanted::new(options, codec, decoder.header());
+    let options = render_options(args, decoder.header(), decoder.metadata());
+    let wanted = Wanted::new(options.with_context(context)?, codec, decoder.header());
     let wanted = wanted.with_context(|| files::output_name(&args.output))?;
     let image = wanted.decode(&mut decoder).with_context(context)?;
+    // Metadata may stand after the layers.
+    let metadata = decoder.metadata().clone();
     Ok(StillImage { image, metadata, warnings: Vec::new() })
 }
 

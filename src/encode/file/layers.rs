@@ -27,8 +27,8 @@ pub(super) fn write_packed_layers(
     plan::packed_layers(codes.len()).into_iter().map(layer).collect()
 }
 
-/// Bytes that the layers of `count` Gaussians take in a packed file, their framing included.
-pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u64 {
+/// The number of the layers of `count` Gaussians in a packed file, and their bytes, their framing included.
+pub(super) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> (usize, u64) {
     let layers = plan::packed_layers(count);
     let last = layers.len().saturating_sub(1);
     let layer = |(number, &count): (usize, &usize)| {
@@ -36,7 +36,7 @@ pub(crate) fn packed_layers_length(quantizers: &[Quantizer], count: usize) -> u6
         let count = LayerCount::written(count as u32, number == last);
         ChunkType::LAYER.framed(count.len() + codes) as u64
     };
-    layers.iter().enumerate().map(layer).sum()
+    (layers.len(), layers.iter().enumerate().map(layer).sum())
 }
 
 /// The layers of an entropy-coded file. Sorts the codes into the order of the file, and rounds

@@ -104,6 +104,19 @@ impl<'a> FileLayout<'a> {
         file.into_bytes()
     }
 
+    /// Size in bytes of a file with the packed coding and so many Gaussians.
+    pub(crate) fn packed_length(&self, quantizers: &[Quantizer], gaussians: usize) -> u64 {
+        let (layers, length) = layers::packed_layers_length(quantizers, gaussians);
+        let header =
+            Header { gaussians: gaussians as u32, layers: layers as u16, ..self.header.clone() };
+        let header = header.to_payload(Some(&Dequantizer::Packed(quantizers.to_vec())));
+        let rest = SIGNATURE.len()
+            + ChunkType::HEADER.framed(header.len())
+            + self.metadata_length()
+            + ChunkType::END.framed(0);
+        rest as u64 + length
+    }
+
     /// A file with the packed coding. Its codes are sorted as [`FileLayout::ordered`] does.
     pub(crate) fn write_packed(&self, packed: &PackedCodes) -> Vec<u8> {
         let PackedCodes { quantizers, codes } = self.ordered(packed);
@@ -252,6 +265,7 @@ impl<'a> FileLayout<'a> {
 mod tests {
     use super::*;
     use crate::coding::entropy::{CenterGrid, Code};
+    use crate::coding::packed::UniformQuantizer;
     use crate::color::ColorModel;
     use crate::decode::Decoder;
     use crate::encode::progress::unobserved;
@@ -304,6 +318,25 @@ mod tests {
         let mut samples = vec![0; decoder.output_len().expect("it is within the limits")];
         decoder.decode_into(&mut samples).expect("the file is valid");
         (samples, decoder.stream().gaussians().len())
+    }
+
+    #[test]
+    fn the_length_of_a_packed_file_is_known_before_its_codes() {
+        let samples = [9; 12];
+        let source = source([2, 2], ColorModel::Rgb, &samples);
+        let mut metadata = Metadata::default();
+        metadata.xmp = Some(vec![b'x'; 200]);
+        let kernel = Kernel::Exponential { cutoff: 9.0 };
+        let shape = Parameterization::Covariance;
+        let layout = FileLayout::new(&source, [0.5; 4], kernel, shape, &metadata);
+        let steps = UniformQuantizer { bits: 9, scale: 1.0, offset: 0.0 };
+        let mut quantizers = vec![Quantizer::Linear(steps); layout.header().components()];
+        quantizers[1] = Quantizer::Float;
+        for count in [0, 1, 127, 128, 511, 512, 4000, 20_000] {
+            let codes = vec![[0; MAX_COMPONENTS]; count];
+            let file = layout.write_packed(&PackedCodes { quantizers: quantizers.clone(), codes });
+            assert_eq!(layout.packed_length(&quantizers, count), file.len() as u64, "{count}");
+        }
     }
 
     #[test]

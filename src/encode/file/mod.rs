@@ -3,5 +3,4 @@
 mod layers;
 mod layout;
 
-pub(crate) use layers::packed_layers_length;
 pub(crate) use layout::{CodedLayers, FileLayout};

@@ -13,10 +13,12 @@ Saving keeps the samples of these modes and those of I;16B, I (from 0 to 65535),
 La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK by its ICC profile.
 
 As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
-turns them; ``save`` stores the ICC profile of the picture by itself, and the colour space of one
-that has ``info["cicp"]``, the two codes of ``image_gip.encode``. It takes ``icc_profile``, ``cicp``,
-``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``: with ``metadata="none"``,
-turn the picture before, as nothing in the file tells how it is to be turned.
+turns them. Metadata that stands after the first layer of a file, which is never an orientation, is
+in ``info`` once the whole picture is loaded. ``save`` stores the ICC profile of the picture by
+itself, and the colour space that is in ``info["cicp"]``, the two codes of ``image_gip.encode``. It
+takes ``icc_profile``, ``cicp``, ``exif`` and ``xmp``. Its other options are those of
+``image_gip.encode``: with ``metadata="none"``, turn the picture before, as nothing in the file
+tells how it is to be turned.
 """
 
 from __future__ import annotations
@@ -32,14 +34,17 @@ from PIL import Image, ImageFile
 from image_gip import _modes
 from image_gip._errors import GipError, SignatureError
 from image_gip._native import StreamDecoder, encode, info, read_header
-from image_gip._types import Limits
+from image_gip._types import Info, Limits
 
 _FORMAT = "GIP"
-_SIGNATURE = b"\xc7GIP\r\n\x1a\n"
+#: What files of every version of the format begin with.
+_START = b"\xc7GIP\r\n"
 #: Pillow has limits of its own for the size of a picture.
 _LIMITS = Limits(max_width=2**32 - 1, max_height=2**32 - 1, max_pixels=2**64 - 1)
 #: Bytes of a file that are read at once for a draft.
 _PIECE = 1024
+#: The size of a draft with all Gaussians.
+_LARGEST = (2**32 - 1, 2**32 - 1)
 #: What `save` passes on to the encoder; Pillow has names of its own for the rest.
 _OPTIONS = inspect.signature(encode).parameters.keys() - {"array", "icc", "exif", "xmp"}
 
@@ -60,18 +65,23 @@ class GipImageFile(ImageFile.ImageFile):
             raise OSError(str(error)) from error
         self._stored_size = header.size
         self._mode = "I;16" if (header.mode, header.depth) == ("L", 16) else header.mode
-        if header.cicp is not None:
-            self.info["cicp"] = header.cicp
-        if header.icc is not None:
-            self.info["icc_profile"] = header.icc
-        if header.exif is not None:
-            self.info["exif"] = b"Exif\0\0" + header.exif
-        if header.xmp is not None:
-            self.info["xmp"] = header.xmp
-        if header.texts:
-            self.info["texts"] = header.texts
+        self._noted: dict[str, Any] = {}
+        self._note(header)
         self._texture = True
         self._set_size(header.size, is_draft=False)
+
+    def _note(self, read: Info) -> None:
+        """Takes the metadata of what was read of the file, as far as it is new."""
+        found = {
+            "cicp": read.cicp,
+            "icc_profile": read.icc,
+            "exif": None if read.exif is None else b"Exif\0\0" + read.exif,
+            "xmp": read.xmp,
+            "texts": read.texts or None,
+        }
+        for name, value in found.items():
+            if value is not None and value != self._noted.get(name):
+                self.info[name] = self._noted[name] = value
 
     def _set_size(self, size: tuple[int, int], *, is_draft: bool) -> None:
         self._size = size
@@ -79,7 +89,7 @@ class GipImageFile(ImageFile.ImageFile):
         self._set_tile()
 
     def _set_tile(self) -> None:
-        arguments = (self._is_draft, self._texture)
+        arguments = (self._is_draft, self._texture, self._note)
         self.tile = [ImageFile._Tile("gip", (0, 0, *self._size), 0, arguments)]
 
     @property
@@ -168,7 +178,7 @@ class _Decoder(ImageFile.PyDecoder):
     def decode(self, buffer: Any) -> tuple[int, int]:
         assert self.fd is not None
         assert self.im is not None
-        is_draft, texture = self.args
+        is_draft, texture, note = self.args
         stream = StreamDecoder(limits=_LIMITS)
         try:
             self._read(self.fd, stream, self.im.size if is_draft else None)
@@ -180,6 +190,7 @@ class _Decoder(ImageFile.PyDecoder):
                 samples = stream.image(size=self.im.size, dtype=np.uint8, texture=texture)
         except GipError as error:
             raise OSError(str(error)) from error
+        note(stream.info)
         # It takes any buffer, without copying it.
         self.set_as_raw(cast("bytes", samples))
         return -1, 0
@@ -192,7 +203,11 @@ class _Decoder(ImageFile.PyDecoder):
             else:
                 for piece in iter(lambda: file.read(_PIECE), b""):
                     arrived = stream.feed(piece).arrived
-                    if arrived > 0 and arrived >= stream.gaussians_for(*draft):
+                    if arrived == 0:
+                        continue
+                    wanted = stream.gaussians_for(*draft)
+                    # What may come after all Gaussians, such as texture, is wanted with them.
+                    if arrived >= wanted and wanted < stream.gaussians_for(*_LARGEST):
                         return
             stream.finish()
         except GipError:
@@ -202,7 +217,7 @@ class _Decoder(ImageFile.PyDecoder):
 
 def _accept(prefix: bytes) -> bool:
     # A file object may give any buffer.
-    return bytes(prefix).startswith(_SIGNATURE)
+    return bytes(prefix).startswith(_START)
 
 
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:

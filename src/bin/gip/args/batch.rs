@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn decoding_takes_no_options_of_the_encoder() {
         let options = EncoderArgs::augment_args(clap::Command::new("gip"));
-        let values = ["50", "1", "packed", "psnr"];
+        let values = ["50", "1", "300", "packed", "psnr"];
         for flags in [&["--decode"][..], &["--thumbnail", "64"]] {
             assert!(parse(flags).is_some());
             for option in options.get_arguments() {

@@ -192,9 +192,9 @@ fn decode(
     let file = BufReader::new(File::open(&item.source).with_context(context)?);
     let mut decoder =
         Decoder::new_with_limits(file, reading.limits.clone()).with_context(context)?;
-    let metadata = decoder.metadata().clone();
     if let Some(bounds) = bounds {
-        let (width, height) = fitted(decoder.header(), metadata.orientation(), bounds);
+        let orientation = decoder.metadata().orientation();
+        let (width, height) = fitted(decoder.header(), orientation, bounds);
         options = options.with_size(width, height);
     }
     let wanted = Wanted::new(options, codec, decoder.header()).with_context(context)?;
@@ -218,6 +218,8 @@ fn decode(
         _ => decoder.stream().gaussians().len() as u32,
     };
     let image = image.with_context(context)?;
+    // Metadata may stand after the layers.
+    let metadata = decoder.metadata().clone();
     let mut picture = StillImage { image, metadata, warnings };
     decode::finish(&mut picture, codec, policy);
     let bytes = codec.encode(&picture).with_context(context)?;

@@ -22,8 +22,9 @@ pub(super) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<
 
 fn whole(file: &[u8], limits: &Limits) -> Result<StillImage> {
     let mut decoder = Decoder::new_with_limits(file, limits.clone())?;
-    let metadata = decoder.metadata().clone();
     let image = wanted(decoder.header()).decode(&mut decoder)?;
+    // Metadata may stand after the layers.
+    let metadata = decoder.metadata().clone();
     let has_texture = decoder.picture()?.texture_map().is_some();
     let warnings = has_texture.then(|| "its texture is left out".to_owned());
     Ok(StillImage { image, metadata, warnings: warnings.into_iter().collect() })
