@@ -67,16 +67,18 @@ impl Cicp {
         Self { primaries, transfer }
     }
 
-    pub(super) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
-        const CHUNK: ChunkType = ChunkType::CICP;
-        let &[primaries, transfer, matrix, range] = fixed(CHUNK, payload)?;
-        if matrix != 0 {
-            return Err(DecodeError::unsupported(CHUNK, "matrix coefficients", matrix.into()));
-        }
-        if range != 1 {
-            return Err(DecodeError::unsupported(CHUNK, "full range flag", range.into()));
-        }
-        Ok(Self { primaries, transfer })
+    /// The colour space of a payload; `None` if it has the wrong length.
+    ///
+    /// # Errors
+    /// When samples are transformed by a matrix, or are not of full range.
+    pub(super) fn parse(payload: &[u8]) -> Result<Option<Self>, DecodeError> {
+        let &[primaries, transfer, matrix, range] = payload else { return Ok(None) };
+        let (what, value) = match (matrix, range) {
+            (0, 1) => return Ok(Some(Self { primaries, transfer })),
+            (0, _) => ("full range flag", range),
+            _ => ("matrix coefficients", matrix),
+        };
+        Err(DecodeError::unsupported(ChunkType::CICP, what, value.into()))
     }
 
     /// The payload of the chunk `cICP`, in `.gip` as in PNG.
@@ -87,10 +89,11 @@ impl Cicp {
 }
 
 impl MasteringDisplay {
-    pub(super) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
-        let payload: &[u8; 24] = fixed(ChunkType::MDCV, payload)?;
+    /// The display of a payload; `None` if it has the wrong length.
+    pub(super) fn parse(payload: &[u8]) -> Option<Self> {
+        let payload: &[u8; 24] = payload.try_into().ok()?;
         let half = |at: usize| u16::from_be_bytes([payload[at], payload[at + 1]]);
-        Ok(Self {
+        Some(Self {
             red: [half(0), half(2)],
             green: [half(4), half(6)],
             blue: [half(8), half(10)],
@@ -116,9 +119,10 @@ impl MasteringDisplay {
 }
 
 impl ContentLight {
-    pub(super) fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
-        let payload: &[u8; 8] = fixed(ChunkType::CLLI, payload)?;
-        Ok(Self { max_content: word(payload, 0), max_frame_average: word(payload, 4) })
+    /// How bright the picture of a payload is; `None` if that has the wrong length.
+    pub(super) fn parse(payload: &[u8]) -> Option<Self> {
+        let payload: &[u8; 8] = payload.try_into().ok()?;
+        Some(Self { max_content: word(payload, 0), max_frame_average: word(payload, 4) })
     }
 
     /// The payload of the chunk `cLLI`, in `.gip` as in PNG.
@@ -127,11 +131,6 @@ impl ContentLight {
         let levels = u64::from(self.max_content) << 32 | u64::from(self.max_frame_average);
         levels.to_be_bytes()
     }
-}
-
-/// A payload of a fixed length.
-fn fixed<const N: usize>(chunk: ChunkType, payload: &[u8]) -> Result<&[u8; N], DecodeError> {
-    payload.try_into().map_err(|_| DecodeError::malformed(chunk, "has the wrong length"))
 }
 
 /// The number of four bytes at a place, all of which are there.
@@ -158,11 +157,12 @@ mod tests {
         let bytes = display.to_bytes();
         assert_eq!(bytes[..4], [0x8A, 0x48, 0x39, 0x08]);
         assert_eq!(bytes[16..], [0x00, 0x98, 0x96, 0x80, 0, 0, 0x01, 0xF4]);
-        assert_eq!(MasteringDisplay::parse(&bytes).unwrap(), display);
+        assert_eq!(MasteringDisplay::parse(&bytes), Some(display));
         let light = ContentLight { max_content: 10_000_000, max_frame_average: 2_500_000 };
         let bytes = light.to_bytes();
         assert_eq!(bytes, [0x00, 0x98, 0x96, 0x80, 0x00, 0x26, 0x25, 0xA0]);
-        assert_eq!(ContentLight::parse(&bytes).unwrap(), light);
-        assert_eq!(Cicp::parse(&Cicp::BT2100_PQ.to_bytes()).unwrap(), Cicp::BT2100_PQ);
+        assert_eq!(ContentLight::parse(&bytes), Some(light));
+        let found = Cicp::parse(&Cicp::BT2100_PQ.to_bytes()).unwrap();
+        assert_eq!(found, Some(Cicp::BT2100_PQ));
     }
 }

@@ -87,19 +87,50 @@ impl Metadata {
 
     /// Adds the payload of a metadata chunk. A second one of anything but texts is an error.
     pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
-        match chunk {
-            ChunkType::CICP => add(&mut self.cicp, chunk, Cicp::parse(&payload)?),
-            ChunkType::MDCV => {
-                add(&mut self.mastering_display, chunk, MasteringDisplay::parse(&payload)?)
+        let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
+        if self.has(chunk) {
+            return malformed("appears twice");
+        }
+        let is_whole = match chunk {
+            ChunkType::CICP => {
+                self.cicp = Cicp::parse(&payload)?;
+                self.cicp.is_some()
             }
-            ChunkType::CLLI => add(&mut self.content_light, chunk, ContentLight::parse(&payload)?),
-            ChunkType::ICCP => add(&mut self.icc_profile, chunk, payload),
-            ChunkType::EXIF => add(&mut self.exif, chunk, payload),
-            ChunkType::XMP => add(&mut self.xmp, chunk, payload),
+            ChunkType::MDCV => {
+                self.mastering_display = MasteringDisplay::parse(&payload);
+                self.mastering_display.is_some()
+            }
+            ChunkType::CLLI => {
+                self.content_light = ContentLight::parse(&payload);
+                self.content_light.is_some()
+            }
+            ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP => {
+                let blob = match chunk {
+                    ChunkType::ICCP => &mut self.icc_profile,
+                    ChunkType::EXIF => &mut self.exif,
+                    _ => &mut self.xmp,
+                };
+                *blob = Some(payload);
+                true
+            }
             _ => {
                 self.texts.push(Text::parse(&payload)?);
-                Ok(())
+                true
             }
+        };
+        if is_whole { Ok(()) } else { malformed("has the wrong length") }
+    }
+
+    /// Whether there is what a chunk holds that may be there once.
+    fn has(&self, chunk: ChunkType) -> bool {
+        match chunk {
+            ChunkType::CICP => self.cicp.is_some(),
+            ChunkType::MDCV => self.mastering_display.is_some(),
+            ChunkType::CLLI => self.content_light.is_some(),
+            ChunkType::ICCP => self.icc_profile.is_some(),
+            ChunkType::EXIF => self.exif.is_some(),
+            ChunkType::XMP => self.xmp.is_some(),
+            _ => false,
         }
     }
 
@@ -107,9 +138,9 @@ impl Metadata {
     #[cfg(feature = "encode")]
     pub(crate) fn check_payload(chunk: ChunkType, payload: &[u8]) -> Result<(), DecodeError> {
         match chunk {
-            ChunkType::CICP => Cicp::parse(payload).map(drop),
-            ChunkType::MDCV => MasteringDisplay::parse(payload).map(drop),
-            ChunkType::CLLI => ContentLight::parse(payload).map(drop),
+            ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI => {
+                Self::default().insert(chunk, payload.into())
+            }
             _ => Ok(()),
         }
     }
@@ -179,14 +210,6 @@ impl Metadata {
         ];
         let once = once.into_iter().filter_map(|(chunk, payload)| Some((chunk, payload?)));
         once.chain(self.texts.iter().map(|text| (ChunkType::TEXT, text.to_payload())))
-    }
-}
-
-/// Keeps what a chunk holds that may be there once.
-fn add<T>(slot: &mut Option<T>, chunk: ChunkType, value: T) -> Result<(), DecodeError> {
-    match slot.replace(value) {
-        None => Ok(()),
-        Some(_) => Err(DecodeError::malformed(chunk, "appears twice")),
     }
 }
 
