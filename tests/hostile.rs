@@ -167,6 +167,7 @@ fn texture_takes_memory_as_it_arrives() {
     assert_eq!((kind, wanted), (LimitKind::Gaussians, count.into()));
 }
 
+#[cfg(feature = "std")]
 #[test]
 fn what_follows_the_layers_needs_no_more_memory_side_by_side() {
     let _alone = alone();

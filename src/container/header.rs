@@ -1,7 +1,6 @@
 //! The header, the chunk `H`: all that a decoder must know before it allocates memory, and what turns the codes
 //! of Gaussians into values (spec, section 5.1).
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use super::fields::Fields;

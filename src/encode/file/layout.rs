@@ -324,8 +324,7 @@ mod tests {
     fn the_length_of_a_packed_file_is_known_before_its_codes() {
         let samples = [9; 12];
         let source = source([2, 2], ColorModel::Rgb, &samples);
-        let mut metadata = Metadata::default();
-        metadata.xmp = Some(vec![b'x'; 200]);
+        let metadata = Metadata { xmp: Some(vec![b'x'; 200]), ..Metadata::default() };
         let kernel = Kernel::Exponential { cutoff: 9.0 };
         let shape = Parameterization::Covariance;
         let layout = FileLayout::new(&source, [0.5; 4], kernel, shape, &metadata);
