@@ -135,9 +135,8 @@ mod tests {
     #[test]
     fn curves_rise_over_all_codes() {
         let curve = |transfer| {
-            let mut metadata = Metadata::default();
-            metadata.cicp = Some(Cicp::new(9, transfer));
-            Curve::of(&metadata)
+            let cicp = Some(Cicp::new(9, transfer));
+            Curve::of(&Metadata { cicp, ..Metadata::default() })
         };
         for transfer in [LINEAR, PQ] {
             let curve = curve(transfer).expect("one of its own");
