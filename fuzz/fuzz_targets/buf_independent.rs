@@ -5,7 +5,7 @@
 use std::io::{self, Read};
 
 use arbitrary::{Arbitrary, Unstructured};
-use image_gip::{ChunkStatistics, Decoder, StreamDecoder};
+use image_gip::{ChunkStatistics, Decoder, Metadata, StreamDecoder};
 use image_gip_fuzz::file::File;
 use libfuzzer_sys::fuzz_target;
 
@@ -21,14 +21,15 @@ struct Outcome {
 struct State {
     complete: bool,
     description: String,
+    metadata: Metadata,
     chunks: Vec<ChunkStatistics>,
     gaussians: Vec<[u32; 9]>,
 }
 
 impl State {
     fn of(decoder: &StreamDecoder) -> Self {
-        let description =
-            format!("{:?} {:?} {:?}", decoder.header(), decoder.quantizers(), decoder.metadata(),);
+        let description = format!("{:?} {:?}", decoder.header(), decoder.quantizers());
+        let metadata = decoder.metadata().clone();
         let chunks = decoder.chunks().to_vec();
         let gaussians = decoder
             .gaussians()
@@ -42,7 +43,7 @@ impl State {
                 bits
             })
             .collect();
-        Self { complete: decoder.is_complete(), description, chunks, gaussians }
+        Self { complete: decoder.is_complete(), description, metadata, chunks, gaussians }
     }
 }
 
@@ -62,6 +63,17 @@ fn outcome<'a>(pieces: impl Iterator<Item = &'a [u8]>) -> Outcome {
     let error = error.or_else(|| decoder.finish().err());
     let end = error.map_or(Ok(used), |error| Err(error.to_string()));
     Outcome { end, state: State::of(&decoder) }
+}
+
+/// Whether metadata begin with these others.
+fn includes(metadata: &Metadata, others: &Metadata) -> bool {
+    let blobs = [
+        (&metadata.icc_profile, &others.icc_profile),
+        (&metadata.exif, &others.exif),
+        (&metadata.xmp, &others.xmp),
+    ];
+    blobs.iter().all(|(blob, other)| other.is_none() || blob == other)
+        && metadata.texts.starts_with(&others.texts)
 }
 
 /// Pieces of 0 to 40 bytes, mostly short, from a generator that the contents seed.
@@ -145,7 +157,9 @@ fuzz_target!(|input: &[u8]| {
             );
             let mut state = State::of(decoder.stream());
             if !state.complete {
-                // A layer may wait until those behind it have arrived, and then be found damaged.
+                // A layer may wait until what is behind it has arrived, and then be found damaged.
+                assert!(includes(&state.metadata, &whole.state.metadata), "metadata is lost");
+                state.metadata.clone_from(&whole.state.metadata);
                 state.chunks.clone_from(&whole.state.chunks);
             }
             assert_eq!(state, whole.state, "through a reader");
