@@ -38,6 +38,12 @@ impl ChunkType {
     pub const BNDS: Self = Self(*b"bNDS");
     /// The texture: the Gaussians of its map.
     pub const TXTR: Self = Self(*b"tXTR");
+    /// The colour space, in coding-independent code points.
+    pub const CICP: Self = Self(*b"cICP");
+    /// The display on which the picture was made.
+    pub const MDCV: Self = Self(*b"mDCV");
+    /// How bright the picture is.
+    pub const CLLI: Self = Self(*b"cLLI");
     /// An ICC profile.
     pub const ICCP: Self = Self(*b"iCCP");
     /// Exif data: a TIFF stream.

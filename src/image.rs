@@ -11,12 +11,14 @@ use ::image::error::{
     UnsupportedError, UnsupportedErrorKind,
 };
 use ::image::hooks::{register_decoding_hook, register_format_detection_hook};
-use ::image::metadata::Orientation;
+use ::image::metadata::{
+    CicpColorPrimaries as Primaries, CicpTransferCharacteristics as Transfer, Orientation,
+};
 use ::image::{ColorType, ImageDecoder, ImageDecoderRect, ImageError, ImageResult};
 
 use crate::chunk::MAGIC;
 use crate::color::{ColorModel, SampleDepth};
-use crate::container::Metadata;
+use crate::container::{Cicp, Metadata};
 use crate::decode::Decoder;
 use crate::error::{DecodeError, LimitKind};
 use crate::limits::Limits;
@@ -116,16 +118,34 @@ impl<R: Read> GipDecoder<R> {
         Ok(())
     }
 
+    /// The colour space that the file says in codes, for [`DynamicImage::set_color_space`](::image::DynamicImage::set_color_space);
+    /// `image` asks a decoder for an ICC profile alone. It counts before the profile. `None` if there is none, or if
+    /// `image` does not know its codes.
+    ///
+    /// # Errors
+    /// When the file is malformed, unsupported or ends too early, as far as it is read: to its end, if there is none
+    /// before the first layer.
+    pub fn color_space(&mut self) -> ImageResult<Option<::image::metadata::Cicp>> {
+        self.metadata_with(|metadata| {
+            let Cicp { primaries, transfer } = metadata.cicp?;
+            Some(::image::metadata::Cicp {
+                primaries: PRIMARIES.into_iter().find(|&code| code as u8 == primaries)?,
+                transfer: TRANSFERS.into_iter().find(|&code| code as u8 == transfer)?,
+                ..::image::metadata::Cicp::SRGB
+            })
+        })
+    }
+
     /// Whether the picture's texture is rendered; see [`RenderOptions::with_texture`]. Default `true`.
     pub fn set_texture(&mut self, texture: bool) {
         self.texture = texture;
     }
 
     /// Part of the metadata. What is not there yet may stand after the layers.
-    fn metadata_with(
+    fn metadata_with<T>(
         &mut self,
-        find: impl Fn(&Metadata) -> Option<Vec<u8>>,
-    ) -> ImageResult<Option<Vec<u8>>> {
+        find: impl Fn(&Metadata) -> Option<T>,
+    ) -> ImageResult<Option<T>> {
         match find(self.decoder.metadata()) {
             None => Ok(find(self.decoder.read_metadata()?)),
             found => Ok(found),
@@ -261,6 +281,41 @@ impl<R: Read> ImageDecoderRect for GipDecoder<R> {
     }
 }
 
+/// All codes that `image` knows, which does not make them of numbers.
+const PRIMARIES: [Primaries; 12] = [
+    Primaries::SRgb,
+    Primaries::Unspecified,
+    Primaries::RgbM,
+    Primaries::RgbB,
+    Primaries::Bt601,
+    Primaries::Rgb240m,
+    Primaries::GenericFilm,
+    Primaries::Rgb2020,
+    Primaries::Xyz,
+    Primaries::SmpteRp431,
+    Primaries::SmpteRp432,
+    Primaries::Industry22,
+];
+const TRANSFERS: [Transfer; 17] = [
+    Transfer::Bt709,
+    Transfer::Unspecified,
+    Transfer::Bt470M,
+    Transfer::Bt470BG,
+    Transfer::Bt601,
+    Transfer::Smpte240m,
+    Transfer::Linear,
+    Transfer::Log100,
+    Transfer::LogSqrt,
+    Transfer::Iec61966_2_4,
+    Transfer::Bt1361,
+    Transfer::SRgb,
+    Transfer::Bt2020_10bit,
+    Transfer::Bt2020_12bit,
+    Transfer::Smpte2084,
+    Transfer::Smpte428,
+    Transfer::Bt2100Hlg,
+];
+
 impl From<DecodeError> for ImageError {
     fn from(error: DecodeError) -> Self {
         match error {
@@ -315,6 +370,7 @@ mod encoder {
 
     use super::{hint, parameter};
     use crate::color::{ColorModel, SampleDepth};
+    use crate::container::Cicp;
     use crate::encode::{EncodeError, Encoder, Source, SourceError};
 
     /// Encodes `.gip` for `image`: an [`ImageEncoder`] over any writer, for 8- and 16-bit gray and
@@ -346,6 +402,29 @@ mod encoder {
         /// An encoder with the options of `encoder`.
         pub fn with_encoder(writer: W, encoder: Encoder) -> Self {
             Self { writer, encoder }
+        }
+
+        /// Stores a colour space in codes, such as
+        /// [`DynamicImage::color_space`](::image::DynamicImage::color_space), which `image` does not hand to an
+        /// encoder. That of sRGB is what a file without codes is in, and is left out.
+        ///
+        /// # Errors
+        /// When samples are transformed by a matrix, or are not of full range.
+        pub fn with_color_space(
+            mut self,
+            color_space: ::image::metadata::Cicp,
+        ) -> ImageResult<Self> {
+            let ::image::metadata::Cicp { primaries, transfer, matrix, full_range } = color_space;
+            let srgb = ::image::metadata::Cicp::SRGB;
+            if (matrix, full_range) != (srgb.matrix, srgb.full_range) {
+                let what = format!("colour space of {matrix:?} and {full_range:?}");
+                let kind = UnsupportedErrorKind::GenericFeature(what);
+                let error = UnsupportedError::from_format_and_kind(hint(), kind);
+                return Err(ImageError::Unsupported(error));
+            }
+            let cicp = Cicp::new(primaries as u8, transfer as u8);
+            self.encoder.metadata.cicp = Some(cicp).filter(|cicp| *cicp != Cicp::SRGB);
+            Ok(self)
         }
     }
 

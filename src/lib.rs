@@ -123,7 +123,7 @@ pub use chunk::ChunkType;
 pub use coding::entropy::{AttributeBits, QuantizationSteps};
 pub use coding::packed::{Quantizer, UniformQuantizer};
 pub use color::{ColorModel, SampleDepth};
-pub use container::{Coding, Header, Metadata, Text};
+pub use container::{Cicp, Coding, ContentLight, Header, MasteringDisplay, Metadata, Text};
 #[cfg(feature = "encode")]
 pub use container::{MetadataError, Prefix, Prefixes};
 #[cfg(feature = "std")]

@@ -11,8 +11,9 @@ use common::{
     layered, number, of_chunks, offsets, oracle, packed, quantizers, steps, without_last_word,
 };
 use image_gip::{
-    ChunkType, ColorModel, DecodeError, Decoder, Gaussian, Kernel, LimitKind, Limits, Orientation,
-    Quantizer, Region, RenderOptions, RequestError, SampleDepth, Samples, StreamDecoder,
+    ChunkType, Cicp, ColorModel, ContentLight, DecodeError, Decoder, Gaussian, Kernel, LimitKind,
+    Limits, MasteringDisplay, Orientation, Quantizer, Region, RenderOptions, RequestError,
+    SampleDepth, Samples, StreamDecoder,
 };
 use proptest::prelude::*;
 
@@ -316,6 +317,29 @@ fn the_orientation_is_told_as_soon_as_it_is_known() {
 
     let empty = File::new(Header::default(), vec![Entry::FLOAT; 6], vec![]).bytes();
     assert_eq!(told(&empty), Some((empty.len(), Orientation::NoTransforms)));
+}
+
+#[test]
+fn colours_arrive_as_they_were_stored() {
+    let file = include_bytes!("../spec/vectors/cicp.gip");
+    let decoder = decode_valid(file);
+    let metadata = decoder.metadata();
+    assert_eq!(metadata.cicp, Some(Cicp::BT2100_PQ));
+    let display = MasteringDisplay {
+        red: [35_400, 14_600],
+        green: [8_500, 39_850],
+        blue: [6_550, 2_300],
+        white: [15_635, 16_450],
+        max_luminance: 10_000_000,
+        min_luminance: 50,
+    };
+    assert_eq!(metadata.mastering_display, Some(display));
+    let light = ContentLight { max_content: 10_000_000, max_frame_average: 2_500_000 };
+    assert_eq!(metadata.content_light, Some(light));
+
+    let decoder = decode_valid(include_bytes!("../spec/vectors/cicp-unknown.gip"));
+    assert_eq!(decoder.metadata().cicp, Some(Cicp::new(255, 0)));
+    assert!(decoder.metadata().icc_profile.is_some());
 }
 
 #[test]

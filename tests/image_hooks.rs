@@ -180,6 +180,41 @@ fn metadata_is_carried() {
 }
 
 #[test]
+fn colour_spaces_are_carried_in_codes() {
+    use image::metadata::{
+        Cicp, CicpColorPrimaries, CicpMatrixCoefficients, CicpTransferCharacteristics,
+    };
+
+    let encode = |color_space| {
+        let mut file = Vec::new();
+        let gip = GipEncoder::with_encoder(&mut file, encoder());
+        picture(ColorType::Rgb16).write_with_encoder(gip.with_color_space(color_space)?)?;
+        Ok::<_, ImageError>(file)
+    };
+    let pq = Cicp {
+        primaries: CicpColorPrimaries::Rgb2020,
+        transfer: CicpTransferCharacteristics::Smpte2084,
+        ..Cicp::SRGB
+    };
+    for color_space in [Cicp::DISPLAY_P3, pq] {
+        let file = encode(color_space).unwrap();
+        let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap().unwrap();
+        assert_eq!(found, color_space);
+        let mut picture = DynamicImage::from_decoder(GipDecoder::new(&file[..]).unwrap()).unwrap();
+        picture.set_color_space(found).unwrap();
+        assert_eq!(picture.color_space(), color_space);
+    }
+    // What a file is in without codes, and codes that have no name.
+    let srgb = encode(Cicp::SRGB).unwrap();
+    assert_eq!(GipDecoder::new(&srgb[..]).unwrap().color_space().unwrap(), None);
+    let unknown = &include_bytes!("../spec/vectors/cicp-unknown.gip")[..];
+    assert_eq!(GipDecoder::new(unknown).unwrap().color_space().unwrap(), None);
+    let matrix = CicpMatrixCoefficients::Bt709;
+    let error = encode(Cicp { matrix, ..Cicp::SRGB }).unwrap_err();
+    assert!(matches!(error, ImageError::Unsupported(_)), "{error}");
+}
+
+#[test]
 fn metadata_after_the_layers_is_found() {
     let file = encode(ColorType::L8);
     let (layers, end) = file.split_at(file.len() - chunk(b"E", &[]).len());

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use exif::experimental::Writer;
 use exif::{Context, Field, In, Rational, Tag, Value};
-use image_gip::{Metadata, MetadataLoss, MetadataPolicy, Orientation, Text};
+use image_gip::{Cicp, Metadata, MetadataLoss, MetadataPolicy, Orientation, Text};
 
 /// Stands in everything that must not be passed on.
 const SECRET: &str = "SECRET";
@@ -521,6 +521,12 @@ fn without_its_profile_a_picture_has_other_colours_unless_it_is_srgb() {
     };
     assert_eq!(lost(profile(b"desc\0\0\0\0\0\0\0\x12sRGB IEC61966-2.1\0")), []);
     assert_eq!(lost(profile(b"mluc\0\0\0\0\0s\0R\0G\0B")), []);
+    let mut coded = Metadata::default();
+    coded.cicp = Some(Cicp::DISPLAY_P3);
+    let kept = coded.clone();
+    coded.icc_profile = Some(profile(b"desc\0\0\0\0\0\0\0\x0bDisplay P3\0"));
+    assert!(coded.retain(MetadataPolicy::None).is_empty(), "the codes say it all");
+    assert_eq!(coded, kept);
     let mut cut = profile(b"desc\0\0\0\0\0\0\0\x12sRGB IEC61966-2.1\0");
     cut.pop();
     for profile in [profile(b"desc\0\0\0\0\0\0\0\x0bDisplay P3\0"), b"sRGB".to_vec(), cut] {

@@ -5,8 +5,8 @@ mod common;
 
 use common::{Entry, File, Header, decode_valid, entropy, of_chunks};
 use image_gip::{
-    ColorModel, DecodeError, EncodeError, Encoder, Metadata, OptionError, Precision, Prefix,
-    Prefixes, RenderOptions, Source, StreamDecoder, Target, Text,
+    Cicp, ColorModel, ContentLight, DecodeError, EncodeError, Encoder, Metadata, OptionError,
+    Precision, Prefix, Prefixes, RenderOptions, Source, StreamDecoder, Target, Text,
 };
 
 const SIDES: [u32; 2] = [256, 192];
@@ -88,7 +88,10 @@ fn prefixes_are_files_of_the_same_gaussians() {
 #[test]
 fn what_says_how_the_picture_is_shown_is_kept_and_nothing_else() {
     for (exif, is_kept) in [(TURNED, true), (UPRIGHT, false)] {
-        let metadata = metadata(exif);
+        let mut metadata = metadata(exif);
+        metadata.cicp = Some(Cicp::DISPLAY_P3);
+        metadata.content_light =
+            Some(ContentLight { max_content: 2_000_000, max_frame_average: 0 });
         let file = encode(Encoder::new().with_metadata(metadata.clone())).expect("valid options");
         let whole = decode_valid(&file);
         assert!(whole.picture().expect("a header").texture_map().is_some());
@@ -97,6 +100,7 @@ fn what_says_how_the_picture_is_shown_is_kept_and_nothing_else() {
         for prefix in prefixes.iter() {
             let small = check(&file, &prefixes, prefix);
             let kept = small.metadata();
+            assert_eq!((kept.cicp, kept.content_light), (metadata.cicp, metadata.content_light));
             assert_eq!(kept.icc_profile.as_deref(), Some(PROFILE));
             assert_eq!(kept.exif.is_some(), is_kept);
             assert_eq!(small.orientation(), whole.orientation());
@@ -141,11 +145,13 @@ fn flaws_are_told() {
     let mut damaged = first.clone();
     *damaged.last_mut().expect("a CRC") ^= 1;
     let critical = common::chunk(b"Q", &[]);
+    let limited = common::chunk(b"cICP", &[1, 1, 0, 0]);
     for (chunks, expected) in [
         (vec![first.clone(), end.clone()], "chunk L (layer): "),
         (vec![header.clone(), header.clone()], "chunk H (header): "),
         (vec![header.clone(), damaged], "chunk L (layer): the CRC does not match"),
         (vec![header.clone(), critical], "chunk Q: unsupported"),
+        (vec![header.clone(), limited], "chunk cICP: unsupported: full range flag 0"),
         (vec![header.clone(), profile.clone(), profile.clone()], "chunk iCCP: appears twice"),
         (vec![header.clone(), first.clone(), second.clone(), second.clone()], "more layers than"),
     ] {

@@ -103,6 +103,10 @@ enum ExtraKind {
     Orientation(u8),
     Xmp,
     Text,
+    /// A `cICP` of these codes, in place of the payload.
+    ColorSpace([u8; 4]),
+    MasteringDisplay,
+    ContentLight,
     /// A critical chunk has the first letter alone.
     Other([u8; 4]),
 }
@@ -205,6 +209,9 @@ impl File {
                 b"H" | b"L" | b"E" | b"tXTR" => true,
                 b"tEXt" => is_text(payload),
                 b"iCCP" | b"xMPd" => !appears_twice,
+                b"cICP" => !appears_twice && matches!(payload[..], [_, _, 0, 1]),
+                b"mDCV" => !appears_twice && payload.len() == 24,
+                b"cLLI" => !appears_twice && payload.len() == 8,
                 b"eXIf" if first_layer.is_none_or(|layer| place < layer) => !appears_twice,
                 // Arbitrary bytes may turn the picture, or not.
                 b"eXIf" => match payload.strip_prefix(EXIF)? {
@@ -323,6 +330,9 @@ impl ExtraKind {
             Self::Exif | Self::Orientation(_) => *b"eXIf",
             Self::Xmp => *b"xMPd",
             Self::Text => *b"tEXt",
+            Self::ColorSpace(_) => *b"cICP",
+            Self::MasteringDisplay => *b"mDCV",
+            Self::ContentLight => *b"cLLI",
             Self::Other(name) => {
                 name.map(|byte| if byte & 1 == 0 { b'a' } else { b'A' } + byte % 26)
             }
@@ -334,6 +344,7 @@ impl ExtraKind {
     fn payload(&self, payload: &[u8]) -> Vec<u8> {
         match *self {
             // The value fills four bytes, and no other directory follows.
+            Self::ColorSpace(codes) => codes.to_vec(),
             Self::Orientation(value) => [EXIF, &[value % 10, 0, 0, 0], &[0; 4]].concat(),
             _ => payload.to_vec(),
         }

@@ -13,13 +13,13 @@ from .arith import F, quiet
 from .container import ChunkStart, check_signature, read_number
 from .errors import MALFORMED, UNEXPECTED_END, UNSUPPORTED, LimitExceeded, Malformed, Refused, Unsupported
 from .header import ENTROPY, LONGEST, PACKED, Fields, Header, Steps, USUAL_GEOMETRY, read_header, step_of_code
-from .metadata import orientation, read_bounds, read_text
+from .metadata import check_colors, orientation, read_bounds, read_text
 from .packed import bits_of_gaussian, check_padding, decode_gaussians, layer_bytes
 from .tree import ceil_div, decode_layer
 
 CRITICAL = ("H", "L", "E")
-AT_MOST_ONE = ("iCCP", "eXIf", "xMPd", "bNDS", "tXTR")
-METADATA = ("iCCP", "eXIf", "xMPd", "tEXt")
+AT_MOST_ONE = ("cICP", "mDCV", "cLLI", "iCCP", "eXIf", "xMPd", "bNDS", "tXTR")
+METADATA = ("cICP", "mDCV", "cLLI", "iCCP", "eXIf", "xMPd", "tEXt")
 NODE_DISTANCE = 8  # pixels from a node of a texture's map to the next
 
 
@@ -131,6 +131,7 @@ class Decoder:
         elif type in METADATA:
             if type == "eXIf" and self.layers > 0 and orientation(payload) != 1:
                 raise Malformed("an orientation after the first layer")
+            check_colors(type, payload)
             self.picture.metadata[type] = payload
 
     def layer_head(self, payload, complete_length):

@@ -1,6 +1,8 @@
 """Payloads of ancillary chunks: texts and Exif (section 5.5), bounds of layers (section 5.6)."""
 
-from .errors import Malformed
+from .errors import Malformed, Unsupported
+
+LENGTHS = {"cICP": 4, "mDCV": 24, "cLLI": 8}  # of payloads in bytes
 
 
 def read_text(payload):
@@ -16,6 +18,16 @@ def read_text(payload):
         return keyword.decode("utf-8"), text.decode("utf-8")
     except UnicodeDecodeError:
         raise Malformed("a text that is not UTF-8") from None
+
+
+def check_colors(type, payload):
+    """The payloads of `cICP`, `mDCV` and `cLLI`; any of the other types."""
+    if len(payload) != LENGTHS.get(type, len(payload)):
+        raise Malformed("a wrong length")
+    if type == "cICP" and payload[2] != 0:
+        raise Unsupported("matrix coefficients")
+    if type == "cICP" and payload[3] != 1:
+        raise Unsupported("a range that is not full")
 
 
 def orientation(exif):

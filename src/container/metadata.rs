@@ -1,8 +1,9 @@
-//! Metadata: ICC profile, Exif, XMP and texts (spec, section 5.5).
+//! Metadata: colour space, ICC profile, Exif, XMP and texts (spec, section 5.5).
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use super::color_space::{Cicp, ContentLight, MasteringDisplay};
 use super::exif;
 use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
@@ -18,7 +19,13 @@ const MAX_KEYWORD: usize = 79;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Metadata {
-    /// The ICC profile of the colour channels. Without one they are sRGB.
+    /// The colour space of the colour channels in codes. It counts before the ICC profile.
+    pub cicp: Option<Cicp>,
+    /// The display on which the picture was made.
+    pub mastering_display: Option<MasteringDisplay>,
+    /// How bright the picture is.
+    pub content_light: Option<ContentLight>,
+    /// The ICC profile of the colour channels. Without one, and without codes, they are sRGB.
     pub icc_profile: Option<Vec<u8>>,
     /// Exif data: a TIFF stream, which begins with `II` or `MM`.
     pub exif: Option<Vec<u8>>,
@@ -78,29 +85,71 @@ impl Metadata {
         }
     }
 
-    /// Adds the payload of a metadata chunk. A second ICC profile, Exif or XMP is an error.
+    /// Adds the payload of a metadata chunk. A second one of anything but texts is an error.
     pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
-        let slot = match chunk {
-            ChunkType::ICCP => &mut self.icc_profile,
-            ChunkType::EXIF => &mut self.exif,
-            ChunkType::XMP => &mut self.xmp,
+        let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
+        if self.has(chunk) {
+            return malformed("appears twice");
+        }
+        let is_whole = match chunk {
+            ChunkType::CICP => {
+                self.cicp = Cicp::parse(&payload)?;
+                self.cicp.is_some()
+            }
+            ChunkType::MDCV => {
+                self.mastering_display = MasteringDisplay::parse(&payload);
+                self.mastering_display.is_some()
+            }
+            ChunkType::CLLI => {
+                self.content_light = ContentLight::parse(&payload);
+                self.content_light.is_some()
+            }
+            ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP => {
+                let blob = match chunk {
+                    ChunkType::ICCP => &mut self.icc_profile,
+                    ChunkType::EXIF => &mut self.exif,
+                    _ => &mut self.xmp,
+                };
+                *blob = Some(payload);
+                true
+            }
             _ => {
                 self.texts.push(Text::parse(&payload)?);
-                return Ok(());
+                true
             }
         };
-        if slot.is_some() {
-            return Err(DecodeError::malformed(chunk, "appears twice"));
+        if is_whole { Ok(()) } else { malformed("has the wrong length") }
+    }
+
+    /// Whether there is what a chunk holds that may be there once.
+    fn has(&self, chunk: ChunkType) -> bool {
+        match chunk {
+            ChunkType::CICP => self.cicp.is_some(),
+            ChunkType::MDCV => self.mastering_display.is_some(),
+            ChunkType::CLLI => self.content_light.is_some(),
+            ChunkType::ICCP => self.icc_profile.is_some(),
+            ChunkType::EXIF => self.exif.is_some(),
+            ChunkType::XMP => self.xmp.is_some(),
+            _ => false,
         }
-        *slot = Some(payload);
-        Ok(())
+    }
+
+    /// Checks a chunk that is copied as it is. Profiles, Exif and XMP may be anything.
+    #[cfg(feature = "encode")]
+    pub(crate) fn check_payload(chunk: ChunkType, payload: &[u8]) -> Result<(), DecodeError> {
+        match chunk {
+            ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI => {
+                Self::default().insert(chunk, payload.into())
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether a chunk of metadata says how the picture is shown: its colours, or that it is turned.
     #[cfg(feature = "encode")]
     pub(crate) fn is_of_display(chunk: ChunkType, payload: &[u8]) -> bool {
         match chunk {
-            ChunkType::ICCP => true,
+            ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI | ChunkType::ICCP => true,
             ChunkType::EXIF => Self::turns(payload),
             _ => false,
         }
@@ -108,7 +157,10 @@ impl Metadata {
 
     /// Whether a chunk is metadata, which [`Metadata::insert`] takes.
     pub(crate) fn includes(chunk: ChunkType) -> bool {
-        matches!(chunk, ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP | ChunkType::TEXT)
+        use ChunkType as Type;
+
+        matches!(chunk, Type::CICP | Type::MDCV | Type::CLLI)
+            || matches!(chunk, Type::ICCP | Type::EXIF | Type::XMP | Type::TEXT)
     }
 
     /// An upper bound of the memory that is held, in bytes.
@@ -148,13 +200,16 @@ impl Metadata {
     /// The chunks of this metadata, in the order in which they are written.
     #[cfg(feature = "encode")]
     pub(crate) fn chunks(&self) -> impl Iterator<Item = (ChunkType, Vec<u8>)> + '_ {
-        let blobs = [
-            (ChunkType::ICCP, &self.icc_profile),
-            (ChunkType::EXIF, &self.exif),
-            (ChunkType::XMP, &self.xmp),
+        let once = [
+            (ChunkType::CICP, self.cicp.map(|cicp| cicp.to_bytes().to_vec())),
+            (ChunkType::MDCV, self.mastering_display.map(|display| display.to_bytes().to_vec())),
+            (ChunkType::CLLI, self.content_light.map(|light| light.to_bytes().to_vec())),
+            (ChunkType::ICCP, self.icc_profile.clone()),
+            (ChunkType::EXIF, self.exif.clone()),
+            (ChunkType::XMP, self.xmp.clone()),
         ];
-        let blobs = blobs.into_iter().filter_map(|(chunk, blob)| Some((chunk, blob.clone()?)));
-        blobs.chain(self.texts.iter().map(|text| (ChunkType::TEXT, text.to_payload())))
+        let once = once.into_iter().filter_map(|(chunk, payload)| Some((chunk, payload?)));
+        once.chain(self.texts.iter().map(|text| (ChunkType::TEXT, text.to_payload())))
     }
 }
 

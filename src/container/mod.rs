@@ -1,5 +1,6 @@
 //! The container of a file: signature, chunks, header and metadata (spec, sections 4 and 5).
 
+mod color_space;
 mod exif;
 pub(crate) mod fields;
 mod header;
@@ -11,6 +12,7 @@ pub(crate) mod varint;
 #[cfg(feature = "encode")]
 mod writer;
 
+pub use color_space::{Cicp, ContentLight, MasteringDisplay};
 #[cfg(feature = "metadata")]
 pub(crate) use exif::{ByteOrder, Directory, Entry};
 pub(crate) use header::Dequantizer;

@@ -30,8 +30,8 @@ pub struct Prefix {
 ///
 /// A file that is cut off is no whole file, which decoders report as an error. These are: a placeholder of a few
 /// hundred bytes, or a smaller picture for a slow line, from a file that is at hand, without decoding and encoding.
-/// They keep what says how the picture is shown: the ICC profile, and Exif if it turns the picture. Texture and other
-/// metadata are left out.
+/// They keep what says how the picture is shown: its colour space and ICC profile, and Exif if it turns the picture.
+/// Texture and other metadata are left out.
 #[derive(Debug)]
 pub struct Prefixes<'a> {
     header: Header,
@@ -119,6 +119,7 @@ impl<'a> Prefixes<'a> {
                 if self.kept.iter().any(|(_, kept, _)| *kept == chunk) {
                     return Err(DecodeError::malformed(chunk, "appears twice"));
                 }
+                Metadata::check_payload(chunk, payload)?;
                 self.kept.push((self.layers.len(), chunk, payload));
             }
             _ if !chunk.is_critical() => {}

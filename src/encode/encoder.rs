@@ -4,6 +4,7 @@ use core::ops::ControlFlow;
 use std::time::Instant;
 
 use super::aim::Aim;
+use super::appearance::Curve;
 use super::error::{EncodeError, OptionError};
 use super::fit::training::Training;
 use super::job::Job;
@@ -237,6 +238,7 @@ impl Encoder {
         let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
         let mut observer = Observer::new(progress, iterations);
         let source = source.keeping_invisible(self.keep_invisible);
+        let source = source.seen_by(Curve::of(&self.metadata));
         let jobs: Vec<_> = runs
             .iter()
             .map(|(training, passes)| Job {

@@ -5,6 +5,7 @@
 
 mod aim;
 mod alpha_bleed;
+mod appearance;
 mod encoder;
 mod entropy;
 mod error;

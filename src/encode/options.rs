@@ -27,7 +27,8 @@ pub enum Target {
     /// which the metric takes for an error. The encoder aims at its estimate of the metric, [`Report::quality`](crate::Report), and no higher than 97. It aims at more in two cases:
     /// where the picture is smooth, as in a gradient, so that there are no blotches; and where a side has
     /// less than 113 pixels. Of such a picture the metric says little, so a larger one, made of the
-    /// picture and its mirror images, must have the quality as well.
+    /// picture and its mirror images, must have the quality as well. A picture whose [`Cicp`](crate::Cicp) says
+    /// PQ is judged as a display of standard range shows it: the metric knows no other.
     Quality(f64),
     /// A Lagrange multiplier lambda from 0.01 to 10^6: with all files of a set at the same lambda, no
     /// bit would bring more in another one. It is the squared error that a bit must save, where

@@ -1,5 +1,6 @@
 //! The picture to encode.
 
+use super::appearance::Curve;
 use super::error::SourceError;
 use crate::color::{ColorModel, SampleDepth, with_channels};
 use crate::container::MAX_SIDE;
@@ -13,6 +14,8 @@ pub struct Source<'a> {
     samples: SourceSamples<'a>,
     /// Whether colours count where alpha is 0.
     keeps_invisible: bool,
+    /// What samples look like, if they are not about those of sRGB.
+    curve: Option<&'static Curve>,
 }
 
 /// Most pixels of a row that are read at a time.
@@ -57,7 +60,7 @@ impl<'a> Source<'a> {
     }
 
     fn of(width: u32, height: u32, color: ColorModel, samples: SourceSamples<'a>) -> Self {
-        Self { width, height, color, samples, keeps_invisible: false }
+        Self { width, height, color, samples, keeps_invisible: false, curve: None }
     }
 
     /// The same picture, where colours count under alpha 0 as well, or not.
@@ -65,10 +68,20 @@ impl<'a> Source<'a> {
         Self { keeps_invisible, ..self }
     }
 
+    /// The same picture, whose samples look as a curve says.
+    pub(crate) fn seen_by(self, curve: Option<&'static Curve>) -> Self {
+        Self { curve, ..self }
+    }
+
+    /// What samples look like, if they are not about those of sRGB.
+    pub(crate) fn curve(&self) -> Option<&'static Curve> {
+        self.curve
+    }
+
     /// A picture of the same size, model and depth with other samples.
     pub(crate) fn with_samples<'b>(&self, samples: SourceSamples<'b>) -> Source<'b> {
-        let Self { width, height, color, keeps_invisible, .. } = *self;
-        Source { width, height, color, samples, keeps_invisible }
+        let Self { width, height, color, keeps_invisible, curve, .. } = *self;
+        Source { width, height, color, samples, keeps_invisible, curve }
     }
 
     /// Whether errors of a colour count as they show: times alpha.

@@ -11,6 +11,9 @@ const SAFE_KEYWORDS: [&str; 6] =
     ["Title", "Author", "Description", "Copyright", "Creation Time", "Disclaimer"];
 
 /// Which metadata to keep; see [`Metadata::retain`].
+///
+/// Each keeps the colour space in codes, the mastering display and the content light level: they say what the samples
+/// stand for, and nothing of anybody.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MetadataPolicy {
@@ -27,7 +30,7 @@ pub enum MetadataPolicy {
     /// - Texts with PNG's keywords `Title`, `Author`, `Description`, `Copyright`, `Creation Time` and
     ///   `Disclaimer`.
     Safe,
-    /// Nothing, not even the colour profile and the orientation.
+    /// Nothing else, not even the colour profile and the orientation.
     None,
 }
 
@@ -35,7 +38,8 @@ pub enum MetadataPolicy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MetadataLoss {
-    /// A colour profile that is not sRGB's: the same samples now stand for other colours.
+    /// A colour profile that is not sRGB's, without a colour space in codes: the same samples now stand for other
+    /// colours.
     ColorProfile,
     /// An orientation other than upright: whoever shows the picture leaves it as it is stored.
     Orientation,
@@ -85,10 +89,14 @@ impl Metadata {
             }
             MetadataPolicy::None => {
                 let dropped = core::mem::take(self);
+                self.cicp = dropped.cicp;
+                self.mastering_display = dropped.mastering_display;
+                self.content_light = dropped.content_light;
                 if dropped.orientation() != Orientation::NoTransforms {
                     losses.push(MetadataLoss::Orientation);
                 }
-                if dropped.icc_profile.is_some_and(|profile| !icc::is_srgb(&profile)) {
+                let is_needed = |profile: Vec<u8>| !icc::is_srgb(&profile);
+                if self.cicp.is_none() && dropped.icc_profile.is_some_and(is_needed) {
                     losses.push(MetadataLoss::ColorProfile);
                 }
             }

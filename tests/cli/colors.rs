@@ -1,5 +1,5 @@
-//! What sources say about their colours: it is kept as an ICC profile or turned to sRGB, or its loss is
-//! told.
+//! What sources say about their colours: it is kept in codes or as an ICC profile or turned to sRGB, or its loss
+//! is told.
 
 use std::io::Cursor;
 
@@ -43,6 +43,29 @@ fn code_points(primaries: u8, transfer: u8) -> (&'static [u8], Vec<u8>) {
     (CODE_POINTS, vec![primaries, transfer, 0, 1])
 }
 
+/// `mDCV` and `cLLI` of a display of BT.2020's primaries with 0.005 to 1000 cd/m².
+fn light() -> [(&'static [u8], Vec<u8>); 2] {
+    let points = [35_400_u16, 14_600, 8_500, 39_850, 6_550, 2_300, 15_635, 16_450];
+    let luminances = [10_000_000_u32, 50].map(u32::to_be_bytes).concat();
+    let display = [points.map(u16::to_be_bytes).concat(), luminances].concat();
+    let levels = [9_000_000_u32, 1_234_567].map(u32::to_be_bytes).concat();
+    [(b"mDCV", display), (b"cLLI", levels)]
+}
+
+/// What a PNG says of its samples beside a profile, with its payloads.
+fn said(file: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
+    let (mut at, mut found) = (8, Vec::new());
+    while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk()) {
+        let end = at + 8 + u32::from_be_bytes(*length) as usize;
+        let name = file[at + 4..at + 8].to_vec();
+        if [CODE_POINTS, b"mDCV", b"cLLI"].contains(&&name[..]) {
+            found.push((name, file[at + 8..end].to_vec()));
+        }
+        at = end + 4;
+    }
+    found
+}
+
 /// What becomes of a source: the profile of the decoded picture, and what is printed.
 fn carried(room: &Room, name: &str, file: &[u8]) -> (Option<ColorProfile>, String) {
     room.write(name, file);
@@ -60,21 +83,20 @@ fn carried(room: &Room, name: &str, file: &[u8]) -> (Option<ColorProfile>, Strin
 fn chunks_of_png_become_a_profile() {
     let room = Room::new();
     let picture = pictures::picture((8, 8), ColorType::Rgb8);
-    // x and y of the red of each profile's primaries, adapted to D50.
-    let (p3, wide, adobe) = ((0.5151, 0.2412), (0.6735, 0.2790), (0.6097, 0.3111));
+    // x and y of the red of the primaries, adapted to D50.
+    let adobe = (0.6097, 0.3111);
     for (chunks, red) in [
-        (&[code_points(12, 13)][..], Some(p3)),
-        (&[code_points(9, 1)], Some(wide)),
-        (&[code_points(9, 14), gamma(100_000), chromaticities(SRGB)], Some(wide)),
-        (&[gamma(SRGB_GAMMA), chromaticities(ADOBE)], Some(adobe)),
+        (&[gamma(SRGB_GAMMA), chromaticities(ADOBE)][..], Some(adobe)),
         (&[chromaticities(ADOBE)], Some(adobe)),
         // sRGB in other words.
         (&[code_points(1, 13)], None),
         (&[gamma(SRGB_GAMMA), chromaticities(SRGB)], None),
         (&[gamma(SRGB_GAMMA)], None),
         (&[(b"sRGB", vec![0]), gamma(100_000), chromaticities(ADOBE)], None),
-        // Not specified.
+        // Not specified, or only what is as in sRGB.
         (&[code_points(2, 2)], None),
+        (&[code_points(1, 2)], None),
+        (&[code_points(2, 13)], None),
     ] {
         let (profile, printed) = carried(&room, "a.png", &png(&picture, chunks));
         assert_eq!(printed, "", "{chunks:?}");
@@ -86,6 +108,128 @@ fn chunks_of_png_become_a_profile() {
             (found, red) => assert_eq!(found, red, "{chunks:?}"),
         }
     }
+}
+
+#[test]
+fn code_points_of_png_are_kept() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    let profile = ColorProfile::new_adobe_rgb().encode().expect("valid");
+    let mut with_profile = Vec::new();
+    let mut encoder = image::codecs::png::PngEncoder::new(&mut with_profile);
+    encoder.set_icc_profile(profile).expect("PNG has it");
+    picture.write_with_encoder(encoder).expect("in memory");
+    // x and y of the red of a profile in their place, where there is one.
+    let (p3, wide) = ((0.5151, 0.2412), (0.6735, 0.2790));
+    for (codes, other, red) in [
+        ((12, 13), vec![], Some(p3)),
+        ((9, 14), vec![gamma(100_000), chromaticities(SRGB)], Some(wide)),
+        ((9, 16), light().to_vec(), None),
+        ((9, 18), vec![], None),
+        ((9, 2), vec![], None),
+        ((2, 4), vec![], None),
+        ((200, 201), vec![], None),
+    ] {
+        let (primaries, transfer) = codes;
+        let chunks = [vec![code_points(primaries, transfer)], other].concat();
+        room.write("a.png", png(&picture, &chunks));
+        let warnings =
+            room.warnings(&["encode", "a.png", "a.gip", "--effort", "1", "--gaussians", "1"]);
+        assert_eq!(warnings, "", "{codes:?}");
+        let found = &room.json(&["info", "a.gip", "--json"])["metadata"]["cicp"];
+        assert_eq!(
+            (&found["primaries"], &found["transfer"]),
+            (&primaries.into(), &transfer.into())
+        );
+        assert_eq!(room.warnings(&["decode", "a.gip", "b.png"]), "");
+        let expected: Vec<_> = (chunks.iter())
+            .filter(|(name, _)| ![GAMMA, CHROMATICITIES].contains(name))
+            .map(|(name, payload)| (name.to_vec(), payload.clone()))
+            .collect();
+        assert_eq!(said(&room.read("b.png")), expected);
+
+        for name in ["b.jpg", "b.webp", "b.bmp"] {
+            let warnings = room.warnings(&["decode", "a.gip", name]);
+            let reader = ImageReader::open(room.path(name)).expect("it was written");
+            let profile = reader.into_decoder().expect("sound").icc_profile().expect("sound");
+            let red = red.filter(|_| name != "b.bmp");
+            let told = format!("cICP {primaries}/{transfer}/0/1) is not written to");
+            assert_eq!(warnings.contains(&told), red.is_none(), "{name}: {warnings}");
+            assert_eq!(warnings.contains("mastering"), expected.len() == 3, "{name}: {warnings}");
+            let found = profile.map(|profile| {
+                let profile = ColorProfile::new_from_slice(&profile).expect("valid");
+                (profile.red_colorant.x, profile.red_colorant.y)
+            });
+            assert_eq!(found.is_some(), red.is_some(), "{name}");
+            if let (Some((x, y)), Some((u, v))) = (found, red) {
+                assert!((x - u).abs() < 0.001 && (y - v).abs() < 0.001, "{name}: {x} {y}");
+            }
+        }
+    }
+
+    // A profile remains beside them for who does not know them, but they count.
+    let (before, after) = with_profile.split_at(33);
+    let codes = png(&picture, &[code_points(12, 13)]);
+    room.write("a.png", [before, &codes[33..49], after].concat());
+    room.ok(&["encode", "a.png", "a.gip", "--effort", "1", "--gaussians", "1"]);
+    room.ok(&["decode", "a.gip", "b.png"]);
+    assert_eq!(said(&room.read("b.png")).len(), 1);
+    let info = room.json(&["info", "a.gip", "--json"]);
+    assert!(info["metadata"]["icc_profile"].is_u64(), "{info}");
+    room.ok(&["decode", "a.gip", "b.jpg"]);
+    let reader = ImageReader::open(room.path("b.jpg")).expect("it was written");
+    let profile = reader.into_decoder().expect("a JPEG").icc_profile().expect("a JPEG");
+    let profile = ColorProfile::new_from_slice(&profile.expect("there is one")).expect("valid");
+    assert!((profile.red_colorant.x - 0.5151).abs() < 0.001);
+
+    // No policy drops them.
+    for policy in ["safe", "none"] {
+        let warnings = room.warnings(&[
+            "encode",
+            "a.png",
+            "a.gip",
+            "--effort",
+            "1",
+            "--gaussians",
+            "1",
+            "--metadata",
+            policy,
+        ]);
+        assert_eq!(warnings, "");
+        assert_eq!(room.json(&["info", "a.gip", "--json"])["metadata"]["cicp"]["primaries"], 12);
+        room.ok(&["decode", "a.gip", "b.png", "--metadata", policy]);
+        assert_eq!(said(&room.read("b.png")).len(), 1);
+    }
+    let shown = room.ok(&["info", "a.gip"]);
+    assert!(shown.contains("colour space        Display P3, cICP 12/13/0/1"), "{shown}");
+}
+
+#[test]
+fn pictures_of_pq_with_16_bits_come_back_as_they_were() {
+    let room = Room::new();
+    // From dark to 1000 cd/m², with a few 16-bit codes between neighbours.
+    let picture = DynamicImage::from(image::ImageBuffer::from_fn(96, 64, |x, y| {
+        let code = |value: f64| (value.clamp(0.0, 1.0) * 65_535.0).round() as u16;
+        let (x, y) = (f64::from(x) / 96.0, f64::from(y) / 64.0);
+        image::Rgb([code(0.75 * x), code(0.1 + 0.6 * y), code(0.3 + 0.2 * (6.0 * x * y).sin())])
+    }));
+    let chunks = [&[code_points(9, 16)], &light()[..]].concat();
+    room.write("a.png", png(&picture, &chunks));
+    let args = ["encode", "a.png", "a.gip", "--quality", "80", "--effort", "2"];
+    assert_eq!(room.warnings(&args), "");
+    room.ok(&["decode", "a.gip", "b.png"]);
+    let expected: Vec<_> =
+        chunks.iter().map(|(name, payload)| (name.to_vec(), payload.clone())).collect();
+    assert_eq!(said(&room.read("b.png")), expected);
+    let compared = room.json(&["compare", "a.png", "b.png", "--json"]);
+    assert_eq!(compared["depth"], 16);
+    assert!(compared["psnr"].as_f64().expect("a number") > 40.0, "{compared}");
+    // The prefix of the file says so, too.
+    room.ok(&["prefix", "a.gip", "1000000", "c.gip"]);
+    let info = room.json(&["info", "c.gip", "--json"]);
+    assert_eq!(info["metadata"]["cicp"]["transfer"], 16);
+    assert_eq!(info["metadata"]["mastering_display"]["max_luminance"], 1000.0);
+    assert_eq!(info["metadata"]["content_light"]["max_content"], 900.0);
 }
 
 #[test]
@@ -117,7 +261,8 @@ fn chunks_of_png_that_are_invalid_are_ignored_with_a_warning() {
     }
     // A background before the palette that it needs is no concern of the picture.
     let bad = png(&picture, &[(b"bKGD", vec![1]), code_points(12, 13)]);
-    assert!(carried(&room, "a.png", &bad).0.is_some());
+    carried(&room, "a.png", &bad);
+    assert_eq!(said(&room.read("a.png")).len(), 1);
 
     let mut file = Vec::new();
     let mut encoder = image::codecs::png::PngEncoder::new(&mut file);
@@ -176,26 +321,21 @@ fn cameras_name_adobe_rgb_in_exif() {
 fn colours_that_cannot_be_kept_are_told() {
     let room = Room::new();
     let picture = pictures::picture((8, 8), ColorType::Rgb8);
-    for (transfer, name) in [(16, "PQ"), (18, "HLG")] {
-        let (profile, printed) =
-            carried(&room, "a.png", &png(&picture, &[code_points(9, transfer)]));
+    for (chunks, kept) in [
+        (&[(CODE_POINTS, vec![9, 16, 0, 0])][..], "its samples are taken as sRGB"),
+        (
+            &[(CODE_POINTS, vec![1, 1, 0, 0]), gamma(SRGB_GAMMA)],
+            "what else it says about its colours counts",
+        ),
+    ] {
+        let (profile, printed) = carried(&room, "a.png", &png(&picture, chunks));
         assert!(profile.is_none());
+        let [primaries, transfer, ..] = chunks[0].1[..] else { panic!("four bytes") };
         let expected = format!(
-            "warning: a.png: its colour space ({name}, cICP 9/{transfer}/0/1) cannot be kept; its \
-             samples are taken as sRGB\n"
+            "warning: a.png: its colour space (cICP {primaries}/{transfer}/0/0, of limited range) \
+             cannot be kept; {kept}\n"
         );
         assert_eq!(printed, expected);
-    }
-
-    // Code points that leave open what they do not share with sRGB say nothing; others do.
-    for (primaries, transfer, is_told) in
-        [(2, 2, false), (1, 2, false), (2, 13, false), (9, 2, true), (2, 4, true)]
-    {
-        let file = png(&picture, &[code_points(primaries, transfer)]);
-        let (profile, printed) = carried(&room, "a.png", &file);
-        assert!(profile.is_none());
-        let told = format!("cICP {primaries}/{transfer}/0/1) cannot be kept");
-        assert_eq!(printed.contains(&told), is_told, "{printed}");
     }
 
     let mut radiance = Cursor::new(Vec::new());

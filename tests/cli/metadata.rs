@@ -85,7 +85,7 @@ impl Room {
     }
 
     /// Runs `gip`, which must succeed, and returns its warnings.
-    fn warnings(&self, args: &[&str]) -> String {
+    pub(crate) fn warnings(&self, args: &[&str]) -> String {
         let output = self.run(args);
         assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
         text(&output.stderr)

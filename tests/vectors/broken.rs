@@ -5,7 +5,7 @@ use super::common::{
     EXPONENTIAL, Entry, File, Header, SIGNATURE, checked, chunk, crc32, of_chunks, offsets, packed,
     quantizers,
 };
-use super::sound::TURNED;
+use super::sound::{MASTERING, TURNED};
 
 /// A file of four Gaussians in floats, whose parts are changed. Its chunks are H, three layers and E.
 struct Sound {
@@ -451,6 +451,39 @@ fn order(sound: &Sound) -> Vec<Vector> {
         Vector::invalid("xtwice-icc", "two ICC profiles", {
             let profile = chunk(b"iCCP", b"p");
             sound.with_chunks(|chunks| drop(chunks.splice(1..1, [profile.clone(), profile])))
+        }),
+        Vector::invalid("xtwice-cicp", "a cICP before the layers and one between them", {
+            let points = chunk(b"cICP", &[12, 13, 0, 1]);
+            sound.with_chunks(|chunks| {
+                chunks.insert(2, points.clone());
+                chunks.insert(1, points);
+            })
+        }),
+        Vector::invalid("xtwice-mdcv", "two mDCV", {
+            let display = chunk(b"mDCV", MASTERING);
+            sound.with_chunks(|chunks| drop(chunks.splice(1..1, [display.clone(), display])))
+        }),
+        Vector::invalid("xtwice-clli", "two cLLI", {
+            let light = chunk(b"cLLI", &[0; 8]);
+            sound.with_chunks(|chunks| drop(chunks.splice(1..1, [light.clone(), light])))
+        }),
+        Vector::invalid("xcicp-short", "a cICP without the full range flag", {
+            sound.inserted(1, b"cICP", &[12, 13, 0])
+        }),
+        Vector::invalid("xcicp-long", "a cICP of five bytes, after a layer", {
+            sound.inserted(2, b"cICP", &[12, 13, 0, 1, 0])
+        }),
+        Vector::invalid("xcicp-matrix", "a cICP with the matrix coefficients of BT.709", {
+            sound.inserted(1, b"cICP", &[1, 1, 1, 1])
+        }),
+        Vector::invalid("xcicp-range", "a cICP that says that samples are not of full range", {
+            sound.inserted(1, b"cICP", &[1, 1, 0, 0])
+        }),
+        Vector::invalid("xmdcv-short", "an mDCV of 23 bytes", {
+            sound.inserted(1, b"mDCV", &MASTERING[1..])
+        }),
+        Vector::invalid("xclli-long", "a cLLI of nine bytes, after the last layer", {
+            sound.inserted(4, b"cLLI", &[0; 9])
         }),
         Vector::invalid("xtwice-xmp-late", "XMP before the layers and after them", {
             let xmp = chunk(b"xMPd", b"<x/>");

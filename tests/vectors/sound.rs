@@ -49,6 +49,10 @@ fn floats(header: Header, rows: &[[f32; 6]]) -> File {
     File::of_floats(header, &rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())
 }
 
+/// The payload of an `mDCV`: the primaries of BT.2020, D65, and 0.005 to 1000 cd/m².
+pub(super) const MASTERING: &[u8; 24] =
+    b"\x8A\x48\x39\x08\x21\x34\x9B\xAA\x19\x96\x08\xFC\x3D\x13\x40\x42\x00\x98\x96\x80\0\0\0\x32";
+
 pub(super) fn valid() -> Vec<Vector> {
     [
         color_models(),
@@ -275,6 +279,18 @@ fn chunks() -> Vec<Vector> {
         chunks.insert(1, chunk(b"iCCP", b"not a real ICC profile"));
         (file, chunks)
     };
+    // PQ, made on a display of BT.2020's primaries, with 0.005 to 1000 cd/m².
+    let dynamic = random_file(82, Header { depth: 16, ..header(RGB, 16, 16) }, 6)
+        .with(b"cICP", &[9, 16, 0, 1])
+        .with(b"mDCV", MASTERING)
+        .with(b"cLLI", b"\x00\x98\x96\x80\x00\x26\x25\xA0");
+    let unknown = {
+        let file = random_file(83, header(GRAY, 16, 16), 6);
+        let mut chunks = file.chunks();
+        chunks.insert(2, chunk(b"cICP", &[255, 0, 0, 1]));
+        chunks.insert(1, chunk(b"iCCP", b"not a real ICC profile"));
+        (file, chunks)
+    };
     let long = {
         let entries = vec![Entry::linear(3, 2.0, 1.0); 6];
         let layers = [127, 128, 1, 300].into_iter().zip(85..);
@@ -295,6 +311,17 @@ fn chunks() -> Vec<Vector> {
             ],
         ),
         Vector::valid("metadata", "an ICC profile, Exif, XMP and three texts", described),
+        Vector::valid(
+            "cicp",
+            "cICP with BT.2020 and PQ, mDCV and cLLI; 16 bits",
+            dynamic,
+        ),
+        Vector::valid_chunks(
+            "cicp-unknown",
+            "cICP with codes that H.273 does not define, after a layer, and an ICC profile: both are handed over",
+            unknown.0,
+            &unknown.1,
+        ),
         Vector::valid_chunks(
             "ancillary",
             "unknown ancillary chunks wherever they may stand: all are skipped",

@@ -119,7 +119,7 @@ async function finish({ name }, { size, picture, gaussians, error }, signal) {
   stage.draw();
   announce(`${name} is open.`);
   // The shader knows nothing of colour profiles.
-  if (!about.metadata.iccProfile) await useGpu(picture, signal);
+  if (!about.metadata.iccProfile && !about.metadata.cicp) await useGpu(picture, signal);
 }
 
 /** Paints with the GPU, if there is one that can. */

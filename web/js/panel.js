@@ -9,6 +9,9 @@ const CHUNKS = {
   E: 'end',
   bNDS: 'bounds of the layers',
   tXTR: 'texture',
+  cICP: 'Colour space',
+  mDCV: 'Mastering display',
+  cLLI: 'Light level',
   iCCP: 'ICC profile',
   eXIf: 'Exif',
   xMPd: 'XMP',
@@ -112,8 +115,12 @@ function steps({ quantizationSteps }) {
   ]));
 }
 
-function metadata({ iccProfile, exif, xmp, texts }) {
+/** The colour spaces that have names, by their codes. */
+const colorSpaces = { '12,13': 'Display P3', '9,16': 'BT.2100 PQ', '9,18': 'BT.2100 HLG' };
+
+function metadata({ cicp, iccProfile, exif, xmp, texts }) {
   const rows = [
+    ['Colour space', cicp && (colorSpaces[cicp] ?? `cICP ${cicp.join(', ')}`)],
     ['ICC profile', iccProfile && bytes(iccProfile.length)],
     ['Exif', exif && bytes(exif.length)],
     ['XMP', xmp && `${integer(xmp.length)} characters`],

@@ -13,13 +13,13 @@ let gaussians = null;
 
 /**
  * What has arrived. `picture` is the header with the size of the upright picture, once that is known. What was
- * rendered of an earlier `edition` lacks a profile or a texture that has come since.
+ * rendered of an earlier `edition` lacks a colour space or a texture that has come since.
  */
 function progress() {
-  const { header, orientation, gaussians, iccProfile, texture, complete } = decoder.progress;
+  const { header, orientation, gaussians, colorSpace, texture, complete } = decoder.progress;
   const { naturalWidth: width, naturalHeight: height } = decoder;
   const picture = orientation && { ...header, orientation, width, height };
-  return { picture, gaussians, edition: iccProfile + texture, complete };
+  return { picture, gaussians, edition: colorSpace + texture, complete };
 }
 
 const uprightGaussians = () => decoder.gaussians({ orientation: 'from-image' });
@@ -27,7 +27,7 @@ const uprightGaussians = () => decoder.gaussians({ orientation: 'from-image' });
 /** The picture, with its texture or without. */
 async function renderPicture({ level, region, gaussians }, texture) {
   const options = { ...level, region, gaussians, texture };
-  if (decoder.metadata.iccProfile) {
+  if (decoder.progress.colorSpace) {
     // The browser converts the colours of PNG files.
     return createImageBitmap(new Blob([await decoder.png(options)], { type: 'image/png' }));
   }

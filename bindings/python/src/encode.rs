@@ -36,8 +36,8 @@ const NEWS: f64 = 0.002;
 /// Args:
 ///     array: height x width or height x width x channels samples, C-contiguous and aligned: uint8, uint16, or
 ///         float32 from 0.0 to 1.0, which is stored with 16 bits; not masked. The channels are gray; gray, alpha; red,
-///         green, blue; or red, green, blue, alpha. Colours are sRGB unless `icc` says otherwise; alpha
-///         is straight. The array is not copied, but for float32, and must not change during the call.
+///         green, blue; or red, green, blue, alpha. Colours are sRGB unless `cicp` or `icc`
+///         says otherwise; alpha is straight. The array is not copied, but for float32, and must not change during the call.
 ///     bpp: A file of at most so many bits per pixel, 1e-6 to 1e6.
 ///     bytes: A file of at most so many bytes, 1 to 2**30. That only the metadata keep it out of reach is
 ///         an error.
@@ -58,16 +58,19 @@ const NEWS: f64 = 0.002;
 ///     seed: The seed of all random numbers.
 ///     keep_invisible: Keep colours where alpha is 0. By default what does not show takes the colours
 ///         around it: the file is smaller, and scaled pictures have no fringes.
+///     cicp: The colour space of the picture: the codes of its colour primaries and of its transfer characteristics,
+///         0 to 255, as Rec. ITU-T H.273 has them. (12, 13) is Display P3, (9, 16) is BT.2100 with PQ, (9, 18) with
+///         HLG. It counts before `icc`. Pictures of PQ are judged as a display of standard range shows them.
 ///     icc: An ICC profile to store with the picture.
 ///     exif: Exif data: a TIFF stream, with or without the prefix that it has in JPEG.
 ///     xmp: An XMP packet: XML in UTF-8.
 ///     texts: Texts by their keywords, such as "Title", "Author" or "Copyright": a mapping, or pairs,
 ///         in the order in which they are stored. A keyword is 1 to 79 bytes of UTF-8; neither has a
 ///         NUL.
-///     metadata: What of these four is stored: "all"; "safe", which keeps the profile, orientation,
+///     metadata: What of the last four is stored: "all"; "safe", which keeps the profile, orientation,
 ///         copyright, artist, description and dates, and drops position, maker notes, thumbnails,
 ///         serial numbers, names of owners, comments and all else; or "none". There is a
-///         MetadataWarning for a profile other than that of sRGB and for an orientation other than
+///         MetadataWarning for a profile other than that of sRGB, without `cicp`, and for an orientation other than
 ///         upright that are dropped, and for damaged data. The samples are stored as they are: turn
 ///         them before, if nothing shall tell how they are turned.
 ///     limits: Those of the decoder that is to read the file: what it would refuse is not encoded.
@@ -87,7 +90,7 @@ const NEWS: f64 = 0.002;
 ///     CancelledError: `progress` returned False.
 ///     MemoryError: There is no memory to convert float32.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, precision="entropy", threads=1, seed=0, keep_invisible=false, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, precision="entropy", threads=1, seed=0, keep_invisible=false, cicp=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -104,6 +107,7 @@ pub(crate) fn encode<'py>(
     #[pyo3(from_py_with = threads::checked)] threads: usize,
     #[pyo3(from_py_with = checked_seed)] seed: u64,
     keep_invisible: bool,
+    cicp: Option<(Integer<'py>, Integer<'py>)>,
     icc: Option<&Bound<'py, PyAny>>,
     exif: Option<&Bound<'py, PyAny>>,
     xmp: Option<&Bound<'py, PyAny>>,
@@ -113,7 +117,7 @@ pub(crate) fn encode<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
-    let mut stored = metadata::of(icc, exif, xmp, texts)?;
+    let mut stored = metadata::of(cicp, icc, exif, xmp, texts)?;
     for loss in metadata::retain(&mut stored, metadata)? {
         warn(py, "MetadataWarning", &loss.to_string())?;
     }

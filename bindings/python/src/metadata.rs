@@ -1,11 +1,12 @@
 //! Metadata to store with a picture, and what of it is kept.
 
-use image_gip::{Metadata, MetadataLoss, MetadataPolicy, Text};
+use image_gip::{Cicp, Metadata, MetadataLoss, MetadataPolicy, Text};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 
 use crate::input;
+use crate::numbers::Integer;
 
 /// Keeps what the policy of this name says. Returns what was dropped that may be missed.
 pub(crate) fn retain(metadata: &mut Metadata, policy: &str) -> PyResult<Vec<MetadataLoss>> {
@@ -24,6 +25,7 @@ pub(crate) fn retain(metadata: &mut Metadata, policy: &str) -> PyResult<Vec<Meta
 
 /// The metadata that the caller gives. The encoder checks what can be stored.
 pub(crate) fn of(
+    cicp: Option<(Integer<'_>, Integer<'_>)>,
     icc: Option<&Bound<'_, PyAny>>,
     exif: Option<&Bound<'_, PyAny>>,
     xmp: Option<&Bound<'_, PyAny>>,
@@ -35,6 +37,10 @@ pub(crate) fn of(
         bytes.transpose()
     };
     let mut metadata = Metadata::default();
+    if let Some((primaries, transfer)) = cicp {
+        let code = |code: Integer<'_>| code.within("a code of cicp", 0..=u8::MAX);
+        metadata.cicp = Some(Cicp::new(code(primaries)?, code(transfer)?));
+    }
     metadata.icc_profile = blob("icc", icc)?;
     metadata.exif = blob("exif", exif)?.map(tiff_stream).transpose()?;
     metadata.xmp = blob("xmp", xmp)?;

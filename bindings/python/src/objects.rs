@@ -74,6 +74,7 @@ pub(crate) fn info<'py>(
     fields.set_item("parameterization", parameterization(header.parameterization))?;
     fields.set_item("base_color", PyTuple::new(py, &header.base_color[..channels])?)?;
     fields.set_item("chunks", PyTuple::new(py, chunks.collect::<PyResult<Vec<_>>>()?)?)?;
+    fields.set_item("cicp", metadata.cicp.map(|cicp| (cicp.primaries, cicp.transfer)))?;
     fields.set_item("icc", blob(&metadata.icc_profile))?;
     fields.set_item("exif", blob(&metadata.exif))?;
     fields.set_item("xmp", blob(&metadata.xmp))?;

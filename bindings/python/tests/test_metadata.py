@@ -4,6 +4,7 @@ import io
 import warnings
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import VECTORS, Picture, draw, saved
 from PIL import ExifTags, Image, ImageCms
@@ -50,6 +51,32 @@ def test_metadata(photo: Picture) -> None:
     )
     info = image_gip.info(file)
     assert (info.icc, info.exif, info.xmp) == (b"profile", exif, "<ä/>".encode())
+
+
+def test_cicp(photo: Picture) -> None:
+    wide = photo.astype(np.uint16) * 257
+    file = image_gip.encode(wide, effort=1, cicp=(9, 16), metadata="none")
+    info = image_gip.info(file)
+    assert (info.cicp, info.depth, info.icc) == ((9, 16), 16, None)
+    assert image_gip.info(image_gip.encode(photo, effort=1)).cicp is None
+    for codes, error in [((9, 256), ValueError), ((-1, 13), ValueError), (9, TypeError)]:
+        with pytest.raises(error, match="cicp"):
+            image_gip.encode(photo, cicp=codes)  # type: ignore[arg-type]
+
+
+def test_pillow_keeps_cicp(photo: Picture) -> None:
+    image = Image.fromarray(photo)
+    with Image.open(saved(image, cicp=(12, 13))) as found:
+        assert found.info["cicp"] == (12, 13)
+        with Image.open(saved(found)) as again:
+            assert again.info["cicp"] == (12, 13)
+        with Image.open(saved(found, cicp=None)) as again:
+            assert "cicp" not in again.info
+    # What becomes sRGB is in it.
+    inks = Image.new("LAB", (9, 9))
+    inks.info["cicp"] = (12, 13)
+    with Image.open(saved(inks)) as found:
+        assert "cicp" not in found.info
 
 
 def test_texts(photo: Picture) -> None:

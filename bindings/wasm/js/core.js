@@ -110,7 +110,7 @@ export class Decoder extends Upright {
       header: this.header,
       orientation: this.orientation,
       gaussians: native.arrived(),
-      iccProfile: native.hasProfile(),
+      colorSpace: native.hasColorSpace(),
       texture: native.hasTexture(),
       complete: native.complete(),
     };
@@ -160,12 +160,12 @@ export class Decoder extends Upright {
     return { width: request[4], height: request[5], color, channels: channelsOf[color], depth, data };
   }
 
-  /** Renders a PNG file, upright by default, with the picture's ICC profile, which a browser then converts. */
+  /** Renders a PNG file, upright by default, with the picture's colour space, which a browser then converts. */
   async png({ orientation = 'from-image', ...options } = {}) {
     const samples = this.samples({ ...options, orientation, depth: 8 });
-    const { iccProfile } = this.metadata;
+    const { metadata } = this;
     const { encodePng } = await import('./png.js');
-    return encodePng(samples, iccProfile);
+    return encodePng(samples, metadata);
   }
 
   /** Frees the memory. What is called after this throws a `GipError`. */

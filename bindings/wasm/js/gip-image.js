@@ -313,12 +313,12 @@ export class GipImageElement extends ImageAttributes {
 
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
   #next() {
-    const { arrived, iccProfile, texture, lacking } = this.#loader;
+    const { arrived, colorSpace, texture, lacking } = this.#loader;
     if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
     const plan = this.#plan();
     if (!plan) return null;
     const [old, header] = [this.#painting.drawn, this.#header];
-    const next = { plan, arrived, iccProfile, texture, header };
+    const next = { plan, arrived, colorSpace, texture, header };
     if (old && equal(old.plan, plan)) {
       // A file that begins again, since it was replaced, is not shown before it is better.
       const isBetter = arrived >= old.arrived * growth || arrived === header.gaussians;
@@ -351,16 +351,16 @@ export class GipImageElement extends ImageAttributes {
     }
   }
 
-  async #render(loader, { plan, iccProfile }) {
+  async #render(loader, { plan, colorSpace }) {
     const { width, height, region, orientation, texture } = plan;
     const options = { width, height, region, orientation, texture: texture === 'on' };
-    if (!iccProfile) return loader.render(options);
+    if (!colorSpace) return loader.render(options);
     // The browser knows how to convert colours.
     return createImageBitmap(await loader.png(options));
   }
 
   #show(image, drawn) {
-    const wide = drawn.iccProfile && matchMedia('(color-gamut: p3)').matches;
+    const wide = drawn.colorSpace && matchMedia('(color-gamut: p3)').matches;
     this.#painting.show(image, drawn, wide ? 'display-p3' : 'srgb');
     this.#place();
   }

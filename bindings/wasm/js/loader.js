@@ -9,7 +9,7 @@ export class Loader {
   header = null;
   orientation = null;
   arrived = 0;
-  iccProfile = false;
+  colorSpace = false;
   texture = false;
   complete = false;
   #download;
@@ -121,7 +121,7 @@ export class Loader {
   #begin() {
     this.#decoder.close();
     this.#decoder = new StreamDecoder({ limits: this.#limits });
-    const nothing = { iccProfile: false, texture: false, complete: false };
+    const nothing = { colorSpace: false, texture: false, complete: false };
     Object.assign(this, { header: null, orientation: null, arrived: 0, ...nothing });
   }
 }

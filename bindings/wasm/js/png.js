@@ -1,4 +1,4 @@
-// PNG files without compression. Browsers convert their colours by the ICC profile inside, so that this
+// PNG files without compression. Browsers convert their colours by the colour space inside, so that this
 // package needs no code for that.
 
 const colorTypes = { gray: 0, 'gray-alpha': 4, rgb: 2, rgba: 6 };
@@ -68,8 +68,8 @@ function joined(parts) {
   return out;
 }
 
-/** A PNG file of 8-bit samples, as `Decoder.samples` gives them, with an ICC profile or `null`. */
-export function encodePng({ width, height, channels, color, data }, iccProfile) {
+/** A PNG file of 8-bit samples, as `Decoder.samples` gives them, with the colour space that the metadata have. */
+export function encodePng({ width, height, channels, color, data }, { cicp, iccProfile }) {
   const header = new Uint8Array(13);
   const view = new DataView(header.buffer);
   view.setUint32(0, width);
@@ -85,6 +85,8 @@ export function encodePng({ width, height, channels, color, data }, iccProfile) 
 
   const signature = Uint8Array.of(0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a);
   const parts = [signature, chunk('IHDR', header)];
+  // Without a matrix, in full range.
+  if (cicp) parts.push(chunk('cICP', [...cicp, 0, 1]));
   if (iccProfile) {
     // A name, its end, and the only method of compression.
     const name = Uint8Array.of(0x49, 0x43, 0x43, 0, 0);

@@ -26,7 +26,12 @@ export interface Header {
 }
 
 export interface Metadata {
-  /** The ICC profile of the colours; without one they are sRGB. */
+  /**
+   * The colour space: the codes of its primaries and of its transfer characteristics in Rec. ITU-T H.273, such as
+   * 12 and 13 for Display P3, 9 and 16 for PQ, 9 and 18 for HLG. It counts before the ICC profile.
+   */
+  cicp: Uint8Array | null;
+  /** The ICC profile of the colours; without one, and without codes, they are sRGB. */
   iccProfile: Uint8Array | null;
   exif: Uint8Array | null;
   xmp: string | null;
@@ -47,10 +52,10 @@ export interface Progress {
   /** The number of Gaussians that have arrived. */
   gaussians: number;
   /**
-   * Whether an ICC profile has arrived, and whether the texture has. Both may come after Gaussians: a picture that
+   * Whether a colour space has arrived, in codes or as an ICC profile, and whether the texture has. Both may come after Gaussians: a picture that
    * was rendered before is to be rendered anew.
    */
-  iccProfile: boolean;
+  colorSpace: boolean;
   texture: boolean;
   /** Whether the whole file has arrived. */
   complete: boolean;

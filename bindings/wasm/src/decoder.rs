@@ -84,10 +84,11 @@ impl Decoder {
         self.stream.orientation().map(Orientation::to_exif)
     }
 
-    /// Whether an ICC profile has arrived.
-    #[wasm_bindgen(js_name = hasProfile)]
-    pub fn has_profile(&self) -> bool {
-        self.stream.metadata().icc_profile.is_some()
+    /// Whether a colour space has arrived: codes or an ICC profile.
+    #[wasm_bindgen(js_name = hasColorSpace)]
+    pub fn has_color_space(&self) -> bool {
+        let metadata = self.stream.metadata();
+        metadata.cicp.is_some() || metadata.icc_profile.is_some()
     }
 
     /// Whether the texture has arrived.

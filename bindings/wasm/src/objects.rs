@@ -76,7 +76,11 @@ pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
             object([("keyword", text.keyword.as_str().into()), ("text", text.text.as_str().into())])
         })
         .collect();
+    let cicp = metadata
+        .cicp
+        .map_or(JsValue::NULL, |cicp| Uint8Array::new(&[cicp.primaries, cicp.transfer]).into());
     object([
+        ("cicp", cicp),
         ("iccProfile", bytes(&metadata.icc_profile)),
         ("exif", bytes(&metadata.exif)),
         ("xmp", xmp),

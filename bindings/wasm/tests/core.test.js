@@ -60,7 +60,7 @@ test('header, metadata and statistics', () => {
     baseColor: [117 * 257, 125 * 257, 132 * 257],
   });
   const { metadata } = decoder;
-  assert.equal(metadata.iccProfile, null);
+  assert.deepEqual([metadata.cicp, metadata.iccProfile], [null, null]);
   assert.deepEqual([...metadata.exif], [...Buffer.from('II*\0')]);
   assert.equal(metadata.xmp, '<x/>');
   assert.deepEqual(metadata.texts, [{ keyword: 'Title', text: 'A picture' }]);
@@ -145,10 +145,10 @@ test('what comes after layers is told, and rendered from then on', () => {
   const decoder = new Decoder();
   const seen = new Set();
   for (const byte of bytes) {
-    const { orientation, iccProfile, texture, complete } = decoder.feed(Uint8Array.of(byte));
-    seen.add(String([orientation, iccProfile, texture, complete]));
+    const { orientation, colorSpace, texture, complete } = decoder.feed(Uint8Array.of(byte));
+    seen.add(String([orientation, colorSpace, texture, complete]));
     assert.equal(decoder.textureMap() !== null, texture);
-    assert.equal(decoder.metadata.iccProfile !== null, iccProfile);
+    assert.equal(decoder.metadata.iccProfile !== null, colorSpace);
   }
   assert.deepEqual([...seen], [
     ',false,false,false',
@@ -168,6 +168,16 @@ test('what comes after layers is told, and rendered from then on', () => {
   assert.deepEqual(decoder.samples(), early.samples());
   assert.notDeepEqual(decoder.samples(), plain.samples());
   for (const opened of [decoder, early, plain]) opened.close();
+});
+
+test('codes of a colour space go into the PNG file', async () => {
+  const codes = Buffer.from([9, 16, 0, 1]);
+  const decoder = opened(makePicture({ layers: [40], chunks: [['cICP', codes]] }));
+  assert.deepEqual([...decoder.metadata.cicp], [9, 16]);
+  assert.equal(decoder.progress.colorSpace, true);
+  const png = Buffer.from(await decoder.png());
+  assert.deepEqual(png.subarray(33, 45), Buffer.concat([Buffer.from([0, 0, 0, 4]), Buffer.from('cICP'), codes]));
+  decoder.close();
 });
 
 test('an orientation comes before the first layer, or the file is refused', () => {

@@ -7,10 +7,10 @@ import { gzipSync } from 'node:zlib';
 
 const dist = new URL('../dist/', import.meta.url);
 
-test('all scripts and the decoder are at most 105 kB, compressed', () => {
+test('all scripts and the decoder are at most 106 kB, compressed', () => {
   const files = readdirSync(dist).filter((file) => /\.(js|wasm)$/.test(file));
   const sizes = files.map((file) => gzipSync(readFileSync(new URL(file, dist)), { level: 9 }).length);
   const sum = sizes.reduce((a, b) => a + b, 0);
   assert.ok(files.includes('image_gip_bg.wasm') && files.includes('gip-image.js'));
-  assert.ok(sum <= 105_000, files.map((file, at) => `${file}: ${sizes[at]}`).join(', '));
+  assert.ok(sum <= 106_000, files.map((file, at) => `${file}: ${sizes[at]}`).join(', '));
 });

@@ -8,6 +8,7 @@ use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
 use image::{DynamicImage, ImageEncoder};
 use image_gip::{ColorModel, Metadata, SampleDepth};
 
+use crate::cicp;
 use crate::errors::WrongUsage;
 use crate::files;
 use crate::picture::{SampleSlice, StillImage};
@@ -142,9 +143,9 @@ impl Codec {
         Ok(())
     }
 
-    /// Drops the metadata that the format has no place for, or that `image` does not write to it. Returns
-    /// what it was.
-    pub(crate) fn drop_unwritable(self, metadata: &mut Metadata) -> Vec<String> {
+    /// Drops the metadata that the format has no place for, or that is not written to it. Returns what it was.
+    /// Codes of a colour space become a profile where the format has only profiles, and there is one.
+    pub(crate) fn drop_unwritable(self, color: ColorModel, metadata: &mut Metadata) -> Vec<String> {
         let takes_profile = matches!(self, Self::Png | Self::Jpeg | Self::WebP | Self::Tiff);
         let takes_exif = |exif: &Vec<u8>| match self {
             Self::Png | Self::WebP => true,
@@ -152,19 +153,33 @@ impl Codec {
             _ => false,
         };
         let mut dropped = Vec::new();
+        if self != Self::Png {
+            if let Some(codes) = metadata.cicp.take() {
+                let profile = cicp::profile(codes, color.channels() < 3);
+                if let Some(profile) = profile.filter(|_| takes_profile) {
+                    metadata.icc_profile = Some(profile);
+                } else {
+                    dropped.push(format!("colour space ({})", cicp::name(codes)));
+                }
+            }
+            let display = metadata.mastering_display.take().map(drop);
+            if display.or(metadata.content_light.take().map(drop)).is_some() {
+                dropped.push("mastering display or content light level".into());
+            }
+        }
         if !takes_profile && metadata.icc_profile.take().is_some() {
-            dropped.push("colour profile");
+            dropped.push("colour profile".into());
         }
         if metadata.exif.take_if(|exif| !takes_exif(exif)).is_some() {
-            dropped.push("Exif");
+            dropped.push("Exif".into());
         }
         if metadata.xmp.take().is_some() {
-            dropped.push("XMP");
+            dropped.push("XMP".into());
         }
         if !std::mem::take(&mut metadata.texts).is_empty() {
-            dropped.push("text");
+            dropped.push("text".into());
         }
-        let warn = |what| format!("the {what} is not written to {self:?}");
+        let warn = |what: String| format!("the {what} is not written to {self:?}");
         dropped.into_iter().map(warn).collect()
     }
 
@@ -186,7 +201,8 @@ impl Codec {
             Self::Tiff => write(tiff::TiffEncoder::new(&mut out), picture),
             Self::WebP => write(webp::WebPEncoder::new_lossless(&mut out), picture),
         }?;
-        Ok(out.into_inner())
+        let out = out.into_inner();
+        Ok(if self == Self::Png { cicp::with_chunks(out, &picture.metadata) } else { out })
     }
 
     /// Encodes a Netpbm format; `image` does not write all of them with 16 bits.

@@ -75,7 +75,7 @@ pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<Meta
     if codec == Codec::Gif {
         picture.round_alpha();
     }
-    let dropped = codec.drop_unwritable(&mut picture.metadata);
+    let dropped = codec.drop_unwritable(picture.color(), &mut picture.metadata);
     if policy.is_some() {
         picture.warnings.extend(dropped);
     }

@@ -4,12 +4,13 @@ use core::fmt::{self, Display};
 
 use anyhow::{Context, Result, anyhow};
 use image_gip::{
-    ChunkType, Coding, ColorModel, Header, Kernel, Parameterization, Prefix, Prefixes, Quantizer,
-    StreamDecoder,
+    ChunkType, Cicp, Coding, ColorModel, ContentLight, Header, Kernel, MasteringDisplay,
+    Parameterization, Prefix, Prefixes, Quantizer, StreamDecoder,
 };
 use serde::Serialize;
 
 use crate::args;
+use crate::cicp;
 use crate::encode::bits_per_pixel;
 use crate::files;
 
@@ -133,9 +134,67 @@ impl From<image_gip::QuantizationSteps> for StepSizes {
     }
 }
 
-/// Sizes in bytes of each kind of metadata.
+/// The colour space, as PNG's `cICP` has it.
+#[derive(Debug, Serialize)]
+struct ColorSpace {
+    primaries: u8,
+    transfer: u8,
+}
+
+/// The display on which the picture was made.
+#[derive(Debug, Serialize)]
+struct Mastering {
+    /// CIE 1931 x and y.
+    red: [f64; 2],
+    green: [f64; 2],
+    blue: [f64; 2],
+    white: [f64; 2],
+    /// In cd/m².
+    max_luminance: f64,
+    min_luminance: f64,
+}
+
+/// How bright the picture is, in cd/m²; 0 if it is not known.
+#[derive(Debug, Serialize)]
+struct Light {
+    max_content: f64,
+    max_frame_average: f64,
+}
+
+impl From<MasteringDisplay> for Mastering {
+    fn from(display: MasteringDisplay) -> Self {
+        let point = |point: [u16; 2]| point.map(|value| f64::from(value) / 50_000.0);
+        Self {
+            red: point(display.red),
+            green: point(display.green),
+            blue: point(display.blue),
+            white: point(display.white),
+            max_luminance: luminance(display.max_luminance),
+            min_luminance: luminance(display.min_luminance),
+        }
+    }
+}
+
+impl From<ContentLight> for Light {
+    fn from(light: ContentLight) -> Self {
+        Self {
+            max_content: luminance(light.max_content),
+            max_frame_average: luminance(light.max_frame_average),
+        }
+    }
+}
+
+/// In cd/m², of a number of 0.0001 cd/m².
+fn luminance(stored: u32) -> f64 {
+    f64::from(stored) / 10_000.0
+}
+
+/// What the metadata say of colours, and sizes in bytes of each other kind.
 #[derive(Debug, Serialize)]
 struct MetadataSizes {
+    cicp: Option<ColorSpace>,
+    mastering_display: Option<Mastering>,
+    content_light: Option<Light>,
     icc_profile: Option<usize>,
     exif: Option<usize>,
     xmp: Option<usize>,
@@ -235,6 +294,11 @@ impl FileInfo {
             quantization_steps: stream.quantization_steps().map(StepSizes::from),
             texture,
             metadata: MetadataSizes {
+                cicp: metadata
+                    .cicp
+                    .map(|Cicp { primaries, transfer, .. }| ColorSpace { primaries, transfer }),
+                mastering_display: metadata.mastering_display.map(Mastering::from),
+                content_light: metadata.content_light.map(Light::from),
                 icc_profile: size(&metadata.icc_profile),
                 exif: size(&metadata.exif),
                 xmp: size(&metadata.xmp),
@@ -353,7 +417,20 @@ impl Display for FileInfo {
         for Chunk { name, count, bytes, .. } in &self.chunks {
             row(&format!("chunk {name}"), &format_args!("{count}, {bytes} bytes"))?;
         }
-        let MetadataSizes { icc_profile, exif, xmp, texts } = &self.metadata;
+        let MetadataSizes { icc_profile, exif, xmp, texts, .. } = &self.metadata;
+        if let Some(ColorSpace { primaries, transfer }) = self.metadata.cicp {
+            row("colour space", &cicp::name(Cicp::new(primaries, transfer)))?;
+        }
+        if let Some(display) = &self.metadata.mastering_display {
+            let Mastering { min_luminance: least, max_luminance: most, .. } = display;
+            row("mastering display", &format_args!("{least} to {most} cd/m²"))?;
+        }
+        if let Some(Light { max_content, max_frame_average }) = &self.metadata.content_light {
+            row(
+                "content light",
+                &format_args!("{max_content} cd/m² at most, {max_frame_average} cd/m² in the mean"),
+            )?;
+        }
         for (name, bytes) in [("ICC profile", icc_profile), ("Exif", exif), ("XMP", xmp)] {
             if let Some(bytes) = bytes {
                 row(name, &format_args!("{bytes} bytes"))?;

@@ -4,6 +4,7 @@
 
 mod args;
 mod batch;
+mod cicp;
 mod codec;
 mod compare;
 mod decode;

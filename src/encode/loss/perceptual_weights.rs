@@ -90,7 +90,14 @@ impl PerceptualWeights {
                 block[scale] = (share * value) as f32;
             }
         }
-        stress_gradients(&mut blocks, columns, &Gradients::new(source));
+        let gradients = Gradients::new(source);
+        stress(&mut blocks, columns, |x, y| if gradients.has(x, y) { IN_GRADIENT } else { 1.0 });
+        if let Some(curve) = source.curve() {
+            // Errors are of codes, and count by the square of what becomes of them.
+            stress(&mut blocks, columns, |x, y| {
+                curve.slope(code(source, &shares[..colors], [x, y])).powi(2)
+            });
+        }
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
         Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })
     }
@@ -122,12 +129,13 @@ impl PerceptualWeights {
     }
 }
 
-/// Raises the weights of blocks in gradients, and lowers all of them to the same mean as before.
-fn stress_gradients(blocks: &mut [BlockWeights], columns: usize, gradients: &Gradients) {
+/// Multiplies the weights of blocks by factors, given their first pixels, and scales all of them to the same mean as
+/// before.
+fn stress(blocks: &mut [BlockWeights], columns: usize, factor: impl Fn(usize, usize) -> f32) {
     let mut sum = 0.0;
     for (index, block) in blocks.iter_mut().enumerate() {
         let (x, y) = (index % columns * BLOCK, index / columns * BLOCK);
-        let factor = if gradients.has(x, y) { IN_GRADIENT } else { 1.0 };
+        let factor = factor(x, y);
         for value in block {
             *value *= factor;
             sum += f64::from(*value);
@@ -135,6 +143,27 @@ fn stress_gradients(blocks: &mut [BlockWeights], columns: usize, gradients: &Gra
     }
     let mean = (sum / blocks.len() as f64) as f32;
     blocks.iter_mut().flatten().for_each(|value| *value /= mean);
+}
+
+/// What a sample of a colour looks like, scaled to 16 bits.
+fn seen(source: &Source<'_>, at: usize) -> f32 {
+    let sample = f32::from(source.wide_sample(at));
+    source.curve().map_or(sample, |curve| curve.at(sample / 65535.0) * 65535.0)
+}
+
+/// The mean luma of a block's codes, where a full sample is 1.
+fn code(source: &Source<'_>, shares: &[f32], [x, y]: [usize; 2]) -> f32 {
+    let ([width, height], channels) = (source.size(), source.color().channels());
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in y..(y + BLOCK).min(height) {
+        for column in x..(x + BLOCK).min(width) {
+            let samples = ((row * width + column) * channels..).zip(shares);
+            sum +=
+                samples.map(|(at, share)| share * f32::from(source.wide_sample(at))).sum::<f32>();
+            count += 65535.0;
+        }
+    }
+    sum / count
 }
 
 /// Weights from their logarithms, with a mean of 1, and their mean before.
@@ -191,9 +220,8 @@ impl LumaBand {
                 for (x, value) in line.iter_mut().enumerate() {
                     let at = (row * size[0] + x) * channels;
                     let samples = (at..).zip(shares);
-                    *value = samples
-                        .map(|(at, share)| share * f32::from(source.wide_sample(at)) / 65535.0)
-                        .sum::<f32>();
+                    *value =
+                        samples.map(|(at, share)| share * seen(source, at) / 65535.0).sum::<f32>();
                     if let Some(background) = background {
                         let alpha = source.wide_sample((row * size[0] + x + 1) * channels - 1);
                         let alpha = f32::from(alpha) / 65535.0;
@@ -257,6 +285,7 @@ impl LumaBand {
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::appearance::Curve;
     use crate::encode::progress::unobserved;
     use crate::encode::testing::{MODELS, source};
 
@@ -370,6 +399,32 @@ mod tests {
                 let squares = weights.luma.iter().sum::<f32>().powi(2);
                 assert!((squares - weights.colors as f32).abs() < 1e-5, "{model:?}");
             }
+        }
+    }
+
+    #[test]
+    fn weights_of_pq_are_those_of_what_it_looks_like() {
+        let (width, height) = (64, 32);
+        let samples = noise(width, height);
+        let curve = Curve::of_pq();
+        let codes: Vec<u16> = (samples.iter())
+            .map(|&sample| (curve.code(f32::from(sample) / 255.0) * 65535.0).round() as u16)
+            .collect();
+        let plain = source([width, height], ColorModel::Rgb, &samples);
+        let pq = Source::new_u16(width as u32, height as u32, ColorModel::Rgb, &codes);
+        let pq = pq.expect("the sizes agree").seen_by(Some(curve));
+        let [plain_weights, weights] = [plain, pq]
+            .map(|source| unobserved(|observer| PerceptualWeights::new(&source, observer)));
+        for (found, expected) in weights.means.iter().zip(plain_weights.means) {
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found}, {expected}");
+        }
+        // Those of codes also count the slope of the curve.
+        let ratio = |x: usize, y| {
+            let slope = curve.slope(code(&pq, &LUMA, [x, y]));
+            weights.at(x, y) / plain_weights.at(x, y) / slope.powi(2)
+        };
+        for (x, y) in [(4, 0), (60, 20), (32, 28)] {
+            assert!((ratio(x, y) / ratio(0, 0) - 1.0).abs() < 1e-3, "{x} {y}");
         }
     }
 }

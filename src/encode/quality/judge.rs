@@ -146,7 +146,8 @@ impl<'a> Judgement<'a> {
     /// rows is a multiple of 32, except at the bottom.
     pub(crate) fn see(&mut self, region: Region, planes: &[f32]) {
         let Judge { source, level, .. } = *self.judge;
-        let strip = Strip { model: source.color(), depth: source.depth(), region, planes };
+        let (model, depth, curve) = (source.color(), source.depth(), source.curve());
+        let strip = Strip { model, depth, region, planes, curve };
         for view in &mut self.views {
             view.see(source, &strip, level);
         }
@@ -221,21 +222,34 @@ pub(crate) fn count_for(wanted: f64, pixels: usize, [fine, coarse]: [f64; 2]) ->
 mod tests {
     use super::*;
     use crate::color::ColorModel;
+    use crate::encode::appearance::Curve;
     use crate::encode::testing::MODELS;
 
     /// How much a rendering differs from a source, both of which are interleaved, if it comes in strips
     /// of so many rows.
     fn judged(
-        [width, height]: [usize; 2],
+        size: [usize; 2],
         model: ColorModel,
         source: &[f32],
         rendering: &[f32],
         strip: usize,
     ) -> f64 {
+        verdict(size, model, None, [source, rendering], strip).worst()
+    }
+
+    /// The verdict on a rendering of a source.
+    fn verdict(
+        [width, height]: [usize; 2],
+        model: ColorModel,
+        curve: Option<&'static Curve>,
+        [source, rendering]: [&[f32]; 2],
+        strip: usize,
+    ) -> Verdict {
         let samples: Vec<u16> =
             source.iter().map(|sample| (sample * 65535.0).round() as u16).collect();
         let source =
             Source::new_u16(width as u32, height as u32, model, &samples).expect("the sizes agree");
+        let source = source.seen_by(curve);
         let judge = Judge::new(&source);
         let mut judgement = Judgement::new(&judge);
         let channels = model.channels();
@@ -248,7 +262,7 @@ mod tests {
             let region = Region { x: 0, y: y as u32, width: width as u32, height: height as u32 };
             judgement.see(region, &planes);
         }
-        judgement.verdict().worst()
+        judgement.verdict()
     }
 
     #[test]
@@ -273,6 +287,38 @@ mod tests {
         assert!(even > 3.0 * textured, "{even}, {textured}");
         let strengths = [0.01, 0.03, 0.1].map(|strength| quality(with_noise(true, strength)));
         assert!(strengths.is_sorted_by(|a, b| a > b), "{strengths:?}");
+    }
+
+    #[test]
+    fn codes_of_pq_are_judged_by_what_they_look_like() {
+        let (size, model) = ([96, 64], ColorModel::Rgba);
+        let mut rng = fastrand::Rng::with_seed(9);
+        // A gradient, then texture.
+        let source: Vec<f32> = (0..96 * 64 * 4)
+            .map(|at| match at / 4 % 96 {
+                column @ ..64 => 0.1 + column as f32 / 100.0,
+                _ => rng.f32(),
+            })
+            .collect();
+        let rendering: Vec<f32> = source
+            .iter()
+            .map(|sample| (sample + 0.04 * (rng.f32() - 0.5)).clamp(0.0, 1.0))
+            .collect();
+        let curve = Curve::of_pq();
+        let codes = |samples: &[f32]| -> Vec<f32> {
+            let code = |(at, &sample)| if at % 4 == 3 { sample } else { curve.code(sample) };
+            samples.iter().enumerate().map(code).collect()
+        };
+        let (codes, rendered) = (codes(&source), codes(&rendering));
+        let found = verdict(size, model, Some(curve), [&codes, &rendered], 32);
+        let expected = verdict(size, model, None, [&source, &rendering], 32);
+        let plain = verdict(size, model, None, [&codes, &rendered], 32);
+        let ratio = |verdict: Verdict, of: fn(&Verdict) -> f64| of(&verdict) / of(&expected);
+        let distance = |verdict: &Verdict| verdict.distance.unwrap_or(0.0);
+        for of in [distance, |verdict: &Verdict| verdict.blotches] {
+            assert!((ratio(found, of) - 1.0).abs() < 0.01, "{found:?}, {expected:?}");
+            assert!(ratio(plain, of) < 0.9, "{plain:?}, {expected:?}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 use fearless_simd::{Simd, f32x16, i32x16, prelude::*};
 
 use crate::color::{ColorModel, SampleDepth};
+use crate::encode::appearance::Curve;
 use crate::encode::rows::Lanes;
 use crate::encode::source::{SPAN, Source};
 use crate::region::Region;
@@ -62,6 +63,8 @@ pub(super) struct Strip<'a> {
     pub(super) region: Region,
     /// Plane after plane.
     pub(super) planes: &'a [f32],
+    /// What samples look like, if they are not about those of sRGB.
+    pub(super) curve: Option<&'static Curve>,
 }
 
 impl Samples for Strip<'_> {
@@ -82,6 +85,7 @@ impl Samples for Strip<'_> {
                 channel[x] = (channel[x].clamp(0.0, 1.0) * full_scale + 0.5).floor() * scale;
             }
         }
+        see(self.curve, self.model, count, channels);
     }
 }
 
@@ -92,12 +96,25 @@ impl Samples for Source<'_> {
 
     #[inline(always)]
     fn read(&self, x: usize, y: usize, channels: &mut [[f32; COLUMNS]; 4]) {
-        Source::read(self, x, y, channels);
+        let count = Source::read(self, x, y, channels);
         let scale = 1.0 / f32::from(self.depth().max_sample());
         for channel in &mut channels[..self.color().channels()] {
             for x in 0..COLUMNS {
                 channel[x] *= scale;
             }
+        }
+        see(self.curve(), self.color(), count, channels);
+    }
+}
+
+/// Replaces the colours of so many pixels by what they look like.
+#[inline(always)]
+fn see(curve: Option<&Curve>, model: ColorModel, count: usize, channels: &mut [[f32; COLUMNS]; 4]) {
+    let Some(curve) = curve else { return };
+    let colors = model.channels() - usize::from(model.has_alpha());
+    for channel in &mut channels[..colors] {
+        for value in &mut channel[..count] {
+            *value = curve.at(*value);
         }
     }
 }

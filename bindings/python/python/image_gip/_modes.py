@@ -57,6 +57,11 @@ def stored_profile(image: Image.Image, profile: bytes | None) -> bytes | None:
     return profile
 
 
+def stored_cicp(image: Image.Image) -> tuple[int, int] | None:
+    """The colour space that the picture has in codes, unless its samples become sRGB."""
+    return None if image.mode in _MANAGED else image.info.get("cicp")
+
+
 def _sixteen_bits(image: Image.Image) -> NDArray[np.uint16]:
     """The samples of a mode of integers, in the machine's byte order."""
     values = np.asarray(image)

@@ -58,6 +58,7 @@ def encode(
     threads: int = 1,
     seed: int = 0,
     keep_invisible: bool = False,
+    cicp: tuple[int, int] | None = None,
     icc: _Buffer | None = None,
     exif: _Buffer | None = None,
     xmp: _Buffer | None = None,

@@ -85,7 +85,8 @@ class Info:
     width: int
     #: Height in pixels.
     height: int
-    #: The channels. Colours are sRGB unless there is an ICC profile; alpha is straight.
+    #: The channels. Colours are sRGB unless `cicp` or `icc` says otherwise; alpha is
+    #: straight.
     mode: Mode
     #: Bits per sample of the picture that was encoded: 8 or 16.
     depth: int
@@ -111,6 +112,9 @@ class Info:
     base_color: tuple[int, ...]
     #: The chunks that were read, by type, in the order in which the types appear.
     chunks: tuple[Chunk, ...]
+    #: The colour space: the codes of colour primaries and transfer characteristics of Rec. ITU-T
+    #: H.273, such as (12, 13) for Display P3. It counts before the ICC profile.
+    cicp: tuple[int, int] | None
     #: The ICC profile.
     icc: bytes | None
     #: Exif data: a TIFF stream, which begins with ``II`` or ``MM``.

@@ -15,7 +15,8 @@ La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK 
 As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
 turns them. Metadata that stands after the first layer of a file, which is never an orientation, is
 in ``info`` once the whole picture is loaded. ``save`` stores the ICC profile of the picture by
-itself, and takes ``icc_profile``, ``exif`` and ``xmp``. Its other options are those of
+itself, and the colour space that is in ``info["cicp"]``, the two codes of ``image_gip.encode``. It
+takes ``icc_profile``, ``cicp``, ``exif`` and ``xmp``. Its other options are those of
 ``image_gip.encode``: with ``metadata="none"``, turn the picture before, as nothing in the file
 tells how it is to be turned.
 """
@@ -72,6 +73,7 @@ class GipImageFile(ImageFile.ImageFile):
     def _note(self, read: Info) -> None:
         """Takes the metadata of what was read of the file, as far as it is new."""
         found = {
+            "cicp": read.cicp,
             "icc_profile": read.icc,
             "exif": None if read.exif is None else b"Exif\0\0" + read.exif,
             "xmp": read.xmp,
@@ -230,6 +232,7 @@ def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
         options["exif"] = exif.tobytes() if isinstance(exif, Image.Exif) else exif
     if xmp := asked.get("xmp"):
         options["xmp"] = xmp.encode() if isinstance(xmp, str) else xmp
+    options.setdefault("cicp", _modes.stored_cicp(image))
     samples = _modes.samples(image, profile)
     try:
         encoded = encode(samples, **options)

@@ -17,8 +17,9 @@ use super::values::{ThreadCount, number, region, size};
 ///
 /// The picture is written upright: an orientation in the file's Exif is applied, and reset in Exif and XMP. Sizes
 /// and regions are those of the upright picture. ICC profile and Exif are written to PNG, JPEG and WebP, to TIFF
-/// the profile, to other formats nothing; XMP and texts are not written. A warning tells what was there and is
-/// not written. More is in docs/metadata.md.
+/// the profile, to other formats nothing; XMP and texts are not written. A colour space in codes (cICP) is written
+/// to PNG, and to formats with profiles as one, if there is one: not for PQ and HLG. A warning tells what was there
+/// and is not written. More is in docs/metadata.md.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,

@@ -19,9 +19,10 @@ use super::values::{ThreadCount, number};
 /// sRGB; in TIFF they are from 0 to 1, like integers from 0 to their largest. CMYK, YCbCr and CIELAB
 /// become RGB. A .gip is read without its texture, which would take many bytes as detail.
 ///
-/// Colours: an ICC profile is kept, if it is one of gray or RGB. What a PNG says by cICP, or by gAMA and
-/// cHRM, becomes a profile, or sRGB if it is only a gamma; so does the Adobe RGB of a camera's Exif. What cannot
-/// be kept, such as PQ and HLG, is told.
+/// Colours: an ICC profile is kept, if it is one of gray or RGB, and so is what a PNG says by cICP, mDCV and cLLI,
+/// PQ and HLG included. What it says by gAMA and cHRM becomes a profile, or sRGB if it is only a gamma; so does the
+/// Adobe RGB of a camera's Exif. What cannot be kept is told. Of PQ, the quality and what shows to the eye are those
+/// of the picture as a display of standard range shows it.
 ///
 /// The picture is stored upright: an Exif orientation is applied to the pixels, and reset in Exif and XMP. ICC
 /// profile, Exif and XMP are stored; of the tags of a TIFF those of description, artist, copyright, camera, dates
@@ -92,7 +93,7 @@ pub(crate) struct EncoderArgs {
           value_parser = clap::value_parser!(u8).range(0..=100))]
     texture: u8,
     /// Let the first layer make a file of at most N bytes, from 64 to 65536, as a placeholder: `gip prefix` cuts it
-    /// off. ICC profile and orientation are in it; all other metadata are stored after it.
+    /// off. Colour space, ICC profile and orientation are in it; all other metadata are stored after it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=65_536))]
     first_layer: Option<u32>,
     /// How the Gaussians are stored.

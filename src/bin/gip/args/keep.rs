@@ -26,10 +26,10 @@ impl Keep {
 enum PolicyArg {
     /// All of it, as it is
     All,
-    /// Orientation, colour profile, title, description, artist, copyright and dates; no position, maker
+    /// Colours, orientation, title, description, artist, copyright and dates; no position, maker
     /// notes, embedded thumbnails, cameras, serial numbers, owners, comments or anything unknown
     Safe,
-    /// Nothing, not even the colour profile
+    /// Only the colour space in codes (cICP), not even a colour profile
     None,
 }
 

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 ///
 /// The first layers of a file are a picture: of the strongest Gaussians, blurred, but of the same size. This writes a
 /// file of as many layers as fit into BYTES, as a placeholder for example, without decoding and encoding. `gip info`
-/// shows how many bytes there can be. The ICC profile is kept, and Exif if it turns the picture; texture and other
-/// metadata are left out. `gip encode --first-layer` makes files whose first layer fits.
+/// shows how many bytes there can be. Colour space and ICC profile are kept, and Exif if it turns the picture; texture
+/// and other metadata are left out. `gip encode --first-layer` makes files whose first layer fits.
 ///
 /// The beginning of a file that is cut off is enough, if it has the layers.
 #[derive(Debug, clap::Args)]

@@ -2,16 +2,13 @@
 
 use std::ops::RangeInclusive;
 
-use image::DynamicImage;
-use image_gip::Metadata;
-use moxcms::{
-    Chromaticity, CicpProfile, ColorPrimaries, ColorProfile, DataColorSpace, LocalizableString,
-    MatrixCoefficients, ProfileText, ToneReprCurve, XyY,
-};
+use image_gip::{Cicp, Metadata};
+use moxcms::{Chromaticity, ColorPrimaries, ColorProfile, ToneReprCurve, XyY};
 use png::{CodingIndependentCodePoints, Info, SourceChromaticities};
 
 use super::light;
 use super::stored::Stored;
+use crate::cicp;
 
 /// The gamma that stands for sRGB, and how far others that do may be from it.
 const SRGB_GAMMA: f64 = 0.454_55;
@@ -28,25 +25,28 @@ const SAME_CHROMATICITY: f64 = 0.002;
 pub(super) const SRGB: [(f64, f64); 4] = [(0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06)];
 
 /// Applies the chunks of a PNG, of which the first of cICP, iCCP, sRGB, and gAMA with cHRM counts (PNG,
-/// third edition, 4.3). A gamma alone is turned to that of sRGB, and what has other colours gets a
-/// profile.
+/// third edition, 4.3). Codes and profiles are kept; a gamma alone is turned to that of sRGB, and what has other
+/// chromaticities gets a profile.
 pub(super) fn of_png(info: &Info<'_>, stored: &mut Stored) {
-    let is_gray =
-        matches!(stored.image, DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_))
-            || matches!(stored.image, DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_));
-    if let Some(points) = info.coding_independent_code_points
-        && !is_default(points)
-    {
-        match profile_of_code_points(points, is_gray) {
-            Some(profile) => {
-                stored.metadata.icc_profile = profile.and_then(|profile| profile.encode().ok());
-                return;
-            }
-            None => stored.warnings.push(lost(points, has_other(info))),
+    cicp::light_of_png(info, &mut stored.metadata);
+    match info.coding_independent_code_points {
+        Some(points) if !points.is_video_full_range_image => {
+            stored.warnings.push(limited(points, has_other(info)));
         }
+        Some(points) if !is_default(points) => {
+            let cicp = Cicp::new(points.color_primaries, points.transfer_function);
+            if cicp == Cicp::SRGB {
+                // As samples are without codes and profile.
+                stored.metadata.icc_profile = None;
+            } else {
+                stored.metadata.cicp = Some(cicp);
+            }
+            return;
+        }
+        _ => {}
     }
     if info.icc_profile.is_none() && info.srgb.is_none() {
-        of_gamma_and_chromaticities(info, is_gray, stored);
+        of_gamma_and_chromaticities(info, stored);
     }
 }
 
@@ -57,35 +57,6 @@ fn is_default(points: CodingIndependentCodePoints) -> bool {
     matches!((primaries, transfer), (1 | 2, 2) | (2, 13))
 }
 
-/// The profile for code points; `Some(None)` for sRGB, and `None` if no profile can express them.
-fn profile_of_code_points(
-    points: CodingIndependentCodePoints,
-    is_gray: bool,
-) -> Option<Option<ColorProfile>> {
-    let (primaries, transfer) = (points.color_primaries, points.transfer_function);
-    // Others than these are of high dynamic range, historical, or unspecified.
-    let is_known = primaries != 2 && matches!(transfer, 1 | 4..=8 | 13..=15);
-    if !is_known || points.matrix_coefficients != 0 || !points.is_video_full_range_image {
-        return None;
-    }
-    if transfer == 13 && (primaries == 1 || is_gray) {
-        return Some(None);
-    }
-    let mut profile = ColorProfile::new_from_cicp(CicpProfile {
-        color_primaries: primaries.try_into().ok()?,
-        transfer_characteristics: transfer.try_into().ok()?,
-        matrix_coefficients: MatrixCoefficients::Identity,
-        full_range: true,
-    });
-    let curve = profile.red_trc.clone()?;
-    if is_gray {
-        profile = ColorProfile::new_gray_with_gamma(1.0);
-        profile.pcs = DataColorSpace::Xyz;
-        profile.gray_trc = Some(curve);
-    }
-    Some(Some(named(profile, format!("CICP {primaries}/{transfer}/0/1"))))
-}
-
 /// Whether a PNG has a description of its colours beside cICP.
 fn has_other(info: &Info<'_>) -> bool {
     info.icc_profile.is_some()
@@ -94,30 +65,21 @@ fn has_other(info: &Info<'_>) -> bool {
         || info.chrm_chunk.is_some()
 }
 
-fn lost(points: CodingIndependentCodePoints, has_other: bool) -> String {
-    let CodingIndependentCodePoints {
-        color_primaries,
-        transfer_function,
-        matrix_coefficients,
-        is_video_full_range_image,
-    } = points;
-    let name = match transfer_function {
-        16 => "PQ, ",
-        18 => "HLG, ",
-        _ => "",
-    };
-    let range = u8::from(is_video_full_range_image);
+/// What is said of codes for samples of limited range.
+fn limited(points: CodingIndependentCodePoints, has_other: bool) -> String {
+    let CodingIndependentCodePoints { color_primaries, transfer_function, .. } = points;
     let kept = match has_other {
         true => "what else it says about its colours counts",
         false => "its samples are taken as sRGB",
     };
     format!(
-        "its colour space ({name}cICP {color_primaries}/{transfer_function}/{matrix_coefficients}/\
-         {range}) cannot be kept; {kept}"
+        "its colour space (cICP {color_primaries}/{transfer_function}/0/0, of limited range) cannot be \
+         kept; {kept}"
     )
 }
 
-fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stored) {
+fn of_gamma_and_chromaticities(info: &Info<'_>, stored: &mut Stored) {
+    let is_gray = stored.image.color().channel_count() < 3;
     let mut invalid = |chunk, is_valid: bool| {
         if !is_valid {
             stored.warnings.push(format!("its chunk {chunk} is invalid, and is ignored"));
@@ -149,7 +111,7 @@ fn of_gamma_and_chromaticities(info: &Info<'_>, is_gray: bool, stored: &mut Stor
             profile.red_trc = Some(curve.clone());
             profile.green_trc = Some(curve.clone());
             profile.blue_trc = Some(curve);
-            let profile = named(profile, "PNG gAMA cHRM".into());
+            let profile = cicp::named(profile, "PNG gAMA cHRM".into());
             let matrix = profile.colorant_matrix();
             if matrix.v.iter().flatten().all(|value| value.is_finite() && value.abs() < 4.0)
                 && let Ok(profile) = profile.encode()
@@ -190,15 +152,6 @@ fn points(chromaticities: SourceChromaticities) -> [(f64, f64); 4] {
 
 fn srgb_curve() -> ToneReprCurve {
     ColorProfile::new_srgb().red_trc.unwrap_or(ToneReprCurve::Parametric(vec![2.2]))
-}
-
-/// The profile with a name, and with the white that its colours are adapted to.
-fn named(mut profile: ColorProfile, name: String) -> ColorProfile {
-    profile.cicp = None;
-    profile.media_white_point = Some(profile.white_point);
-    let name = LocalizableString::new("en".into(), "US".into(), name);
-    profile.description = Some(ProfileText::Localizable(vec![name]));
-    profile
 }
 
 /// Adds the profile of Adobe RGB, which cameras name by a code in Exif in its place (DCF, 2.0).
