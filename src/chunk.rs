@@ -47,9 +47,9 @@ impl ChunkType {
     /// An ICC profile.
     pub const ICCP: Self = Self(*b"iCCP");
     /// Exif data: a TIFF stream.
-    pub const EXIF: Self = Self(*b"eXIf");
+    pub const EXIF: Self = Self(*b"eXIF");
     /// An XMP packet.
-    pub const XMP: Self = Self(*b"xMPd");
+    pub const XMP: Self = Self(*b"xMPD");
     /// A keyword and its text.
     pub const TEXT: Self = Self(*b"tEXt");
 

@@ -87,14 +87,6 @@ impl DecodeError {
         Self::Unsupported { chunk, what }
     }
 
-    /// The same error, of the chunk that has such data in it.
-    pub(crate) fn in_chunk(self, chunk: ChunkType) -> Self {
-        match self {
-            Self::Malformed { reason, .. } => Self::Malformed { chunk, reason },
-            other => other,
-        }
-    }
-
     /// Whether the file ended too early: with more bytes, decoding could have continued.
     #[must_use]
     pub fn is_unexpected_end(&self) -> bool {
@@ -173,6 +165,23 @@ impl fmt::Display for LimitKind {
             Self::Memory => "bytes of memory",
             Self::Work => "kernel evaluations",
         })
+    }
+}
+
+/// A chunk that breaks a rule, but was skipped, as the picture can be shown without it (spec, section 4.3): metadata,
+/// bounds of layers, or a texture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SkippedChunk {
+    /// Its type.
+    pub chunk: ChunkType,
+    /// Which rule it breaks.
+    pub reason: Reason,
+}
+
+impl fmt::Display for SkippedChunk {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "chunk {} is skipped: {}", self.chunk, self.reason)
     }
 }
 

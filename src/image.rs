@@ -121,18 +121,13 @@ impl<R: Read> GipDecoder<R> {
     /// The colour space that the file says in codes, for [`DynamicImage::set_color_space`](::image::DynamicImage::set_color_space);
     /// `image` asks a decoder for an ICC profile alone. It counts before the profile. `None` if there is none, or if
     /// `image` does not know its codes.
-    ///
-    /// # Errors
-    /// When the file is malformed, unsupported or ends too early, as far as it is read: to its end, if there is none
-    /// before the first layer.
-    pub fn color_space(&mut self) -> ImageResult<Option<::image::metadata::Cicp>> {
-        self.metadata_with(|metadata| {
-            let Cicp { primaries, transfer } = metadata.cicp?;
-            Some(::image::metadata::Cicp {
-                primaries: PRIMARIES.into_iter().find(|&code| code as u8 == primaries)?,
-                transfer: TRANSFERS.into_iter().find(|&code| code as u8 == transfer)?,
-                ..::image::metadata::Cicp::SRGB
-            })
+    #[must_use]
+    pub fn color_space(&self) -> Option<::image::metadata::Cicp> {
+        let Cicp { primaries, transfer } = self.decoder.metadata().cicp?;
+        Some(::image::metadata::Cicp {
+            primaries: PRIMARIES.into_iter().find(|&code| code as u8 == primaries)?,
+            transfer: TRANSFERS.into_iter().find(|&code| code as u8 == transfer)?,
+            ..::image::metadata::Cicp::SRGB
         })
     }
 
@@ -212,7 +207,8 @@ impl<R: Read> ImageDecoder for GipDecoder<R> {
     }
 
     fn icc_profile(&mut self) -> ImageResult<Option<Vec<u8>>> {
-        self.metadata_with(|metadata| metadata.icc_profile.clone())
+        // It comes before the first layer, up to which the file was read.
+        Ok(self.decoder.metadata().icc_profile.clone())
     }
 
     fn exif_metadata(&mut self) -> ImageResult<Option<Vec<u8>>> {

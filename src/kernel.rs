@@ -77,9 +77,14 @@ impl Kernel {
 
     /// The exponential kernel with a cut-off that a file declares.
     pub(crate) fn exponential(cutoff: f32) -> Result<Self, DecodeError> {
-        if cutoff > 0.0 && cutoff <= MAX_CUTOFF {
-            return Ok(Self::Exponential { cutoff });
+        match cutoff {
+            _ if cutoff.is_nan() || cutoff <= 0.0 => {
+                Err(DecodeError::malformed(ChunkType::HEADER, "a cut-off that is not positive"))
+            }
+            _ if cutoff > MAX_CUTOFF => {
+                Err(DecodeError::unsupported(ChunkType::HEADER, "cut-off over", MAX_CUTOFF as u32))
+            }
+            _ => Ok(Self::Exponential { cutoff }),
         }
-        Err(DecodeError::malformed(ChunkType::HEADER, "a cut-off that is not in (0, 64]"))
     }
 }

@@ -134,7 +134,7 @@ pub use encode::{
     EncodeError, Encoded, Encoder, OptionError, Precision, Progress, Report, Shortfall, Source,
     SourceError, Target, Tune, encode,
 };
-pub use error::{DecodeError, LimitKind, Reason, RequestError, Unsupported};
+pub use error::{DecodeError, LimitKind, Reason, RequestError, SkippedChunk, Unsupported};
 pub use gaussian::{Gaussian, Parameterization};
 pub use kernel::Kernel;
 pub use limits::Limits;

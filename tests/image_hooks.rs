@@ -198,7 +198,7 @@ fn colour_spaces_are_carried_in_codes() {
     };
     for color_space in [Cicp::DISPLAY_P3, pq] {
         let file = encode(color_space).unwrap();
-        let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap().unwrap();
+        let found = GipDecoder::new(&file[..]).unwrap().color_space().unwrap();
         assert_eq!(found, color_space);
         let mut picture = DynamicImage::from_decoder(GipDecoder::new(&file[..]).unwrap()).unwrap();
         picture.set_color_space(found).unwrap();
@@ -206,9 +206,9 @@ fn colour_spaces_are_carried_in_codes() {
     }
     // What a file is in without codes, and codes that have no name.
     let srgb = encode(Cicp::SRGB).unwrap();
-    assert_eq!(GipDecoder::new(&srgb[..]).unwrap().color_space().unwrap(), None);
+    assert_eq!(GipDecoder::new(&srgb[..]).unwrap().color_space(), None);
     let unknown = &include_bytes!("../spec/vectors/cicp-unknown.gip")[..];
-    assert_eq!(GipDecoder::new(unknown).unwrap().color_space().unwrap(), None);
+    assert_eq!(GipDecoder::new(unknown).unwrap().color_space(), None);
     let matrix = CicpMatrixCoefficients::Bt709;
     let error = encode(Cicp { matrix, ..Cicp::SRGB }).unwrap_err();
     assert!(matches!(error, ImageError::Unsupported(_)), "{error}");
@@ -217,11 +217,12 @@ fn colour_spaces_are_carried_in_codes() {
 #[test]
 fn metadata_after_the_layers_is_found() {
     let file = encode(ColorType::L8);
+    let header = SIGNATURE.len() + 2 + usize::from(file[SIGNATURE.len() + 1]) + 4;
     let (layers, end) = file.split_at(file.len() - chunk(b"E", &[]).len());
     let exif = b"II\x2a\0\x08\0\0\0\0\0\0\0\0\0";
-    let late = [(b"iCCP", &b"a profile"[..]), (b"eXIf", exif), (b"xMPd", b"<x/>")];
-    let late = late.map(|(kind, payload)| chunk(kind, payload)).concat();
-    let late = [layers, &late, end].concat();
+    let profile = chunk(b"iCCP", b"a profile");
+    let late = [chunk(b"eXIF", exif), chunk(b"xMPD", b"<x/>")].concat();
+    let late = [&file[..header], &profile, &layers[header..], &late, end].concat();
     let mut decoder = GipDecoder::new(&late[..]).unwrap();
     assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
     assert_eq!(decoder.icc_profile().unwrap().as_deref(), Some(&b"a profile"[..]));
@@ -229,11 +230,11 @@ fn metadata_after_the_layers_is_found() {
     assert_eq!(decoder.xmp_metadata().unwrap().as_deref(), Some(&b"<x/>"[..]));
     assert_eq!(read_all(decoder), reference(&file));
 
-    // The orientation is known when the first layer begins, the rest is not.
-    let header = SIGNATURE.len() + 2 + usize::from(late[SIGNATURE.len() + 1]) + 4;
-    let mut decoder = GipDecoder::new(&late[..=header]).unwrap();
+    // Orientation and colours are known when the first layer begins, the rest is not.
+    let mut decoder = GipDecoder::new(&late[..=header + profile.len()]).unwrap();
     assert_eq!(decoder.orientation().unwrap(), Orientation::NoTransforms);
-    assert!(matches!(decoder.icc_profile(), Err(ImageError::Decoding(_))));
+    assert_eq!(decoder.icc_profile().unwrap().as_deref(), Some(&b"a profile"[..]));
+    assert!(matches!(decoder.exif_metadata(), Err(ImageError::Decoding(_))));
 }
 
 #[test]

@@ -140,19 +140,16 @@ fn packed() -> File {
 #[test]
 fn flaws_are_told() {
     let sound = packed().with(b"iCCP", PROFILE).chunks();
-    let [header, profile, first, second, end] = [0, 1, 2, 3, 4].map(|index| sound[index].clone());
+    let [header, first, second, end] = [0, 2, 3, 4].map(|index| sound[index].clone());
     Prefixes::new(&of_chunks(&sound)).expect("it is sound");
     let mut damaged = first.clone();
     *damaged.last_mut().expect("a CRC") ^= 1;
     let critical = common::chunk(b"Q", &[]);
-    let limited = common::chunk(b"cICP", &[1, 1, 0, 0]);
     for (chunks, expected) in [
         (vec![first.clone(), end.clone()], "chunk L (layer): "),
         (vec![header.clone(), header.clone()], "chunk H (header): "),
         (vec![header.clone(), damaged], "chunk L (layer): the CRC does not match"),
         (vec![header.clone(), critical], "chunk Q: unsupported"),
-        (vec![header.clone(), limited], "chunk cICP: unsupported: full range flag 0"),
-        (vec![header.clone(), profile.clone(), profile.clone()], "chunk iCCP: appears twice"),
         (vec![header.clone(), first.clone(), second.clone(), second.clone()], "more layers than"),
     ] {
         let error = Prefixes::new(&of_chunks(&chunks)).expect_err("a flaw").to_string();
@@ -162,6 +159,27 @@ fn flaws_are_told() {
     // What follows the end is no part of the file.
     let longer = [of_chunks(&sound), vec![7; 9]].concat();
     assert_eq!(Prefixes::new(&longer).expect("it is sound").iter().len(), 2);
+}
+
+#[test]
+fn what_decoders_skip_is_left_out() {
+    let whole = |file: &[u8]| {
+        let prefixes = Prefixes::new(file).expect("it is read");
+        prefixes.file(prefixes.within(usize::MAX).expect("a layer"))
+    };
+    let sound = packed().with(b"iCCP", PROFILE).chunks();
+    let expected = whole(&of_chunks(&sound));
+    // No samples of full range, a second profile, one that comes too late.
+    let limited = (1, common::chunk(b"cICP", &[1, 1, 0, 0]));
+    let second = (2, common::chunk(b"iCCP", b"another"));
+    let late = (3, common::chunk(b"cICP", &[1, 13, 0, 1]));
+    for (at, flaw) in [limited, second, late] {
+        let mut chunks = sound.clone();
+        chunks.insert(at, flaw);
+        let file = of_chunks(&chunks);
+        assert_eq!(decode_valid(&file).skipped().len(), 1);
+        assert_eq!(whole(&file), expected);
+    }
 }
 
 #[test]

@@ -8,8 +8,12 @@ mod broken;
 mod common;
 #[path = "vectors/entropy.rs"]
 mod entropy;
+#[path = "vectors/metadata.rs"]
+mod metadata;
 #[path = "vectors/sound.rs"]
 mod sound;
+#[path = "vectors/sums.rs"]
+mod sums;
 #[path = "vectors/texture.rs"]
 mod texture;
 
@@ -113,6 +117,11 @@ impl Vector {
         Self { bytes: of_chunks(chunks), ..Self::valid(name, shows, file) }
     }
 
+    /// A file with chunks that break a rule and are skipped, so that it gives the picture of `file`.
+    fn skipping(name: &'static str, shows: &'static str, file: File, bytes: Vec<u8>) -> Self {
+        Self { bytes, ..Self::valid(name, shows, file) }
+    }
+
     fn invalid(name: &'static str, shows: &'static str, bytes: Vec<u8>) -> Self {
         Self { name, shows, bytes, file: None, requests: Vec::new() }
     }
@@ -176,6 +185,10 @@ fn lines(vector: &Vector) -> String {
     };
     result.expect(name);
     by_bytes_result.expect(name);
+    assert_eq!(decoder.skipped(), by_bytes.skipped(), "{name}");
+    let skipped = decoder.skipped().iter().map(|skipped| letters(skipped.chunk));
+    let skipped = skipped.collect::<Vec<_>>().join(" ");
+    assert_eq!(name.starts_with("skip-"), !skipped.is_empty(), "{name}: {skipped}");
     for request in requests {
         let crc = render(&decoder, &request.options());
         for reference in [false, true] {
@@ -198,6 +211,9 @@ fn lines(vector: &Vector) -> String {
         let shows = if lines.is_empty() { shows } else { "" };
         writeln!(lines, "{name}.gip\t{}\t{crc:08x}\t{shows}", request.name()).expect("a string");
     }
+    if !skipped.is_empty() {
+        writeln!(lines, "{name}.gip\tskips\t{skipped}\t").expect("a string");
+    }
     lines
 }
 
@@ -206,9 +222,12 @@ fn the_folder_holds_what_the_specification_describes() {
     let folder = Path::new(FOLDER);
     let vectors = [
         sound::valid(),
+        metadata::valid(),
+        sums::valid(),
         entropy::valid(),
         texture::valid(),
         broken::invalid(),
+        metadata::skipping(),
         entropy::invalid(),
         texture::invalid(),
     ];

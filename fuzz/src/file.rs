@@ -208,13 +208,13 @@ impl File {
             is_sound &= match &kind[..] {
                 b"H" | b"L" | b"E" | b"tXTR" => true,
                 b"tEXt" => is_text(payload),
-                b"iCCP" | b"xMPd" => !appears_twice,
+                b"iCCP" | b"xMPD" => !appears_twice,
                 b"cICP" => !appears_twice && matches!(payload[..], [_, _, 0, 1]),
                 b"mDCV" => !appears_twice && payload.len() == 24,
                 b"cLLI" => !appears_twice && payload.len() == 8,
-                b"eXIf" if first_layer.is_none_or(|layer| place < layer) => !appears_twice,
+                b"eXIF" if first_layer.is_none_or(|layer| place < layer) => !appears_twice,
                 // Arbitrary bytes may turn the picture, or not.
-                b"eXIf" => match payload.strip_prefix(EXIF)? {
+                b"eXIF" => match payload.strip_prefix(EXIF)? {
                     [orientation, 0, 0, 0, 0, 0, 0, 0] => {
                         !appears_twice && !(2..=8).contains(orientation)
                     }
@@ -327,8 +327,8 @@ impl ExtraKind {
     fn name(&self) -> Vec<u8> {
         let name = match *self {
             Self::IccProfile => *b"iCCP",
-            Self::Exif | Self::Orientation(_) => *b"eXIf",
-            Self::Xmp => *b"xMPd",
+            Self::Exif | Self::Orientation(_) => *b"eXIF",
+            Self::Xmp => *b"xMPD",
             Self::Text => *b"tEXt",
             Self::ColorSpace(_) => *b"cICP",
             Self::MasteringDisplay => *b"mDCV",

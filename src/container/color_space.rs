@@ -1,9 +1,6 @@
 //! What the samples stand for, in codes: the chunks `cICP`, `mDCV` and `cLLI` (spec, section 5.5), whose payloads are
 //! those of PNG's chunks of these names.
 
-use crate::chunk::ChunkType;
-use crate::error::DecodeError;
-
 /// The colour space of the samples, as two coding-independent code points (Rec. ITU-T H.273; PNG, third edition,
 /// chunk `cICP`). Samples are RGB in full range, or gray; the matrix coefficients are 0.
 ///
@@ -67,18 +64,13 @@ impl Cicp {
         Self { primaries, transfer }
     }
 
-    /// The colour space of a payload; `None` if it has the wrong length.
-    ///
-    /// # Errors
-    /// When samples are transformed by a matrix, or are not of full range.
-    pub(super) fn parse(payload: &[u8]) -> Result<Option<Self>, DecodeError> {
-        let &[primaries, transfer, matrix, range] = payload else { return Ok(None) };
-        let (what, value) = match (matrix, range) {
-            (0, 1) => return Ok(Some(Self { primaries, transfer })),
-            (0, _) => ("full range flag", range),
-            _ => ("matrix coefficients", matrix),
-        };
-        Err(DecodeError::unsupported(ChunkType::CICP, what, value.into()))
+    /// The colour space of a payload. `None` if it has the wrong length, or samples that are transformed by a matrix
+    /// or are not of full range.
+    pub(super) fn parse(payload: &[u8]) -> Option<Self> {
+        match *payload {
+            [primaries, transfer, 0, 1] => Some(Self { primaries, transfer }),
+            _ => None,
+        }
     }
 
     /// The payload of the chunk `cICP`, in `.gip` as in PNG.
@@ -162,7 +154,6 @@ mod tests {
         let bytes = light.to_bytes();
         assert_eq!(bytes, [0x00, 0x98, 0x96, 0x80, 0x00, 0x26, 0x25, 0xA0]);
         assert_eq!(ContentLight::parse(&bytes), Some(light));
-        let found = Cicp::parse(&Cicp::BT2100_PQ.to_bytes()).unwrap();
-        assert_eq!(found, Some(Cicp::BT2100_PQ));
+        assert_eq!(Cicp::parse(&Cicp::BT2100_PQ.to_bytes()), Some(Cicp::BT2100_PQ));
     }
 }

@@ -8,7 +8,6 @@ use super::exif;
 use crate::chunk::ChunkType;
 #[cfg(feature = "encode")]
 use crate::chunk::MAX_CHUNK_LENGTH;
-use crate::error::DecodeError;
 use crate::orientation::Orientation;
 
 /// Most bytes of a keyword.
@@ -73,7 +72,7 @@ impl Metadata {
     }
 
     /// Whether Exif data say that the picture is to be turned.
-    pub(crate) fn turns(exif: &[u8]) -> bool {
+    fn turns(exif: &[u8]) -> bool {
         exif::orientation(exif).unwrap_or_default() != Orientation::NoTransforms
     }
 
@@ -85,44 +84,34 @@ impl Metadata {
         }
     }
 
-    /// Adds the payload of a metadata chunk. A second one of anything but texts is an error.
-    pub(crate) fn insert(&mut self, chunk: ChunkType, payload: Vec<u8>) -> Result<(), DecodeError> {
-        let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
-        if self.has(chunk) {
-            return malformed("appears twice");
-        }
-        let is_whole = match chunk {
-            ChunkType::CICP => {
-                self.cicp = Cicp::parse(&payload)?;
-                self.cicp.is_some()
-            }
+    /// Adds the payload of a metadata chunk.
+    ///
+    /// # Errors
+    /// When it breaks a rule: which one. Nothing is added then.
+    pub(crate) fn insert(
+        &mut self,
+        chunk: ChunkType,
+        payload: Vec<u8>,
+    ) -> Result<(), &'static str> {
+        let wrong = "has a wrong length or content";
+        match chunk {
+            ChunkType::CICP => self.cicp = Some(Cicp::parse(&payload).ok_or(wrong)?),
             ChunkType::MDCV => {
-                self.mastering_display = MasteringDisplay::parse(&payload);
-                self.mastering_display.is_some()
+                self.mastering_display = Some(MasteringDisplay::parse(&payload).ok_or(wrong)?);
             }
             ChunkType::CLLI => {
-                self.content_light = ContentLight::parse(&payload);
-                self.content_light.is_some()
+                self.content_light = Some(ContentLight::parse(&payload).ok_or(wrong)?);
             }
-            ChunkType::ICCP | ChunkType::EXIF | ChunkType::XMP => {
-                let blob = match chunk {
-                    ChunkType::ICCP => &mut self.icc_profile,
-                    ChunkType::EXIF => &mut self.exif,
-                    _ => &mut self.xmp,
-                };
-                *blob = Some(payload);
-                true
-            }
-            _ => {
-                self.texts.push(Text::parse(&payload)?);
-                true
-            }
-        };
-        if is_whole { Ok(()) } else { malformed("has the wrong length") }
+            ChunkType::ICCP => self.icc_profile = Some(payload),
+            ChunkType::EXIF => self.exif = Some(payload),
+            ChunkType::XMP => self.xmp = Some(payload),
+            _ => self.texts.push(Text::parse(&payload)?),
+        }
+        Ok(())
     }
 
     /// Whether there is what a chunk holds that may be there once.
-    fn has(&self, chunk: ChunkType) -> bool {
+    pub(crate) fn has(&self, chunk: ChunkType) -> bool {
         match chunk {
             ChunkType::CICP => self.cicp.is_some(),
             ChunkType::MDCV => self.mastering_display.is_some(),
@@ -134,33 +123,36 @@ impl Metadata {
         }
     }
 
-    /// Checks a chunk that is copied as it is. Profiles, Exif and XMP may be anything.
+    /// Whether a chunk that is copied as it is has a sound payload.
     #[cfg(feature = "encode")]
-    pub(crate) fn check_payload(chunk: ChunkType, payload: &[u8]) -> Result<(), DecodeError> {
+    pub(crate) fn is_sound(chunk: ChunkType, payload: &[u8]) -> bool {
         match chunk {
             ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI => {
-                Self::default().insert(chunk, payload.into())
+                Self::default().insert(chunk, payload.into()).is_ok()
             }
-            _ => Ok(()),
+            // Profiles, Exif and XMP may be anything.
+            _ => true,
         }
     }
 
-    /// Whether a chunk of metadata says how the picture is shown: its colours, or that it is turned.
-    #[cfg(feature = "encode")]
+    /// Whether a chunk says which colours the samples stand for: it must come before the first layer.
+    pub(crate) fn is_of_color(chunk: ChunkType) -> bool {
+        use ChunkType as Type;
+
+        matches!(chunk, Type::CICP | Type::MDCV | Type::CLLI | Type::ICCP)
+    }
+
+    /// Whether a chunk of metadata says how the picture is shown: its colours, or that it is turned. Such a one must
+    /// come before the first layer.
     pub(crate) fn is_of_display(chunk: ChunkType, payload: &[u8]) -> bool {
-        match chunk {
-            ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI | ChunkType::ICCP => true,
-            ChunkType::EXIF => Self::turns(payload),
-            _ => false,
-        }
+        Self::is_of_color(chunk) || chunk == ChunkType::EXIF && Self::turns(payload)
     }
 
     /// Whether a chunk is metadata, which [`Metadata::insert`] takes.
     pub(crate) fn includes(chunk: ChunkType) -> bool {
         use ChunkType as Type;
 
-        matches!(chunk, Type::CICP | Type::MDCV | Type::CLLI)
-            || matches!(chunk, Type::ICCP | Type::EXIF | Type::XMP | Type::TEXT)
+        Self::is_of_color(chunk) || matches!(chunk, Type::EXIF | Type::XMP | Type::TEXT)
     }
 
     /// An upper bound of the memory that is held, in bytes.
@@ -221,22 +213,19 @@ impl Text {
         Self { keyword: keyword.into(), text: text.into() }
     }
 
-    fn parse(payload: &[u8]) -> Result<Self, DecodeError> {
-        const CHUNK: ChunkType = ChunkType::TEXT;
-        let nul = payload
-            .iter()
-            .position(|&byte| byte == 0)
-            .ok_or_else(|| DecodeError::malformed(CHUNK, "no NUL after the keyword"))?;
+    /// The text of a payload, or the rule that it breaks.
+    fn parse(payload: &[u8]) -> Result<Self, &'static str> {
+        let nul = payload.iter().position(|&byte| byte == 0).ok_or("no NUL after the keyword")?;
         if !(1..=MAX_KEYWORD).contains(&nul) {
-            return Err(DecodeError::malformed(CHUNK, "the keyword is not 1 to 79 bytes long"));
+            return Err("the keyword is not 1 to 79 bytes long");
         }
         let utf8 = |bytes| match core::str::from_utf8(bytes) {
             Ok(text) => Ok(String::from(text)),
-            Err(_) => Err(DecodeError::malformed(CHUNK, "is not UTF-8")),
+            Err(_) => Err("is not UTF-8"),
         };
         let (keyword, text) = (utf8(&payload[..nul])?, utf8(&payload[nul + 1..])?);
         if text.contains('\0') {
-            return Err(DecodeError::malformed(CHUNK, "a NUL in the text"));
+            return Err("a NUL in the text");
         }
         Ok(Self { keyword, text })
     }

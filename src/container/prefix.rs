@@ -36,8 +36,8 @@ pub struct Prefix {
 pub struct Prefixes<'a> {
     header: Header,
     dequantizer: Option<Dequantizer>,
-    /// Chunks to keep, each with the number of layers before it.
-    kept: Vec<(usize, ChunkType, &'a [u8])>,
+    /// Chunks to keep, all of which stand before the first layer.
+    kept: Vec<(ChunkType, &'a [u8])>,
     layers: Vec<Layer<'a>>,
 }
 
@@ -115,12 +115,12 @@ impl<'a> Prefixes<'a> {
                 let gaussians = declared.take(&mut bytes)?;
                 self.layers.push(Layer { gaussians, bytes, end, gaussians_before, bytes_before });
             }
-            _ if Metadata::is_of_display(chunk, payload) => {
-                if self.kept.iter().any(|(_, kept, _)| *kept == chunk) {
-                    return Err(DecodeError::malformed(chunk, "appears twice"));
+            // Others break a rule if they stand after the first layer: decoders skip them.
+            _ if Metadata::is_of_display(chunk, payload) && self.layers.is_empty() => {
+                let is_second = self.kept.iter().any(|(kept, _)| *kept == chunk);
+                if !is_second && Metadata::is_sound(chunk, payload) {
+                    self.kept.push((chunk, payload));
                 }
-                Metadata::check_payload(chunk, payload)?;
-                self.kept.push((self.layers.len(), chunk, payload));
             }
             _ if !chunk.is_critical() => {}
             _ => return Err(DecodeError::unknown_critical(chunk)),
@@ -166,10 +166,10 @@ impl<'a> Prefixes<'a> {
         let gaussians = layers.iter().map(|layer| layer.gaussians).sum();
         let mut file = ChunkWriter::new();
         file.chunk(ChunkType::HEADER, &[&self.header(layers.len(), gaussians)]);
+        for (kind, payload) in &self.kept {
+            file.chunk(*kind, &[payload]);
+        }
         for (number, layer) in layers.iter().enumerate() {
-            for (_, kind, payload) in self.kept.iter().filter(|(before, ..)| *before == number) {
-                file.chunk(*kind, &[payload]);
-            }
             let count = LayerCount::written(layer.gaussians, number + 1 == layers.len());
             file.chunk(ChunkType::LAYER, &[&count, layer.bytes]);
         }
@@ -178,8 +178,8 @@ impl<'a> Prefixes<'a> {
 
     /// The length of the file that ends with this layer, before which there are `before` layers.
     fn length(&self, before: usize, last: &Layer<'_>) -> usize {
-        let kept = self.kept.iter().filter(|(layers, ..)| *layers <= before);
-        let kept = kept.map(|(_, kind, payload)| kind.framed(payload.len())).sum::<usize>();
+        let kept = self.kept.iter().map(|(kind, payload)| kind.framed(payload.len()));
+        let kept = kept.sum::<usize>();
         let header = self.header(before + 1, last.gaussians_before + last.gaussians);
         ChunkWriter::length(header.len(), kept + last.bytes_before + last.framed(true))
     }

@@ -10,7 +10,7 @@ use crate::coding::entropy::{AttributeBits, Quantization};
 use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{PackedLayerReader, Quantizer};
 use crate::container::{Dequantizer, Header, Metadata};
-use crate::error::DecodeError;
+use crate::error::{DecodeError, Reason, SkippedChunk};
 use crate::gaussian::Gaussian;
 use crate::layers::bounds::LayerBounds;
 use crate::limits::Limits;
@@ -21,6 +21,8 @@ use crate::threads::Threads;
 
 /// Most bytes in the payload of the header (spec, section 5.1).
 const MAX_HEADER: u32 = 255;
+/// Most skipped chunks that are listed: there may be as many as a file has bytes.
+const MAX_SKIPPED: usize = 16;
 
 /// What the chunks of a file contain, as far as they have arrived.
 #[derive(Debug, Default)]
@@ -38,6 +40,8 @@ pub(super) struct ChunkDecoder {
     /// Entropy-coded layers that have arrived and are not decoded yet.
     pending: PendingLayers,
     pub(super) metadata: Metadata,
+    /// Chunks that broke a rule, at most [`MAX_SKIPPED`].
+    pub(super) skipped: Vec<SkippedChunk>,
     /// The Gaussians that are decoded, in file order.
     pub(super) gaussians: Vec<Gaussian>,
     /// The bits of entropy-coded Gaussians, if they are to be counted.
@@ -143,6 +147,11 @@ impl ChunkDecoder {
 
     /// Begins a chunk with a payload of `length` bytes.
     pub(super) fn begin(&mut self, chunk: ChunkType, length: u32) -> Result<(), DecodeError> {
+        if let Some(reason) = self.flaw_of_place(chunk) {
+            self.skip(chunk, reason.into());
+            self.stage = Stage::Skip;
+            return Ok(());
+        }
         self.stage = match self.stage_of(chunk, length) {
             Err(DecodeError::Limit { .. }) if self.pending.count() > 0 => {
                 // Decoding the pending layers frees their memory.
@@ -154,27 +163,58 @@ impl ChunkDecoder {
         Ok(())
     }
 
+    /// Why an ancillary chunk may not stand here, as far as its type shows.
+    fn flaw_of_place(&self, chunk: ChunkType) -> Option<&'static str> {
+        let is_second = match chunk {
+            ChunkType::BNDS => self.bounds.is_some(),
+            ChunkType::TXTR => self.texture.is_some(),
+            _ => self.metadata.has(chunk),
+        };
+        match chunk {
+            _ if is_second => Some("appears twice"),
+            _ if Metadata::is_of_color(chunk) => self.flaw_of_display(),
+            _ => None,
+        }
+    }
+
+    /// Why a chunk that says how the picture is shown may not stand here: it may have been shown by now.
+    fn flaw_of_display(&self) -> Option<&'static str> {
+        (!self.layers.is_empty()).then_some("stands after the first layer")
+    }
+
+    /// Notes that a chunk is skipped, as it breaks a rule.
+    fn skip(&mut self, chunk: ChunkType, reason: Reason) {
+        if self.skipped.len() < MAX_SKIPPED {
+            self.skipped.push(SkippedChunk { chunk, reason });
+        }
+    }
+
     /// Checks that a chunk may stand here, and decides what becomes of its payload.
     fn stage_of(&self, chunk: ChunkType, length: u32) -> Result<Stage, DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
         let Some(header) = &self.header else {
             return match chunk {
-                ChunkType::HEADER if length > MAX_HEADER => malformed("is too long"),
+                ChunkType::HEADER if length > MAX_HEADER => {
+                    Err(DecodeError::unsupported(chunk, "length", length))
+                }
                 ChunkType::HEADER => Ok(Stage::collect(length)),
                 _ => malformed("stands before the header"),
             };
         };
         match chunk {
             ChunkType::HEADER => malformed("appears twice"),
-            ChunkType::BNDS if self.bounds.is_some() => malformed("appears twice"),
-            ChunkType::TXTR if self.texture.is_some() => malformed("appears twice"),
             ChunkType::LAYER if self.layers.len() == usize::from(header.layers) => {
                 malformed("more layers than the header declares")
             }
             ChunkType::LAYER if self.quantization.is_some() => self.collect_within_limits(length),
             ChunkType::LAYER => {
-                let layer = PackedLayerReader::new(length, self.next_count(header));
+                let mut layer = PackedLayerReader::new(length, self.next_count(header));
+                // Of the last layer, the length says at once whether it is right.
+                layer.count(&mut &[][..], &self.quantizers)?;
                 Ok(Stage::Layer(layer, self.gaussians.len()))
+            }
+            ChunkType::END if self.layers.len() < usize::from(header.layers) => {
+                malformed("fewer layers than the header declares")
             }
             ChunkType::END if length != 0 => malformed("is not empty"),
             ChunkType::END => Ok(Stage::Skip),
@@ -240,23 +280,11 @@ impl ChunkDecoder {
                 let count = self.pending.push(payload, declared, self.layers.len())?;
                 self.count_layer(count);
             }
-            (ChunkType::BNDS, Stage::Collect { payload, .. }) => {
-                let Some(header) = &self.header else { return Ok(()) };
-                self.bounds = Some(LayerBounds::parse_all(payload, header)?);
-            }
-            (ChunkType::TXTR, Stage::Collect { payload, .. }) => {
-                let payload = core::mem::take(payload);
-                self.insert_texture(&payload)?;
-            }
             (_, Stage::Collect { payload, .. }) => {
                 let payload = core::mem::take(payload);
-                // What has been shown is not turned afterwards.
-                let is_late_exif = chunk == ChunkType::EXIF && !self.layers.is_empty();
-                if is_late_exif && Metadata::turns(&payload) {
-                    let reason = "an orientation after the first layer";
-                    return Err(DecodeError::malformed(chunk, reason));
+                if let Err(reason) = self.insert(chunk, payload)? {
+                    self.skip(chunk, reason);
                 }
-                self.metadata.insert(chunk, payload)?;
             }
             (_, Stage::Layer(layer, before)) => {
                 layer.finish()?;
@@ -264,11 +292,6 @@ impl ChunkDecoder {
                 self.count_layer(count as u32);
             }
             (ChunkType::END, _) => {
-                let declared = self.header.as_ref().map_or(0, |header| header.layers.into());
-                if self.layers.len() != declared {
-                    let reason = "fewer layers than the header declares";
-                    return Err(DecodeError::malformed(chunk, reason));
-                }
                 self.stage = Stage::Complete;
                 return Ok(());
             }
@@ -285,17 +308,45 @@ impl ChunkDecoder {
         self.layers.push(count);
     }
 
-    /// Decodes the texture, if there is memory for it and for all Gaussians.
-    fn insert_texture(&mut self, payload: &[u8]) -> Result<(), DecodeError> {
-        self.texture = match self.texture_of(payload) {
+    /// Takes what an ancillary chunk has, or says which rule it breaks.
+    ///
+    /// # Errors
+    /// When a limit is exceeded, or a layer is malformed that is decoded to free its memory.
+    fn insert(
+        &mut self,
+        chunk: ChunkType,
+        payload: Vec<u8>,
+    ) -> Result<Result<(), Reason>, DecodeError> {
+        let flaw = match (chunk, &self.header) {
+            (ChunkType::TXTR, _) => return self.insert_texture(&payload),
+            (ChunkType::BNDS, Some(header)) => {
+                LayerBounds::parse_all(&payload, header).map(|bounds| self.bounds = Some(bounds))
+            }
+            _ => match self.flaw_of_display() {
+                Some(reason) if Metadata::is_of_display(chunk, &payload) => Err(reason),
+                _ => self.metadata.insert(chunk, payload),
+            },
+        };
+        Ok(flaw.map_err(Reason::from))
+    }
+
+    /// Decodes the texture, if there is memory for it and for all Gaussians, or says which rule it breaks.
+    fn insert_texture(&mut self, payload: &[u8]) -> Result<Result<(), Reason>, DecodeError> {
+        let texture = match self.texture_of(payload) {
             Err(DecodeError::Limit { .. }) if self.pending.count() > 0 => {
                 // Decoding the pending layers frees their memory.
                 self.decode_pending(Threads::One)?;
-                self.texture_of(payload)?
+                self.texture_of(payload)
             }
-            texture => texture?,
+            texture => texture,
         };
-        Ok(())
+        match texture {
+            Ok(texture) => self.texture = texture,
+            Err(DecodeError::Malformed { reason, .. }) => return Ok(Err(reason)),
+            Err(DecodeError::Unsupported { what, .. }) => return Ok(Err(what.to_string().into())),
+            Err(error) => return Err(error),
+        }
+        Ok(Ok(()))
     }
 
     /// The texture of a payload. `None` before the header.

@@ -68,8 +68,9 @@ impl<R: Read> Decoder<R> {
         self.stream.header().expect("`new_with_limits` read it")
     }
 
-    /// The metadata that was read: ICC profile, Exif, XMP and texts. An orientation is always there; the rest may
-    /// stand after layers, so that all of it is known after [`Decoder::read_metadata`] or a `decode_into`.
+    /// The metadata that was read. What says how the picture is shown is always there: its colours and its
+    /// orientation. The rest may stand after layers, so that all of it is known after [`Decoder::read_metadata`] or a
+    /// `decode_into`, and as far as it was read if the file is damaged.
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         self.stream.metadata()

@@ -10,7 +10,7 @@ use crate::coding::entropy::AttributeBits;
 use crate::coding::entropy::{Quantization, QuantizationSteps};
 use crate::coding::packed::Quantizer;
 use crate::container::{Event, Header, Metadata, Parser};
-use crate::error::DecodeError;
+use crate::error::{DecodeError, SkippedChunk};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 use crate::orientation::Orientation;
@@ -215,6 +215,13 @@ impl StreamDecoder {
     #[must_use]
     pub fn metadata(&self) -> &Metadata {
         &self.chunks.metadata
+    }
+
+    /// Chunks that break a rule, and so are not in the other results: a picture is shown without them (spec, section
+    /// 4.3). At most 16 are listed.
+    #[must_use]
+    pub fn skipped(&self) -> &[SkippedChunk] {
+        &self.chunks.skipped
     }
 
     /// How the picture is to be turned for display; `None` until it is known: until the Exif data or

@@ -3,9 +3,7 @@
 
 use alloc::vec::Vec;
 
-use crate::chunk::ChunkType;
 use crate::container::Header;
-use crate::error::DecodeError;
 #[cfg(feature = "encode")]
 use crate::gaussian::Gaussian;
 #[cfg(feature = "std")]
@@ -35,14 +33,16 @@ impl LayerBounds {
     const LENGTH: usize = 4;
 
     /// Reads the payload of `bNDS`: the bounds of all layers that the header declares.
-    pub(crate) fn parse_all(payload: &[u8], header: &Header) -> Result<Vec<Self>, DecodeError> {
-        let malformed = |reason| Err(DecodeError::malformed(ChunkType::BNDS, reason));
+    ///
+    /// # Errors
+    /// When it breaks a rule: which one.
+    pub(crate) fn parse_all(payload: &[u8], header: &Header) -> Result<Vec<Self>, &'static str> {
         if payload.len() != usize::from(header.layers) * Self::LENGTH {
-            return malformed("has not as many entries as there are layers");
+            return Err("has not as many entries as there are layers");
         }
         let (entries, _) = payload.as_chunks::<{ Self::LENGTH }>();
         if entries.iter().any(|[left, top, right, bottom]| left > right || top > bottom) {
-            return malformed("a layer ends before it begins");
+            return Err("a layer ends before it begins");
         }
         let read = |&[left, top, right, bottom]: &[u8; Self::LENGTH]| Self {
             first: [left, top],

@@ -108,7 +108,7 @@ impl<const WIDTH: usize> TileGrid<WIDTH> {
     }
 
     /// For each of at most sixteen Gaussians the rows of tiles that it may touch, and an upper
-    /// bound of the number of tiles in any of these rows.
+    /// bound of the number of tiles in any of these rows. There are none if it lies beside the region.
     pub(super) fn extents(
         &self,
         backend: Backend,
@@ -145,16 +145,21 @@ impl<const WIDTH: usize> TileGrid<WIDTH> {
         }
         ellipses.widen(view);
         let footprints = Footprints::new(&ellipses, cutoff);
-        let [first, end] =
-            tiles(footprints.rows(), self.region.y, self.region.height, TILE_HEIGHT, truncate);
+        let Region { x, y, width, height } = self.region;
+        let [first, end] = tiles(footprints.rows(), y, height, TILE_HEIGHT, &truncate);
+        let ends = footprints.columns(y as f32, (y + height) as f32);
+        let [left, right] = tiles(ends, x, width, WIDTH, truncate);
         let widths = footprints.widest(TILE_HEIGHT as f32);
         let mut extents = [Extent::default(); LANES];
         for (lane, extent) in extents.iter_mut().enumerate() {
             // The cast saturates. Two tiles more than the width, since both ends may lie within a
             // tile.
             let columns = (widths[lane] * (1.0 / WIDTH as f32)) as u32;
-            let columns = columns.saturating_add(2).min(self.columns as u32);
-            let (first, end) = (first[lane] as u32, end[lane] as u32);
+            let within = (right[lane] - left[lane]).max(0) as u32;
+            let columns = columns.saturating_add(2).min(within);
+            // What lies beside the region has no rows.
+            let end = if within == 0 { 0 } else { end[lane] as u32 };
+            let first = first[lane] as u32;
             *extent = Extent { first: first.min(end), end, columns };
         }
         extents

@@ -27,7 +27,7 @@ impl Texture {
     /// Reads a payload. `check` decides whether so many Gaussians may be decoded.
     ///
     /// # Errors
-    /// When the payload is malformed or has more Gaussians than the map has nodes, and those of `check`.
+    /// When the payload breaks a rule, which may be that of a layer, and those of `check`.
     pub(crate) fn parse(
         payload: &[u8],
         picture: &Header,
@@ -43,13 +43,12 @@ impl Texture {
         if u64::from(count) > u64::from(header.width) * u64::from(header.height) {
             return Err(fields.malformed("more Gaussians than nodes"));
         }
-        let named = |error: DecodeError| error.in_chunk(ChunkType::TXTR);
         let bytes = fields.rest();
-        LayerCoder::check_count(count, bytes).map_err(named)?;
+        LayerCoder::check_count(count, bytes)?;
         check(count)?;
         let coder = header.layer_coder(&quantization);
         let mut gaussians = vec![Gaussian::NOTHING; count as usize];
-        coder.read_gaussians(bytes, None, header.color, &mut gaussians).map_err(named)?;
+        coder.read_gaussians(bytes, None, header.color, &mut gaussians)?;
         Ok(Self { header, gaussians })
     }
 

@@ -154,7 +154,7 @@ fn thumbnails_have_what_is_safe_and_all_else_has_all_unless_asked_otherwise() {
     );
 }
 
-/// The file with its metadata behind the layers.
+/// The file with such metadata as may stand there behind the layers.
 fn with_late_metadata(file: &[u8]) -> Vec<u8> {
     let (mut early, mut late) = (SIGNATURE.to_vec(), Vec::new());
     let mut rest = &file[SIGNATURE.len()..];
@@ -162,7 +162,8 @@ fn with_late_metadata(file: &[u8]) -> Vec<u8> {
         let length = chunk(kind(rest), payload(rest)).len();
         let (found, later) = rest.split_at(length);
         rest = later;
-        let place = if kind(found) == b"H" || kind(found) == b"L" { &mut early } else { &mut late };
+        let is_early = [&b"H"[..], b"L", b"iCCP"].contains(&kind(found));
+        let place = if is_early { &mut early } else { &mut late };
         place.extend_from_slice(found);
     }
     assert!(!late.is_empty());

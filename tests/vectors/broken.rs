@@ -5,16 +5,15 @@ use super::common::{
     EXPONENTIAL, Entry, File, Header, SIGNATURE, checked, chunk, crc32, of_chunks, offsets, packed,
     quantizers,
 };
-use super::sound::{MASTERING, TURNED};
 
 /// A file of four Gaussians in floats, whose parts are changed. Its chunks are H, three layers and E.
-struct Sound {
+pub(super) struct Sound {
     entries: Vec<Entry>,
     /// The bytes of a Gaussian.
     gaussian: Vec<u8>,
     /// Its codes.
     codes: [u32; 6],
-    file: File,
+    pub(super) file: File,
     bytes: Vec<u8>,
     chunks: Vec<Vec<u8>>,
     /// Where the chunks begin.
@@ -22,7 +21,7 @@ struct Sound {
 }
 
 impl Sound {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         let entries = vec![Entry::FLOAT; 6];
         let codes = [8.0_f32, 8.0, 2.0, 0.5, 2.0, 0.5].map(f32::to_bits);
         let layers = vec![codes.to_vec(), codes.repeat(2), codes.to_vec()];
@@ -43,7 +42,7 @@ impl Sound {
     }
 
     /// With other chunks.
-    fn with_chunks(&self, change: impl FnOnce(&mut Vec<Vec<u8>>)) -> Vec<u8> {
+    pub(super) fn with_chunks(&self, change: impl FnOnce(&mut Vec<Vec<u8>>)) -> Vec<u8> {
         let mut chunks = self.chunks.clone();
         change(&mut chunks);
         of_chunks(&chunks)
@@ -53,13 +52,18 @@ impl Sound {
         self.with_chunks(|chunks| chunks[at] = chunk(kind, payload))
     }
 
-    fn inserted(&self, at: usize, kind: &[u8], payload: &[u8]) -> Vec<u8> {
+    pub(super) fn inserted(&self, at: usize, kind: &[u8], payload: &[u8]) -> Vec<u8> {
         self.with_chunks(|chunks| chunks.insert(at, chunk(kind, payload)))
     }
 
     /// With a private chunk before the layers that has these bytes as its length, and a CRC that is right.
     fn with_length(&self, length: &[u8]) -> Vec<u8> {
         self.with_chunks(|chunks| chunks.insert(1, checked(&[b"prVt", length, b"abc"].concat())))
+    }
+
+    /// With these bytes in place of all chunks from one on.
+    fn cut_after(&self, at: usize, bytes: &[&[u8]]) -> Vec<u8> {
+        [&of_chunks(&self.chunks[..at])[..], &bytes.concat()].concat()
     }
 
     /// The header's fields before its quantizers, changed.
@@ -107,6 +111,7 @@ pub(super) fn invalid() -> Vec<Vector> {
         quantizer_entries(&sound),
         layers(&sound),
         order(&sound),
+        first_errors(&sound),
     ]
     .concat()
 }
@@ -380,13 +385,6 @@ fn quantizer_entries(sound: &Sound) -> Vec<Vector> {
 
 /// Layers (section 5.4) and packed codes (section 7.2).
 fn layers(sound: &Sound) -> Vec<Vector> {
-    let padded = {
-        let entries = vec![Entry::linear(3, 1.0, 1.0); 6];
-        let mut bytes = packed(&entries, &[1; 6]);
-        bytes[2] |= 0x80;
-        let header = Header { gaussians: 1, layers: 1, ..Header::default() };
-        of_chunks(&[header.chunk(&quantizers(&entries)), chunk(b"L", &bytes), chunk(b"E", &[])])
-    };
     vec![
         Vector::invalid(
             "xfloat-nan",
@@ -420,11 +418,11 @@ fn layers(sound: &Sound) -> Vec<Vector> {
         Vector::invalid("xlayer-last", "a last layer that begins with its number of Gaussians", {
             sound.replaced(3, b"L", &[&[1][..], &sound.gaussian].concat())
         }),
-        Vector::invalid("xpadding", "a padding bit that is not zero", padded),
+        Vector::invalid("xpadding", "a padding bit that is not zero", padded(None)),
     ]
 }
 
-/// The order of chunks (section 4), and metadata (section 5.5).
+/// The order of chunks (section 4.4).
 fn order(sound: &Sound) -> Vec<Vector> {
     vec![
         Vector::invalid("xorder-header", "a chunk before H", sound.inserted(0, b"prVt", b"")),
@@ -448,68 +446,132 @@ fn order(sound: &Sound) -> Vec<Vector> {
             "a second header, after a layer",
             sound.with_chunks(|chunks| chunks.insert(2, chunks[0].clone())),
         ),
-        Vector::invalid("xtwice-icc", "two ICC profiles", {
-            let profile = chunk(b"iCCP", b"p");
-            sound.with_chunks(|chunks| drop(chunks.splice(1..1, [profile.clone(), profile])))
-        }),
-        Vector::invalid("xtwice-cicp", "a cICP before the layers and one between them", {
-            let points = chunk(b"cICP", &[12, 13, 0, 1]);
-            sound.with_chunks(|chunks| {
-                chunks.insert(2, points.clone());
-                chunks.insert(1, points);
-            })
-        }),
-        Vector::invalid("xtwice-mdcv", "two mDCV", {
-            let display = chunk(b"mDCV", MASTERING);
-            sound.with_chunks(|chunks| drop(chunks.splice(1..1, [display.clone(), display])))
-        }),
-        Vector::invalid("xtwice-clli", "two cLLI", {
-            let light = chunk(b"cLLI", &[0; 8]);
-            sound.with_chunks(|chunks| drop(chunks.splice(1..1, [light.clone(), light])))
-        }),
-        Vector::invalid("xcicp-short", "a cICP without the full range flag", {
-            sound.inserted(1, b"cICP", &[12, 13, 0])
-        }),
-        Vector::invalid("xcicp-long", "a cICP of five bytes, after a layer", {
-            sound.inserted(2, b"cICP", &[12, 13, 0, 1, 0])
-        }),
-        Vector::invalid("xcicp-matrix", "a cICP with the matrix coefficients of BT.709", {
-            sound.inserted(1, b"cICP", &[1, 1, 1, 1])
-        }),
-        Vector::invalid("xcicp-range", "a cICP that says that samples are not of full range", {
-            sound.inserted(1, b"cICP", &[1, 1, 0, 0])
-        }),
-        Vector::invalid("xmdcv-short", "an mDCV of 23 bytes", {
-            sound.inserted(1, b"mDCV", &MASTERING[1..])
-        }),
-        Vector::invalid("xclli-long", "a cLLI of nine bytes, after the last layer", {
-            sound.inserted(4, b"cLLI", &[0; 9])
-        }),
-        Vector::invalid("xtwice-xmp-late", "XMP before the layers and after them", {
-            let xmp = chunk(b"xMPd", b"<x/>");
-            sound.with_chunks(|chunks| {
-                chunks.insert(4, xmp.clone());
-                chunks.insert(1, xmp);
-            })
+        Vector::invalid("xorder-end-payload", "an E before the layers that ends in its payload", {
+            sound.cut_after(1, &[b"E", &[3], b"ab"])
         }),
         Vector::invalid(
-            "xexif-late",
-            "Exif that turns the picture, after the first layer",
-            sound.inserted(2, b"eXIf", TURNED),
+            "xorder-critical",
+            "an unknown critical chunk before H",
+            sound.inserted(0, b"Q", b""),
         ),
         Vector::invalid(
-            "xexif-last",
-            "Exif that turns the picture, after the last layer",
-            sound.inserted(4, b"eXIf", TURNED),
+            "xorder-type",
+            "a chunk before H whose type is not of letters alone",
+            sound.inserted(0, b"a1bc", b""),
         ),
-        Vector::invalid("xtext", "a text without the NUL after its keyword", {
-            sound.inserted(1, b"tEXt", b"Title: none")
-        }),
-        Vector::invalid("xtext-utf8", "a text that is not UTF-8", {
-            sound.inserted(1, b"tEXt", b"Title\0\xE9")
-        }),
-        Vector::invalid("xtext-late", "a text with a NUL, after the last layer", {
-            sound.inserted(4, b"tEXt", b"Title\0a\0b")
-        }),
     ]
+}
+
+/// Which error comes first, where there are two or the file is cut off (section 11).
+fn first_errors(sound: &Sound) -> Vec<Vector> {
+    let wrong_crc = |kind: &[u8], payload: &[u8]| {
+        let mut chunk = chunk(kind, payload);
+        *chunk.last_mut().expect("a CRC") ^= 1;
+        chunk
+    };
+    let with = |at: usize, chunk: Vec<u8>| sound.with_chunks(|chunks| chunks.insert(at, chunk));
+    let instead = |at: usize, chunk: Vec<u8>| sound.with_chunks(|chunks| chunks[at] = chunk);
+    let layer = [&[2][..], &sound.gaussian.repeat(2)].concat();
+    vec![
+        Vector::invalid(
+            "xfirst-critical-crc",
+            "an unknown critical chunk with a wrong CRC",
+            with(2, wrong_crc(b"Q", b"?")),
+        ),
+        Vector::invalid(
+            "xfirst-critical-cut",
+            "an unknown critical chunk, cut off in its payload",
+            sound.cut_after(2, &[b"Q", &[3], b"ab"]),
+        ),
+        Vector::invalid("xfirst-header-twice", "a second H, cut off in its payload", {
+            sound.cut_after(2, &[b"H", &[9], b"ab"])
+        }),
+        Vector::invalid("xfirst-header-long", "an H of 256 bytes, cut off in its payload", {
+            sound.cut_after(0, &[b"H", &[0x80, 2], b"ab"])
+        }),
+        Vector::invalid(
+            "xfirst-header-format",
+            "an H of one byte, whose bit 7 is set",
+            instead(0, chunk(b"H", &[0x80])),
+        ),
+        Vector::invalid(
+            "xfirst-header-crc",
+            "an H with bit 7 set and a wrong CRC",
+            instead(0, wrong_crc(b"H", &[0x80])),
+        ),
+        Vector::invalid(
+            "xfirst-header-side",
+            "a width over 2^20, and a height of 0",
+            sound.with_header(|header| (header.width, header.height) = ((1 << 20) + 1, 0)),
+        ),
+        Vector::invalid(
+            "xfirst-header-quantizer",
+            "an H that ends after the kind of a quantizer, which is not known",
+            instead(0, chunk(b"H", &[&sound.fields(|_| ())[..], &[3]].concat())),
+        ),
+        Vector::invalid("xfirst-layer-many", "a layer too many, cut off in its payload", {
+            sound.cut_after(4, &[b"L", &[9], b"ab"])
+        }),
+        Vector::invalid(
+            "xfirst-layer-number",
+            "a layer with a number too large, cut off after it",
+            sound.cut_after(2, &[b"L", &[49], &[3]]),
+        ),
+        Vector::invalid(
+            "xfirst-layer-length",
+            "a layer whose length does not fit its number, cut off in its first Gaussian",
+            sound.cut_after(2, &[b"L", &[50], &[2], &sound.gaussian[..7]]),
+        ),
+        Vector::invalid(
+            "xfirst-last-length",
+            "a last layer whose length does not fit its Gaussians, cut off after it",
+            sound.cut_after(3, &[b"L", &[25]]),
+        ),
+        Vector::invalid(
+            "xfirst-layer-nan",
+            "a layer with a NaN in its first Gaussian, cut off in the second",
+            {
+                let mut nan = layer[..1 + 24 + 5].to_vec();
+                nan[1 + 4..1 + 8].copy_from_slice(&0x7FC0_0000_u32.to_le_bytes());
+                sound.cut_after(2, &[b"L", &[49], &nan])
+            },
+        ),
+        Vector::invalid(
+            "xfirst-layer-padding",
+            "a layer with a padding bit that is not zero, cut off in its CRC",
+            padded(Some(2)),
+        ),
+        Vector::invalid("xfirst-type", "a type with a digit, cut off before its last byte", {
+            sound.cut_after(2, &[b"a1b"])
+        }),
+        Vector::invalid("xfirst-text-crc", "a broken text with a wrong CRC", {
+            with(1, wrong_crc(b"tEXt", b"Title: none"))
+        }),
+        Vector::invalid("xfirst-icc-cut", "a second ICC profile, cut off in its payload", {
+            let (header, profile) = (&sound.chunks[0], chunk(b"iCCP", b"p"));
+            [&SIGNATURE[..], header, &profile, b"iCCP", &[3], b"ab"].concat()
+        }),
+        Vector::invalid(
+            "xfirst-before-layers",
+            "an unknown critical chunk between H and the first layer, after a text",
+            sound.with_chunks(|chunks| {
+                let text = chunk(b"tEXt", b"Title\0none");
+                drop(chunks.splice(1..1, [text, chunk(b"Q", b"")]));
+            }),
+        ),
+    ]
+}
+
+/// A file whose only layer has a padding bit that is not zero, without its last bytes if they are cut off.
+fn padded(cut: Option<usize>) -> Vec<u8> {
+    let entries = vec![Entry::linear(3, 1.0, 1.0); 6];
+    let mut bytes = packed(&entries, &[1; 6]);
+    bytes[2] |= 0x80;
+    let header = Header { gaussians: 1, layers: 1, ..Header::default() };
+    let layer = chunk(b"L", &bytes);
+    let header = header.chunk(&quantizers(&entries));
+    match cut {
+        Some(missing) => [&SIGNATURE[..], &header, &layer[..layer.len() - missing]].concat(),
+        None => of_chunks(&[header, layer, chunk(b"E", &[])]),
+    }
 }

@@ -13,8 +13,8 @@ const CHUNKS = {
   mDCV: 'Mastering display',
   cLLI: 'Light level',
   iCCP: 'ICC profile',
-  eXIf: 'Exif',
-  xMPd: 'XMP',
+  eXIF: 'Exif',
+  xMPD: 'XMP',
   tEXt: 'text',
 };
 

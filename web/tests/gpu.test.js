@@ -119,7 +119,7 @@ test('WebGPU paints what the decoder renders', { skip: missing, timeout: 180_000
     { name: 'gray', bytes: await encoded(vectorBytes('gray8.gip')), frames: SMALL_FRAMES },
     ...[1, 2, 4, 6, 7].map((orientation) => ({
       name: `orientation ${orientation}`,
-      bytes: makePicture({ layers: [200], chunks: [['eXIf', exif(orientation)], ['tXTR', texture]] }).toString('base64'),
+      bytes: makePicture({ layers: [200], chunks: [['eXIF', exif(orientation)], ['tXTR', texture]] }).toString('base64'),
       frames: TURNED_FRAMES,
     })),
   ];

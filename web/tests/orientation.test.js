@@ -20,7 +20,7 @@ if (!missing) {
 
 /** Opens a file of the picture, and returns its bytes and the view of it. */
 async function openTurned(page, orientation, layers) {
-  const bytes = makePicture({ width: WIDTH, height: HEIGHT, layers, chunks: [['eXIf', exif(orientation)]] });
+  const bytes = makePicture({ width: WIDTH, height: HEIGHT, layers, chunks: [['eXIF', exif(orientation)]] });
   const name = `turned-${orientation}.gip`;
   await drop(page, { name, bytes });
   await page.waitForFunction((name) => document.title.startsWith(name), name);

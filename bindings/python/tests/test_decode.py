@@ -241,7 +241,7 @@ def test_info(photo: Picture) -> None:
     assert len(info.layers) > 1
     layers = next(chunk for chunk in info.chunks if chunk.kind == "L")
     assert layers.count == len(info.layers)
-    assert [chunk.kind for chunk in info.chunks] == ["H", "iCCP", "eXIf", "xMPd", "L", "E"]
+    assert [chunk.kind for chunk in info.chunks] == ["H", "iCCP", "eXIF", "xMPD", "L", "E"]
     signature = 8
     assert signature + sum(chunk.bytes for chunk in info.chunks) == len(file)
     texts = image_gip.info(VECTORS / "metadata.gip").texts

@@ -140,7 +140,7 @@ def test_thumbnails(file: bytes) -> None:
 
 def test_metadata_after_the_layers(file: bytes) -> None:
     parts = chunks(file)
-    late = [Chunk("iCCP", b"profile"), Chunk("eXIf", b"II*\0\x08\0\0\0\0\0\0\0\0\0")]
+    late = [Chunk("iCCP", b"profile"), Chunk("eXIF", b"II*\0\x08\0\0\0\0\0\0\0\0\0")]
     texts = [Chunk("tEXt", b"Title\0A disc"), Chunk("tEXt", b"Author\0Emma")]
     spread = joined([parts[0], texts[0], *parts[1:-1], *late, texts[1], parts[-1]])
     with Image.open(io.BytesIO(spread)) as opened:

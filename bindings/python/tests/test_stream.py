@@ -89,7 +89,7 @@ def test_one_decoder_for_many_threads(file: bytes) -> None:
 
 
 def test_metadata_after_the_layers(file: bytes) -> None:
-    late = [Chunk("iCCP", b"profile"), Chunk("tEXt", b"Title\0A disc"), Chunk("xMPd", b"<x/>")]
+    late = [Chunk("iCCP", b"profile"), Chunk("tEXt", b"Title\0A disc"), Chunk("xMPD", b"<x/>")]
     parts = chunks(file)
     first = 1 + [part.kind for part in parts].index("L")
     spread = joined([*parts[:first], late[0], *parts[first:-1], *late[1:], parts[-1]])
@@ -130,12 +130,12 @@ def test_texture_after_the_layers(textured: bytes) -> None:
 def test_an_orientation_after_a_layer(file: bytes) -> None:
     turned = b"MM\0*\0\0\0\x08\0\1\1\x12\0\3\0\0\0\1\0\6\0\0\0\0\0\0"
     parts = chunks(file)
-    early = joined([parts[0], Chunk("eXIf", turned), *parts[1:]])
+    early = joined([parts[0], Chunk("eXIF", turned), *parts[1:]])
     assert image_gip.info(early).orientation == 6
     stream = StreamDecoder()
     with pytest.raises(image_gip.MalformedError) as raised:
-        stream.feed(moved(early, "eXIf"))
-    assert raised.value.chunk == "eXIf"
+        stream.feed(moved(early, "eXIF"))
+    assert raised.value.chunk == "eXIF"
     assert stream.info is not None
     assert (stream.info.orientation, stream.info.exif) == (1, None)
     assert stream.arrived == image_gip.info(file).gaussians

@@ -38,9 +38,9 @@ function opened(bytes, options) {
 
 test('header, metadata and statistics', () => {
   const chunks = [
-    ['eXIf', Buffer.from('II*\0')],
+    ['eXIF', Buffer.from('II*\0')],
     ['tEXt', Buffer.from('Title\0A picture')],
-    ['xMPd', Buffer.from('<x/>')],
+    ['xMPD', Buffer.from('<x/>')],
   ];
   const bytes = makePicture({ width: 30, height: 20, layers: [3, 4], chunks });
   const decoder = opened(bytes, { statistics: true });
@@ -67,7 +67,7 @@ test('header, metadata and statistics', () => {
   const statistics = decoder.statistics();
   const [end] = statistics.layers.slice(-1);
   assert.equal(end.end + leastChunk, bytes.length, 'all but the last chunk');
-  assert.deepEqual(statistics.chunks.map(({ type }) => type), ['H', 'eXIf', 'tEXt', 'xMPd', 'L', 'E']);
+  assert.deepEqual(statistics.chunks.map(({ type }) => type), ['H', 'eXIF', 'tEXt', 'xMPD', 'L', 'E']);
   assert.equal(statistics.chunks.reduce((sum, chunk) => sum + chunk.bytes, 8), bytes.length);
   assert.deepEqual(statistics.attributeBits, { position: 448, precision: 0, shape: 672, color: 672 });
   assert.equal(statistics.quantizationSteps, null);
@@ -138,7 +138,7 @@ test('what comes after layers is told, and rendered from then on', () => {
   const later = [
     [1, 'iCCP', profile],
     [2, 'tXTR', texture],
-    [2, 'eXIf', exif(1)],
+    [2, 'eXIF', exif(1)],
     [2, 'tEXt', Buffer.from('Title\0A picture')],
   ];
   const bytes = makePicture({ layers, later });
@@ -181,9 +181,9 @@ test('codes of a colour space go into the PNG file', async () => {
 });
 
 test('an orientation comes before the first layer, or the file is refused', () => {
-  const late = makePicture({ layers: [40, 160], later: [[1, 'eXIf', exif(6)]] });
+  const late = makePicture({ layers: [40, 160], later: [[1, 'eXIF', exif(6)]] });
   const decoder = new Decoder();
-  assert.throws(() => decoder.feed(late), { name: 'MalformedError', chunk: 'eXIf' });
+  assert.throws(() => decoder.feed(late), { name: 'MalformedError', chunk: 'eXIF' });
   assert.deepEqual([decoder.orientation, decoder.progress.gaussians], [1, 40]);
   const { width, height } = decoder.render();
   assert.deepEqual([width, height], [96, 64]);

@@ -17,7 +17,7 @@ const sizeOf = (orientation) =>
 /** No more than the element needs at this size. */
 const layers = [20, 70];
 const pictureOf = (orientation, chunks = []) =>
-  makePicture({ width: WIDTH, height: HEIGHT, layers, chunks: [...chunks, ['eXIf', exif(orientation)]] });
+  makePicture({ width: WIDTH, height: HEIGHT, layers, chunks: [...chunks, ['eXIF', exif(orientation)]] });
 
 /** A decoder that has read a file. */
 function opened(bytes) {

@@ -17,7 +17,7 @@ export function chunk(type, payload) {
   return out;
 }
 
-/** Exif data with an orientation, 1 to 8, as the chunk `['eXIf', exif(6)]`. */
+/** Exif data with an orientation, 1 to 8, as the chunk `['eXIF', exif(6)]`. */
 export function exif(orientation) {
   const bytes = Buffer.from('4d4d002a00000008000101120003000000010000000000000000', 'hex');
   bytes.writeUInt16BE(orientation, 18);

@@ -7,8 +7,8 @@ import { file, harness, script, settled, until, withPage } from './harness.js';
 import { exif, makePicture } from './picture.js';
 
 harness.routes['/wide.gip'] = file(makePicture({ width: 90, height: 60, layers: [40] }));
-harness.routes['/square.gip'] = file(makePicture({ width: 60, height: 60, layers: [40], chunks: [['eXIf', exif(6)]] }));
-harness.routes['/tall.gip'] = file(makePicture({ width: 90, height: 60, layers: [40], chunks: [['eXIf', exif(6)]] }));
+harness.routes['/square.gip'] = file(makePicture({ width: 60, height: 60, layers: [40], chunks: [['eXIF', exif(6)]] }));
+harness.routes['/tall.gip'] = file(makePicture({ width: 90, height: 60, layers: [40], chunks: [['eXIF', exif(6)]] }));
 
 /** Where the canvas is in the element. */
 const placeOf = (page) =>

@@ -46,7 +46,12 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
     let image = wanted.decode(&mut decoder).with_context(context)?;
     // Metadata may stand after the layers.
     let metadata = decoder.metadata().clone();
-    Ok(StillImage { image, metadata, warnings: Vec::new() })
+    Ok(StillImage { image, metadata, warnings: skipped(decoder.stream()) })
+}
+
+/// What a user is told of chunks that were skipped.
+pub(crate) fn skipped(stream: &StreamDecoder) -> Vec<String> {
+    stream.skipped().iter().map(ToString::to_string).collect()
 }
 
 /// Decodes as many Gaussians of an invalid file as possible; `None` if the file is valid.
@@ -59,7 +64,8 @@ pub(crate) fn partial(
     let Err(error) = stream.feed(file).and_then(|_| stream.finish()) else { return Ok(None) };
     let Some(picture) = stream.picture() else { bail!(error) };
     let (shown, all) = (picture.gaussians().len(), picture.header().gaussians);
-    let warnings = vec![format!("{error}; showing {shown} of {all} Gaussians")];
+    let mut warnings = skipped(&stream);
+    warnings.push(format!("{error}; showing {shown} of {all} Gaussians"));
     let metadata = stream.metadata().clone();
     let image = wanted(picture.header(), &metadata)?.render(&picture)?;
     Ok(Some(StillImage { image, metadata, warnings }))

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::args;
 use crate::cicp;
+use crate::decode::skipped;
 use crate::encode::bits_per_pixel;
 use crate::files;
 
@@ -62,6 +63,8 @@ struct FileInfo {
     /// `None` without texture.
     texture: Option<Texture>,
     metadata: MetadataSizes,
+    /// Chunks that break a rule and are skipped.
+    warnings: Vec<String>,
 }
 
 /// The texture: the Gaussians of its map, and what its chunk takes.
@@ -308,6 +311,7 @@ impl FileInfo {
                     .map(|text| TextSize { keyword: text.keyword.clone(), bytes: text.text.len() })
                     .collect(),
             },
+            warnings: skipped(stream),
         }
     }
 }
@@ -416,6 +420,9 @@ impl Display for FileInfo {
         }
         for Chunk { name, count, bytes, .. } in &self.chunks {
             row(&format!("chunk {name}"), &format_args!("{count}, {bytes} bytes"))?;
+        }
+        for warning in &self.warnings {
+            row("warning", warning)?;
         }
         let MetadataSizes { icc_profile, exif, xmp, texts, .. } = &self.metadata;
         if let Some(ColorSpace { primaries, transfer }) = self.metadata.cicp {

@@ -40,7 +40,7 @@ fn ratio(number: u8) -> f32 {
 pub(crate) fn read(fields: &mut Fields<'_>) -> Result<f32, DecodeError> {
     match fields.u16()? {
         number if number <= MOST_STEP => Ok(step(number)),
-        _ => Err(fields.malformed("a step of more than 2^10")),
+        number => Err(fields.unsupported("step", number.into())),
     }
 }
 

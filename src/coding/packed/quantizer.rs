@@ -79,23 +79,26 @@ impl Quantizer {
 
     /// Reads an entry of the header (spec, section 6).
     pub(crate) fn parse(fields: &mut Fields<'_>) -> Result<Self, DecodeError> {
-        let (kind, bits) = (fields.u8()?, fields.u8()?);
-        match kind {
-            0 if bits == 32 => return Ok(Self::Float),
-            0 => return Err(fields.malformed("a float that is not 32 bits deep")),
-            1 | 2 => {}
-            kind => return Err(fields.unsupported("quantizer", kind.into())),
+        let kind = fields.u8()?;
+        if kind > 2 {
+            return Err(fields.unsupported("quantizer", kind.into()));
         }
-        let uniform = UniformQuantizer { bits, scale: fields.f32()?, offset: fields.f32()? };
-        if !(1..=16).contains(&bits) {
-            return Err(fields.malformed("a bit depth that is not 1 to 16"));
+        let bits = fields.u8()?;
+        match (kind, bits) {
+            (_, 0) => return Err(fields.malformed("a bit depth of 0")),
+            (0, 32) => return Ok(Self::Float),
+            (1 | 2, 1..=16) => {}
+            _ => return Err(fields.unsupported("bit depth", bits.into())),
         }
-        if !(uniform.scale > 0.0 && uniform.scale <= MAX_PARAMETER) {
+        let scale = fields.f32()?;
+        if !(scale > 0.0 && scale <= MAX_PARAMETER) {
             return Err(fields.malformed("a scale that is not positive and at most 2^32"));
         }
-        if uniform.offset.is_nan() || uniform.offset.abs() > MAX_PARAMETER {
+        let offset = fields.f32()?;
+        if offset.is_nan() || offset.abs() > MAX_PARAMETER {
             return Err(fields.malformed("an offset that is not within +-2^32"));
         }
+        let uniform = UniformQuantizer { bits, scale, offset };
         Ok(if kind == 1 { Self::Linear(uniform) } else { Self::Log(uniform) })
     }
 

@@ -220,6 +220,7 @@ fn decode(
     let image = image.with_context(context)?;
     // Metadata may stand after the layers.
     let metadata = decoder.metadata().clone();
+    warnings.extend(decode::skipped(decoder.stream()));
     let mut picture = StillImage { image, metadata, warnings };
     decode::finish(&mut picture, codec, policy);
     let bytes = codec.encode(&picture).with_context(context)?;

@@ -5,7 +5,7 @@ use anyhow::Result;
 use image_gip::{Decoder, Header, Limits, Metadata, RenderOptions};
 
 use super::stored::Stored;
-use crate::decode::{Wanted, partial};
+use crate::decode::{Wanted, partial, skipped};
 use crate::picture::StillImage;
 
 pub(super) fn read(file: &[u8], limits: &Limits, allow_partial: bool) -> Result<Stored> {
@@ -26,8 +26,9 @@ fn whole(file: &[u8], limits: &Limits) -> Result<StillImage> {
     // Metadata may stand after the layers.
     let metadata = decoder.metadata().clone();
     let has_texture = decoder.picture()?.texture_map().is_some();
-    let warnings = has_texture.then(|| "its texture is left out".to_owned());
-    Ok(StillImage { image, metadata, warnings: warnings.into_iter().collect() })
+    let mut warnings = skipped(decoder.stream());
+    warnings.extend(has_texture.then(|| "its texture is left out".to_owned()));
+    Ok(StillImage { image, metadata, warnings })
 }
 
 fn wanted(header: &Header) -> Wanted {
