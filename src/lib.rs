@@ -13,8 +13,8 @@
 //! whose sum is a picture (the representation of GaussianImage++). It can be rendered at any size
 //! and in any part, at a cost that follows what is shown. Every prefix of the file that
 //! includes the header gives a picture, which every layer improves. The decoder's arithmetic is
-//! specified to the last bit, so the samples are the same on all machines. Version 1 of the format may
-//! change until its first release, and not after it.
+//! specified to the last bit, so the samples are the same on all machines. Version 1 of the format is
+//! fixed: later versions of this crate read its files, and give the same samples.
 //!
 //! # Encode and decode
 //!
