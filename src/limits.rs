@@ -24,8 +24,8 @@ pub struct Limits {
     pub max_memory: u64,
     /// Most kernel evaluations in one rendering beyond 64 for each pixel that is rendered, which is
     /// more than ordinary pictures take. Each Gaussian counts with an upper bound of the pixels that
-    /// it covers: the rows of 8 x 8 tiles that it reaches, times the most tiles that it can reach in
-    /// one of them, times 64. Default 2^32, a few seconds on one core.
+    /// it covers: the rows of 8 x 8 tiles of the region that it reaches, times the most tiles of it
+    /// that it can reach in one of them, times 64. Default 2^32, a few seconds on one core.
     pub max_work: u64,
 }
 
