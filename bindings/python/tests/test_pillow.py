@@ -53,7 +53,7 @@ def test_round_trips(mode: str) -> None:
     assert file.getvalue() == image_gip.encode(samples, psnr=36, effort=1)
     with Image.open(file) as opened:
         assert (opened.format, opened.mode, opened.size) == ("GIP", mode, (60, 45))
-        assert opened.get_format_mimetype() == "image/x-gip"
+        assert opened.get_format_mimetype() == "image/vnd.gip"
         expected = image_gip.decode(file.getvalue())
         np.testing.assert_array_equal(np.asarray(opened), expected)
         again = opened.copy()
