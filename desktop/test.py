@@ -192,6 +192,7 @@ class Declarations(TestCase):
             "desktop/README.md",
             "bindings/python/python/image_gip/pillow.py",
             "bindings/wasm/README.md",
+            "web/serve.js",
         ):
             self.assertIn(MEDIA_TYPE, (FOLDER.parent / name).read_text())
         template = (FOLDER / "media-type.txt").read_text()
