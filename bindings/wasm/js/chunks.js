@@ -73,7 +73,9 @@ function typeAt(bytes, at) {
   const letters = bytes.subarray(at, at + (isAncillary ? 4 : 1));
   if (letters.length < (isAncillary ? 4 : 1)) return null;
   const type = String.fromCharCode(...letters);
-  if (!/^[A-Za-z]+$/.test(type)) throw malformed(type, 'the type is not of letters');
+  const hexadecimal = (letter) => `\\x${letter.charCodeAt(0).toString(16).padStart(2, '0')}`;
+  const shown = type.replace(/[^A-Za-z]/g, hexadecimal);
+  if (shown !== type) throw malformed(shown, 'the type is not of letters');
   return type;
 }
 

@@ -13,7 +13,8 @@ export { GipError, MalformedError, SignatureError, UnexpectedEndError, Unsupport
  * it turns the picture. Texture and other metadata are left out.
  *
  * `bytes` is a file or the beginning of one. Throws a `GipError` if that ends before the header does, or breaks a rule
- * of the format up to the last complete layer. What is copied as it is, such as the Gaussians, is not looked at.
+ * of the format up to the last complete layer. What is copied as it is, such as Gaussians and quantizers, is not looked
+ * at.
  */
 export function prefixes(bytes: Uint8Array): Prefix[];
 

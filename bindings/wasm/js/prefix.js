@@ -10,8 +10,27 @@ export { GipError, MalformedError, SignatureError, UnexpectedEndError, Unsupport
 const mostHeader = 255;
 const mostSide = 2 ** 20;
 const mostLayers = 65_535;
-/** Of the first byte of the header: a bit that is 0 in version 1. */
+
+/** The bits of the first byte of the header. */
+const sixteenBits = 0x04;
+const entropyCoding = 0x08;
+const quartic = 0x10;
+const form = 0x60;
 const reserved = 0x80;
+
+/**
+ * How many bytes of the header follow its numbers: base colour, cut-off, and quantizers or steps. The values are not
+ * looked at but for the kinds of quantizers, which say how long they are.
+ */
+function lengthOfRest(format, hasGaussians, rest) {
+  const channels = (format & 3) + 1;
+  let length = channels * (format & sixteenBits ? 2 : 1) + (format & quartic ? 0 : 4);
+  if (!hasGaussians) return length;
+  if (format & entropyCoding) return length + 2 + (channels - 1) + (format & form ? 8 : 0);
+  // Of position, shape and channels.
+  for (let component = 0; component < 5 + channels; component += 1) length += rest[length] === 0 ? 2 : 10;
+  return length;
+}
 
 /** The header: its numbers of Gaussians and layers, and the bytes before and after them. */
 function readHeader(payload) {
@@ -23,7 +42,9 @@ function readHeader(payload) {
     return value;
   };
   if (payload.length > mostHeader) throw wrong('is longer than 255 bytes');
-  if (payload[0] & reserved) throw unsupported(types.header, `format ${payload[0]}`);
+  const format = payload[0];
+  const mostForm = format & entropyCoding ? 0x20 : 0x40;
+  if (format & reserved || (format & form) > mostForm) throw unsupported(types.header, `format ${format}`);
   for (const side of ['width', 'height']) {
     const value = field();
     if (value === 0) throw wrong(`the ${side} is zero`);
@@ -35,7 +56,10 @@ function readHeader(payload) {
   if (gaussians > 0 && layers === 0) throw wrong('Gaussians, but no layer');
   if (layers > gaussians) throw wrong('more layers than Gaussians');
   if (layers > mostLayers) throw unsupported(types.header, `number of layers ${layers}`);
-  return { gaussians, layers, before, after: payload.subarray(cursor.at) };
+  const after = payload.subarray(cursor.at);
+  const length = lengthOfRest(format, gaussians > 0, after);
+  if (after.length !== length) throw wrong(`is ${after.length < length ? 'shorter' : 'longer'} than its fields`);
+  return { gaussians, layers, before, after };
 }
 
 /** Whether Exif data say that the picture is to be turned (spec, section 5.5). */
