@@ -1,9 +1,14 @@
 //! Files of the first layers of others: what is in them, what they keep, and the encoder's option for a first layer of
 //! a given size.
+//!
+//! `BLESS=1 cargo test --test prefix` writes the table `prefixes.tsv` again.
 
 mod common;
 
-use common::{Entry, File, Header, decode_valid, entropy, of_chunks};
+use std::fs;
+use std::path::Path;
+
+use common::{Entry, File, Header, crc32, decode_valid, entropy, of_chunks};
 use image_gip::{
     Cicp, ColorModel, ContentLight, DecodeError, EncodeError, Encoder, Metadata, OptionError,
     Precision, Prefix, Prefixes, RenderOptions, Source, StreamDecoder, Target, Text,
@@ -159,6 +164,35 @@ fn flaws_are_told() {
     // What follows the end is no part of the file.
     let longer = [of_chunks(&sound), vec![7; 9]].concat();
     assert_eq!(Prefixes::new(&longer).expect("it is sound").iter().len(), 2);
+}
+
+/// The table is what other implementations are compared with, such as that of `bindings/wasm`.
+#[test]
+fn the_vectors_have_the_prefixes_of_the_table() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let index = fs::read_to_string(root.join("spec/vectors/index.tsv")).expect("the index");
+    let names = index.lines().skip(1).filter_map(|line| line.split('\t').next());
+    let mut names: Vec<_> = names.filter(|name| !name.starts_with('x')).collect();
+    names.dedup();
+    let mut found = String::from("file\tlayers\tgaussians\tbytes\tend\tcrc32\n");
+    for name in names {
+        let file = fs::read(root.join("spec/vectors").join(name)).expect("a vector");
+        let prefixes = Prefixes::new(&file).expect("a valid file");
+        for prefix in prefixes.iter() {
+            let Prefix { layers, gaussians, bytes, end, .. } = prefix;
+            let crc = crc32(&prefixes.file(prefix));
+            found += &format!("{name}\t{layers}\t{gaussians}\t{bytes}\t{end}\t{crc:08x}\n");
+        }
+    }
+    let path = root.join("tests/prefixes.tsv");
+    if std::env::var_os("BLESS").is_some() {
+        fs::write(&path, &found).expect("writable");
+    }
+    let table = fs::read_to_string(&path).expect("the table");
+    for (found, expected) in found.lines().zip(table.lines()) {
+        assert_eq!(found, expected);
+    }
+    assert_eq!(found.lines().count(), table.lines().count());
 }
 
 #[test]

@@ -9,7 +9,7 @@ import { assemble, buildDecoder } from './build.js';
 
 const types = {
   '.css': 'text/css; charset=utf-8',
-  '.gip': 'application/octet-stream',
+  '.gip': 'image/vnd.gip',
   '.html': 'text/html; charset=utf-8',
   '.js': 'text/javascript; charset=utf-8',
   '.md': 'text/plain; charset=utf-8',

@@ -61,16 +61,20 @@ run(
 );
 
 // What a page loads is few and small files. The worker is one by itself.
-await build({
-  entryPoints: ['index', 'core', 'gip-image', 'worker'].map((name) => join(scripts, `${name}.js`)),
-  outdir: dist,
-  bundle: true,
-  splitting: true,
-  format: 'esm',
-  target: 'es2022',
-  minify: true,
-  legalComments: 'none',
-});
+const bundle = (names) =>
+  build({
+    entryPoints: names.map((name) => join(scripts, `${name}.js`)),
+    outdir: dist,
+    bundle: true,
+    splitting: true,
+    format: 'esm',
+    target: 'es2022',
+    minify: true,
+    legalComments: 'none',
+  });
+await bundle(['index', 'core', 'gip-image', 'worker']);
+// It is used without the decoder, and shares no file with it: a page would load more and smaller ones.
+await bundle(['prefix']);
 for (const file of readdirSync(scripts)) {
   if (file.endsWith('.d.ts')) cpSync(join(scripts, file), join(dist, file));
 }

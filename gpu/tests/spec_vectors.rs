@@ -42,7 +42,7 @@ fn every_vector_is_close_to_the_decoder() {
         let [name, rendering, _, _] = line.split('\t').collect::<Vec<_>>()[..] else {
             panic!("not four columns: {line}");
         };
-        if rendering == "error" {
+        if rendering == "error" || rendering == "skips" {
             continue;
         }
         let file = fs::read(format!("{VECTORS}/{name}")).expect("a vector");

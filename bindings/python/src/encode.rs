@@ -14,6 +14,7 @@ use pyo3::types::PyBytes;
 
 use crate::array::Picture;
 use crate::errors::{encode_error, warn};
+use crate::light::{DisplayFields, LightFields};
 use crate::numbers::{Integer, Real};
 use crate::objects::Limits;
 use crate::{metadata, threads};
@@ -52,6 +53,10 @@ const NEWS: f64 = 0.002;
 ///     texture: The strength of the texture, 0 (none) to 100. It takes the place of fine irregular detail that
 ///         the file has no bits for, such as sand, water and leaves. Files with tune="psnr", and those with
 ///         another precision than "entropy", have none.
+///     first_layer: Most bytes, 64 to 65536, of the file that the first layer makes: a placeholder, which `prefix`
+///         cuts off, and with which the whole file begins. What says how the picture is shown is in it; other
+///         metadata then stand after it. Default: the first layer has about a tenth of the file. A precision other
+///         than "entropy" has layers of the usual size.
 ///     precision: How the Gaussians are stored: "entropy", for the smallest files; "packed", with codes
 ///         of fixed bit depths; or "f32", the fitted values themselves, in files several times as large.
 ///     threads: The number of threads that work, 1 to 1024. The calling thread only waits for them.
@@ -61,13 +66,17 @@ const NEWS: f64 = 0.002;
 ///     cicp: The colour space of the picture: the codes of its colour primaries and of its transfer characteristics,
 ///         0 to 255, as Rec. ITU-T H.273 has them. (12, 13) is Display P3, (9, 16) is BT.2100 with PQ, (9, 18) with
 ///         HLG. It counts before `icc`. Pictures of PQ are judged as a display of standard range shows them.
+///     mastering_display: The display on which the picture was made: a `MasteringDisplay`, or a tuple of its fields.
+///         Chromaticities are rounded to 0.00002, and luminance to 0.0001 cd/m².
+///     content_light: How bright the picture is: a `ContentLight`, or a tuple of its fields. Both are rounded to
+///         0.0001 cd/m².
 ///     icc: An ICC profile to store with the picture.
 ///     exif: Exif data: a TIFF stream, with or without the prefix that it has in JPEG.
 ///     xmp: An XMP packet: XML in UTF-8.
 ///     texts: Texts by their keywords, such as "Title", "Author" or "Copyright": a mapping, or pairs,
 ///         in the order in which they are stored. A keyword is 1 to 79 bytes of UTF-8; neither has a
 ///         NUL.
-///     metadata: What of the last four is stored: "all"; "safe", which keeps the profile, orientation,
+///     metadata: What of `icc`, `exif`, `xmp` and `texts` is stored: "all"; "safe", which keeps the profile, orientation,
 ///         copyright, artist, description and dates, and drops position, maker notes, thumbnails,
 ///         serial numbers, names of owners, comments and all else; or "none". There is a
 ///         MetadataWarning for a profile other than that of sRGB, without `cicp`, and for an orientation other than
@@ -84,13 +93,13 @@ const NEWS: f64 = 0.002;
 /// Raises:
 ///     TypeError: The array is no array of a type above, or more than one target is given.
 ///     ValueError: The array has another shape, strides or alignment, or floats that are out of range or NaN; an
-///         option is out of range.
+///         option is out of range; no first layer is as small as `first_layer`, and the message says which is.
 ///     LimitError: A decoder with these limits would refuse the file: for the size of the picture, its
 ///         metadata or `gaussians`, before any work is done; for the work of decoding, at the end.
 ///     CancelledError: `progress` returned False.
 ///     MemoryError: There is no memory to convert float32.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, precision="entropy", threads=1, seed=0, keep_invisible=false, cicp=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, first_layer=None, precision="entropy", threads=1, seed=0, keep_invisible=false, cicp=None, mastering_display=None, content_light=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -103,11 +112,14 @@ pub(crate) fn encode<'py>(
     #[pyo3(from_py_with = checked_effort)] effort: u8,
     tune: &str,
     #[pyo3(from_py_with = checked_texture)] texture: u8,
+    first_layer: Option<Integer<'py>>,
     precision: &str,
     #[pyo3(from_py_with = threads::checked)] threads: usize,
     #[pyo3(from_py_with = checked_seed)] seed: u64,
     keep_invisible: bool,
     cicp: Option<(Integer<'py>, Integer<'py>)>,
+    mastering_display: Option<DisplayFields<Real>>,
+    content_light: Option<LightFields<Real>>,
     icc: Option<&Bound<'py, PyAny>>,
     exif: Option<&Bound<'py, PyAny>>,
     xmp: Option<&Bound<'py, PyAny>>,
@@ -117,7 +129,9 @@ pub(crate) fn encode<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
-    let mut stored = metadata::of(cicp, icc, exif, xmp, texts)?;
+    let first_layer =
+        first_layer.map(|bytes| bytes.within("first_layer", 64..=65_536)).transpose()?;
+    let mut stored = metadata::of(cicp, mastering_display, content_light, icc, exif, xmp, texts)?;
     for loss in metadata::retain(&mut stored, metadata)? {
         warn(py, "MetadataWarning", &loss.to_string())?;
     }
@@ -126,6 +140,7 @@ pub(crate) fn encode<'py>(
         .with_tune(tuning(tune)?)
         .with_effort(effort)
         .with_texture(texture)
+        .with_first_layer(first_layer)
         .with_precision(self::precision(precision)?)
         .with_seed(seed)
         .with_keep_invisible(keep_invisible)

@@ -17,6 +17,11 @@ fn raised<'py>(made: PyResult<Bound<'py, PyAny>>) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
+/// A `GipError` of no subclass.
+pub(crate) fn gip_error(py: Python<'_>, message: &str) -> PyErr {
+    raised(exception(py, "GipError", message.into()))
+}
+
 /// The exception for an error of the decoder.
 pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
     let message = error.to_string();

@@ -9,10 +9,12 @@ mod decode;
 mod encode;
 mod errors;
 mod input;
+mod light;
 mod metadata;
 mod numbers;
 mod objects;
 mod output;
+mod prefix;
 mod request;
 mod stream;
 mod threads;
@@ -25,6 +27,8 @@ mod _native {
     use super::decode::{decode, gaussians, info, read_header};
     #[pymodule_export]
     use super::encode::encode;
+    #[pymodule_export]
+    use super::prefix::{prefix, prefixes};
     #[pymodule_export]
     use super::stream::StreamDecoder;
 

@@ -6,7 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 
 use crate::input;
-use crate::numbers::Integer;
+use crate::light::{self, DisplayFields, LightFields};
+use crate::numbers::{Integer, Real};
 
 /// Keeps what the policy of this name says. Returns what was dropped that may be missed.
 pub(crate) fn retain(metadata: &mut Metadata, policy: &str) -> PyResult<Vec<MetadataLoss>> {
@@ -26,6 +27,8 @@ pub(crate) fn retain(metadata: &mut Metadata, policy: &str) -> PyResult<Vec<Meta
 /// The metadata that the caller gives. The encoder checks what can be stored.
 pub(crate) fn of(
     cicp: Option<(Integer<'_>, Integer<'_>)>,
+    mastering_display: Option<DisplayFields<Real>>,
+    content_light: Option<LightFields<Real>>,
     icc: Option<&Bound<'_, PyAny>>,
     exif: Option<&Bound<'_, PyAny>>,
     xmp: Option<&Bound<'_, PyAny>>,
@@ -41,6 +44,8 @@ pub(crate) fn of(
         let code = |code: Integer<'_>| code.within("a code of cicp", 0..=u8::MAX);
         metadata.cicp = Some(Cicp::new(code(primaries)?, code(transfer)?));
     }
+    metadata.mastering_display = mastering_display.map(light::display).transpose()?;
+    metadata.content_light = content_light.map(light::light).transpose()?;
     metadata.icc_profile = blob("icc", icc)?;
     metadata.exif = blob("exif", exif)?.map(tiff_stream).transpose()?;
     metadata.xmp = blob("xmp", xmp)?;

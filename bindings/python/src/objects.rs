@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyTuple};
 
 use crate::errors::vec_for;
-use crate::request;
+use crate::{light, request};
 
 /// `image_gip.Limits`.
 #[derive(Debug)]
@@ -74,7 +74,14 @@ pub(crate) fn info<'py>(
     fields.set_item("parameterization", parameterization(header.parameterization))?;
     fields.set_item("base_color", PyTuple::new(py, &header.base_color[..channels])?)?;
     fields.set_item("chunks", PyTuple::new(py, chunks.collect::<PyResult<Vec<_>>>()?)?)?;
+    let skipped = stream.skipped().iter();
+    let skipped = skipped.map(|s| (s.chunk.letters().to_string(), s.reason.to_string()));
+    fields.set_item("skipped", PyTuple::new(py, skipped.collect::<Vec<_>>())?)?;
     fields.set_item("cicp", metadata.cicp.map(|cicp| (cicp.primaries, cicp.transfer)))?;
+    let display = metadata.mastering_display.map(|display| light::display_object(&types, &display));
+    fields.set_item("mastering_display", display.transpose()?)?;
+    let light = metadata.content_light.map(|light| light::light_object(&types, &light));
+    fields.set_item("content_light", light.transpose()?)?;
     fields.set_item("icc", blob(&metadata.icc_profile))?;
     fields.set_item("exif", blob(&metadata.exif))?;
     fields.set_item("xmp", blob(&metadata.xmp))?;

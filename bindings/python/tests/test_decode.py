@@ -246,6 +246,9 @@ def test_info(photo: Picture) -> None:
     assert signature + sum(chunk.bytes for chunk in info.chunks) == len(file)
     texts = image_gip.info(VECTORS / "metadata.gip").texts
     assert texts[0] == ("Title", "Dämmerung über dem Meer")
+    assert info.skipped == ()
+    broken = image_gip.info(VECTORS / "skip-text-utf8.gip")
+    assert (broken.texts, broken.skipped) == ((), (("tEXt", "is not UTF-8"),))
 
 
 def test_gaussians(file: bytes) -> None:

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import VECTORS, Picture, draw, saved
+from conftest import VECTORS, Picture, chunks, draw, saved
 from PIL import ExifTags, Image, ImageCms
 
 import image_gip
+from image_gip import ContentLight, MasteringDisplay
 
 SRGB = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
 #: A profile that says that it is another.
@@ -37,6 +38,16 @@ def exif() -> Image.Exif:
     return made
 
 
+#: The primaries of BT.2020, D65, and 0.005 to 1000 cd/m².
+DISPLAY = MasteringDisplay(
+    red=(0.708, 0.292),
+    green=(0.17, 0.797),
+    blue=(0.131, 0.046),
+    white=(0.3127, 0.329),
+    max_luminance=1000,
+    min_luminance=0.005,
+)
+LIGHT = ContentLight(max_content=812.3456, max_frame_average=0)
 #: As bytes, without the prefix of JPEG.
 DESCRIBED = described().tobytes().removeprefix(b"Exif\0\0")
 TIFF = exif().tobytes().removeprefix(b"Exif\0\0")
@@ -64,19 +75,67 @@ def test_cicp(photo: Picture) -> None:
             image_gip.encode(photo, cicp=codes)  # type: ignore[arg-type]
 
 
-def test_pillow_keeps_cicp(photo: Picture) -> None:
+def test_mastering_display_and_content_light(photo: Picture) -> None:
+    options: dict[str, Any] = {"effort": 1, "metadata": "none"}
+    file = image_gip.encode(photo, mastering_display=DISPLAY, content_light=LIGHT, **options)
+    # Plain tuples, rounded to what a file can have.
+    options |= {"mastering_display": tuple(DISPLAY), "content_light": (812.34562, 0.00004)}
+    same = image_gip.encode(photo, **options)
+    assert file == same
+    stored = {part.kind: part.payload for part in chunks(file)}
+    assert stored["mDCV"].hex() == "8a48390821349baa199608fc3d1340420098968000000032"
+    assert stored["cLLI"].hex() == "007bf44000000000"
+    info = image_gip.info(file, metadata="none")
+    assert (info.mastering_display, info.content_light) == (DISPLAY, LIGHT)
+    assert isinstance(info.mastering_display, MasteringDisplay)
+    assert isinstance(info.content_light, ContentLight)
+    bare = image_gip.info(image_gip.encode(photo, effort=1))
+    assert (bare.mastering_display, bare.content_light) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"content_light": (429_496.7296, 0)}, ValueError, "content_light 429496.7296; it must be"),
+        ({"content_light": (0, -0.001)}, ValueError, "must be 0 to 429496.7295"),
+        ({"content_light": (float("nan"), 0)}, ValueError, "a luminance of content_light NaN"),
+        ({"content_light": (10**400, 0)}, ValueError, "a luminance of content_light inf"),
+        ({"content_light": (1,)}, ValueError, "content_light"),
+        ({"content_light": 1}, TypeError, "content_light"),
+        (
+            {"mastering_display": DISPLAY._replace(white=(0.3, 1.31072))},
+            ValueError,
+            "a chromaticity of mastering_display 1.31072; it must be 0 to 1.3107",
+        ),
+        (
+            {"mastering_display": DISPLAY._replace(min_luminance=-1)},
+            ValueError,
+            "a luminance of mastering_display -1; it must be",
+        ),
+        ({"mastering_display": (1, 2)}, ValueError, "mastering_display"),
+    ],
+)
+def test_light_that_is_refused(
+    photo: Picture, options: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        image_gip.encode(photo, **options)
+
+
+def test_pillow_keeps_what_tells_the_colours(photo: Picture) -> None:
+    told = {"cicp": (9, 16), "mastering_display": DISPLAY, "content_light": LIGHT}
     image = Image.fromarray(photo)
-    with Image.open(saved(image, cicp=(12, 13))) as found:
-        assert found.info["cicp"] == (12, 13)
+    with Image.open(saved(image, **told)) as found:
+        assert {name: found.info[name] for name in told} == told
         with Image.open(saved(found)) as again:
-            assert again.info["cicp"] == (12, 13)
-        with Image.open(saved(found, cicp=None)) as again:
-            assert "cicp" not in again.info
+            assert {name: again.info[name] for name in told} == told
+        with Image.open(saved(found, **dict.fromkeys(told))) as again:
+            assert not told.keys() & again.info.keys()
     # What becomes sRGB is in it.
     inks = Image.new("LAB", (9, 9))
-    inks.info["cicp"] = (12, 13)
+    inks.info.update(told)
     with Image.open(saved(inks)) as found:
-        assert "cicp" not in found.info
+        assert not told.keys() & found.info.keys()
 
 
 def test_texts(photo: Picture) -> None:

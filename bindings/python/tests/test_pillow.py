@@ -53,7 +53,7 @@ def test_round_trips(mode: str) -> None:
     assert file.getvalue() == image_gip.encode(samples, psnr=36, effort=1)
     with Image.open(file) as opened:
         assert (opened.format, opened.mode, opened.size) == ("GIP", mode, (60, 45))
-        assert opened.get_format_mimetype() == "image/x-gip"
+        assert opened.get_format_mimetype() == "image/vnd.gip"
         expected = image_gip.decode(file.getvalue())
         np.testing.assert_array_equal(np.asarray(opened), expected)
         again = opened.copy()
@@ -140,21 +140,21 @@ def test_thumbnails(file: bytes) -> None:
 
 def test_metadata_after_the_layers(file: bytes) -> None:
     parts = chunks(file)
-    late = [Chunk("iCCP", b"profile"), Chunk("eXIF", b"II*\0\x08\0\0\0\0\0\0\0\0\0")]
+    profile, exif = Chunk("iCCP", b"profile"), Chunk("eXIF", b"II*\0\x08\0\0\0\0\0\0\0\0\0")
     texts = [Chunk("tEXt", b"Title\0A disc"), Chunk("tEXt", b"Author\0Emma")]
-    spread = joined([parts[0], texts[0], *parts[1:-1], *late, texts[1], parts[-1]])
+    spread = joined([parts[0], profile, texts[0], *parts[1:-1], exif, texts[1], parts[-1]])
     with Image.open(io.BytesIO(spread)) as opened:
-        assert opened.info == {"texts": (("Title", "A disc"),)}
+        assert opened.info == {"icc_profile": b"profile", "texts": (("Title", "A disc"),)}
         opened.info["mine"] = 1
         opened.load()
         assert opened.info == {
             "mine": 1,
             "icc_profile": b"profile",
-            "exif": b"Exif\0\0" + late[1].payload,
+            "exif": b"Exif\0\0" + exif.payload,
             "texts": (("Title", "A disc"), ("Author", "Emma")),
         }
     # What a program has removed does not come back.
-    early = joined([parts[0], *late, *parts[1:]])
+    early = joined([parts[0], profile, exif, *parts[1:]])
     with Image.open(io.BytesIO(early)) as opened:
         del opened.info["icc_profile"]
         opened.load()

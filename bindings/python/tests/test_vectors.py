@@ -36,7 +36,8 @@ class Line(NamedTuple):
 LINES = [
     Line(*line.split("\t")[:3]) for line in (VECTORS / "index.tsv").read_text().splitlines()[1:]
 ]
-SOUND = [line for line in LINES if line.rendering != "error"]
+SOUND = [line for line in LINES if line.rendering not in ("error", "skips")]
+SKIPPING = [line for line in LINES if line.rendering == "skips"]
 REFUSED = [line for line in LINES if line.rendering == "error"]
 
 
@@ -66,6 +67,7 @@ def options(rendering: str) -> dict[str, Any]:
 
 def test_the_index_is_read() -> None:
     assert len(SOUND) > 60
+    assert len(SKIPPING) > 40
     assert len(REFUSED) > 60
 
 
@@ -86,6 +88,12 @@ def test_samples(line: Line) -> None:
     out = np.full_like(samples, 7)
     assert image_gip.decode(line.file, **keywords, out=out) is out
     assert crc(out) == line.result
+
+
+@pytest.mark.parametrize("line", SKIPPING, ids=lambda line: line.name)
+def test_what_is_skipped(line: Line) -> None:
+    found = image_gip.info(line.file).skipped
+    assert " ".join(chunk for chunk, _ in found) == line.result
 
 
 @pytest.mark.parametrize("line", REFUSED, ids=lambda line: line.name)

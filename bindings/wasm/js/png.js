@@ -1,20 +1,9 @@
 // PNG files without compression. Browsers convert their colours by the colour space inside, so that this
 // package needs no code for that.
 
+import { crc32 } from './crc32.js';
+
 const colorTypes = { gray: 0, 'gray-alpha': 4, rgb: 2, rgba: 6 };
-
-let table = null;
-
-function crc32(bytes) {
-  table ??= Uint32Array.from({ length: 256 }, (_, byte) => {
-    let crc = byte;
-    for (let bit = 0; bit < 8; bit += 1) crc = crc & 1 ? (crc >>> 1) ^ 0xedb88320 : crc >>> 1;
-    return crc;
-  });
-  let crc = 0xffffffff;
-  for (let i = 0; i < bytes.length; i += 1) crc = (crc >>> 8) ^ table[(crc ^ bytes[i]) & 0xff];
-  return ~crc;
-}
 
 function adler32(bytes) {
   let [a, b] = [1, 0];
@@ -68,8 +57,9 @@ function joined(parts) {
   return out;
 }
 
-/** A PNG file of 8-bit samples, as `Decoder.samples` gives them, with the colour space that the metadata have. */
-export function encodePng({ width, height, channels, color, data }, { cicp, iccProfile }) {
+/** A PNG file of 8-bit samples, as `Decoder.samples` gives them, with what the metadata say of their colours. */
+export function encodePng({ width, height, channels, color, data }, metadata) {
+  const { cicp, masteringDisplay, contentLight, iccProfile } = metadata;
   const header = new Uint8Array(13);
   const view = new DataView(header.buffer);
   view.setUint32(0, width);
@@ -87,6 +77,8 @@ export function encodePng({ width, height, channels, color, data }, { cicp, iccP
   const parts = [signature, chunk('IHDR', header)];
   // Without a matrix, in full range.
   if (cicp) parts.push(chunk('cICP', [...cicp, 0, 1]));
+  if (masteringDisplay) parts.push(chunk('mDCV', masteringDisplay));
+  if (contentLight) parts.push(chunk('cLLI', contentLight));
   if (iccProfile) {
     // A name, its end, and the only method of compression.
     const name = Uint8Array.of(0x49, 0x43, 0x43, 0, 0);

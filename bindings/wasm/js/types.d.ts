@@ -31,6 +31,17 @@ export interface Metadata {
    * 12 and 13 for Display P3, 9 and 16 for PQ, 9 and 18 for HLG. It counts before the ICC profile.
    */
   cicp: Uint8Array | null;
+  /**
+   * The display on which the picture was made: the payload of PNG's chunk `mDCV`, 24 bytes. They are CIE 1931 x and y of
+   * red, green, blue and white, in 0.00002, in 16 bits each, then the most and the least luminance, in 0.0001 cd/m², in
+   * 32 bits each. The most significant byte stands first.
+   */
+  masteringDisplay: Uint8Array | null;
+  /**
+   * How bright the picture is: the payload of PNG's chunk `cLLI`, 8 bytes. They are the luminance of the brightest pixel
+   * and the mean of the picture, in 0.0001 cd/m², 0 if it is not known, as the luminances above.
+   */
+  contentLight: Uint8Array | null;
   /** The ICC profile of the colours; without one, and without codes, they are sRGB. */
   iccProfile: Uint8Array | null;
   exif: Uint8Array | null;
@@ -142,6 +153,18 @@ export type Gaussian9 = Float32Array;
  * m2, of which the strengths of two octaves follow, and the direction.
  */
 export type TextureMap = Float32Array;
+
+/** The small file that the first layers of a file make. */
+export interface Prefix {
+  /** How many layers it has, from 1. */
+  layers: number;
+  /** How many Gaussians these have. */
+  gaussians: number;
+  /** How many bytes it has. */
+  bytes: number;
+  /** Where these layers end in the file that they are taken from: so many bytes of that are enough. */
+  end: number;
+}
 
 export interface Statistics {
   /** The complete chunks by type. `type` are its letters, and `bytes` includes type, length and CRC. */

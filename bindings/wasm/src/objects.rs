@@ -64,9 +64,8 @@ pub(crate) fn header(header: &Header) -> JsValue {
 
 /// The metadata. What is absent is `null`.
 pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
-    let bytes = |bytes: &Option<Vec<u8>>| {
-        bytes.as_ref().map_or(JsValue::NULL, |bytes| Uint8Array::new(bytes).into())
-    };
+    let array = |bytes: &[u8]| JsValue::from(Uint8Array::new(bytes));
+    let bytes = |bytes: &Option<Vec<u8>>| bytes.as_deref().map_or(JsValue::NULL, array);
     let xmp = metadata
         .xmp
         .as_ref()
@@ -76,11 +75,14 @@ pub(crate) fn metadata(metadata: &Metadata) -> JsValue {
             object([("keyword", text.keyword.as_str().into()), ("text", text.text.as_str().into())])
         })
         .collect();
-    let cicp = metadata
-        .cicp
-        .map_or(JsValue::NULL, |cicp| Uint8Array::new(&[cicp.primaries, cicp.transfer]).into());
+    let cicp = metadata.cicp.map_or(JsValue::NULL, |cicp| array(&[cicp.primaries, cicp.transfer]));
+    let display = metadata.mastering_display;
+    let display = display.map_or(JsValue::NULL, |display| array(&display.to_bytes()));
+    let light = metadata.content_light.map_or(JsValue::NULL, |light| array(&light.to_bytes()));
     object([
         ("cicp", cicp),
+        ("masteringDisplay", display),
+        ("contentLight", light),
         ("iccProfile", bytes(&metadata.icc_profile)),
         ("exif", bytes(&metadata.exif)),
         ("xmp", xmp),

@@ -13,7 +13,7 @@ const types = {
   '.js': 'text/javascript; charset=utf-8',
   '.wasm': 'application/wasm',
   '.tsv': 'text/plain; charset=utf-8',
-  '.gip': 'application/octet-stream',
+  '.gip': 'image/vnd.gip',
 };
 
 /** Starts a server on a free port. `routes` maps paths to `(request, response) => ...`. */

@@ -3,6 +3,7 @@
 import { decode, GipError, LimitError, open, StreamDecoder } from '../dist/index.js';
 import type { Header, Picture, Region, Samples, Source } from '../dist/index.js';
 import { Decoder, load, memorySize } from '../dist/core.js';
+import { prefix, prefixes } from '../dist/prefix.js';
 import type { GipImageElement } from '../dist/gip-image.js';
 
 export async function everything(source: Source, signal: AbortSignal): Promise<void> {
@@ -30,7 +31,9 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   await element.decode();
   const png: Blob = await picture.png({ width: 10 });
   const bytes: number = memorySize();
-  void [map, turned, unknown, png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
+  const small: Uint8Array = prefix(new Uint8Array(), prefixes(new Uint8Array())[0].bytes);
+  const { masteringDisplay } = await picture.metadata();
+  void [small, masteringDisplay, map, turned, unknown, png, bytes, image, header, samples, numbers, layers, shape, complete, maybe, data];
   // @ts-expect-error: not a source
   await decode(12);
   // @ts-expect-error: there is no such orientation

@@ -1,8 +1,8 @@
 """Decodes and encodes ``.gip``: pictures stored as two-dimensional Gaussians.
 
 ``decode`` gives a NumPy array, at any size, of the whole picture or a part of it; ``encode`` makes
-a file of one. With ``image_gip.register()``, Pillow opens and saves ``.gip``; and
-``image_gip.ray`` encodes and decodes data sets on a cluster.
+a file of one; ``prefix`` cuts a placeholder off it. With ``image_gip.register()``, Pillow opens and
+saves ``.gip``; and ``image_gip.ray`` encodes and decodes data sets on a cluster.
 """
 
 from image_gip._errors import (
@@ -16,18 +16,38 @@ from image_gip._errors import (
     UnexpectedEndError,
     UnsupportedError,
 )
-from image_gip._native import StreamDecoder, __version__, decode, encode, gaussians, info
-from image_gip._types import Chunk, Info, Limits, Progress
+from image_gip._native import (
+    StreamDecoder,
+    __version__,
+    decode,
+    encode,
+    gaussians,
+    info,
+    prefix,
+    prefixes,
+)
+from image_gip._types import (
+    Chunk,
+    ContentLight,
+    Info,
+    Limits,
+    MasteringDisplay,
+    Prefix,
+    Progress,
+)
 
 __all__ = [
     "CancelledError",
     "Chunk",
+    "ContentLight",
     "GipError",
     "Info",
     "LimitError",
     "Limits",
     "MalformedError",
+    "MasteringDisplay",
     "MetadataWarning",
+    "Prefix",
     "Progress",
     "ShortfallWarning",
     "SignatureError",
@@ -39,6 +59,8 @@ __all__ = [
     "encode",
     "gaussians",
     "info",
+    "prefix",
+    "prefixes",
     "register",
 ]
 

@@ -57,9 +57,12 @@ def stored_profile(image: Image.Image, profile: bytes | None) -> bytes | None:
     return profile
 
 
-def stored_cicp(image: Image.Image) -> tuple[int, int] | None:
-    """The colour space that the picture has in codes, unless its samples become sRGB."""
-    return None if image.mode in _MANAGED else image.info.get("cicp")
+def stored_colors(image: Image.Image) -> dict[str, Any]:
+    """What the picture says of its colours besides a profile, unless its samples become sRGB."""
+    if image.mode in _MANAGED:
+        return {}
+    names = ("cicp", "mastering_display", "content_light")
+    return {name: image.info[name] for name in names if name in image.info}
 
 
 def _sixteen_bits(image: Image.Image) -> NDArray[np.uint16]:

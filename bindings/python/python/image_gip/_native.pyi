@@ -5,9 +5,22 @@ from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 from numpy.typing import DTypeLike, NDArray
 from typing_extensions import Buffer
 
-from image_gip._types import Info, Limits, MetadataPolicy, Mode, Precision, Progress, Tune
+from image_gip._types import (
+    Info,
+    Limits,
+    MetadataPolicy,
+    Mode,
+    Precision,
+    Prefix,
+    Progress,
+    Tune,
+)
 
 _Size: TypeAlias = tuple[SupportsIndex, SupportsIndex]
+_Point: TypeAlias = tuple[float, float]
+# Named tuples are such tuples.
+_Display: TypeAlias = tuple[_Point, _Point, _Point, _Point, float, float]
+_Light: TypeAlias = tuple[float, float]
 _Region: TypeAlias = tuple[SupportsIndex, SupportsIndex, SupportsIndex, SupportsIndex]
 # NumPy declares its arrays as buffers from Python 3.12 on only.
 _Buffer: TypeAlias = Buffer | NDArray[Any]
@@ -24,6 +37,8 @@ __all__ = [
     "encode",
     "gaussians",
     "info",
+    "prefix",
+    "prefixes",
     "read_header",
 ]
 
@@ -54,11 +69,14 @@ def encode(
     effort: int = 4,
     tune: Tune = "visual",
     texture: int = 50,
+    first_layer: int | None = None,
     precision: Precision = "entropy",
     threads: int = 1,
     seed: int = 0,
     keep_invisible: bool = False,
     cicp: tuple[int, int] | None = None,
+    mastering_display: _Display | None = None,
+    content_light: _Light | None = None,
     icc: _Buffer | None = None,
     exif: _Buffer | None = None,
     xmp: _Buffer | None = None,
@@ -71,6 +89,8 @@ def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ..
 def info(
     src: _Source, *, metadata: MetadataPolicy = "all", limits: Limits | None = None
 ) -> Info: ...
+def prefixes(src: _Source) -> list[Prefix]: ...
+def prefix(src: _Source, max_bytes: int) -> bytes: ...
 def read_header(file: _Readable, *, limits: Limits | None = None) -> Info: ...
 
 @final

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 from operator import index
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 #: The channels of a picture, as Pillow names them.
 Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
@@ -77,6 +77,32 @@ class Chunk:
     bytes: int
 
 
+class MasteringDisplay(NamedTuple):
+    """The display on which a picture was made (SMPTE ST 2086)."""
+
+    #: CIE 1931 x and y of its red, each 0 to 1.3107, and so are the others.
+    red: tuple[float, float]
+    #: x and y of its green.
+    green: tuple[float, float]
+    #: x and y of its blue.
+    blue: tuple[float, float]
+    #: x and y of its white.
+    white: tuple[float, float]
+    #: The most luminance that it shows, in cd/m²: 0 to 429496.7295, and so is the least.
+    max_luminance: float
+    #: The least luminance that it shows, in cd/m².
+    min_luminance: float
+
+
+class ContentLight(NamedTuple):
+    """How bright a picture is (CTA-861)."""
+
+    #: The luminance of the brightest pixel, MaxCLL, in cd/m²: 0 (not known) to 429496.7295.
+    max_content: float
+    #: The mean luminance of the picture, MaxFALL, in cd/m²: 0 (not known) to 429496.7295.
+    max_frame_average: float
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Info:
     """What a file says of its picture."""
@@ -112,9 +138,15 @@ class Info:
     base_color: tuple[int, ...]
     #: The chunks that were read, by type, in the order in which the types appear.
     chunks: tuple[Chunk, ...]
+    #: Chunks that break a rule, and so were skipped, each with the reason: at most 16 of them.
+    skipped: tuple[tuple[str, str], ...]
     #: The colour space: the codes of colour primaries and transfer characteristics of Rec. ITU-T
     #: H.273, such as (12, 13) for Display P3. It counts before the ICC profile.
     cicp: tuple[int, int] | None
+    #: The display on which the picture was made.
+    mastering_display: MasteringDisplay | None
+    #: How bright the picture is.
+    content_light: ContentLight | None
     #: The ICC profile.
     icc: bytes | None
     #: Exif data: a TIFF stream, which begins with ``II`` or ``MM``.
@@ -128,6 +160,20 @@ class Info:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels, as the picture is stored."""
         return self.width, self.height
+
+
+@dataclass(frozen=True, slots=True)
+class Prefix:
+    """The small file that the first layers of a file make."""
+
+    #: Number of layers, from 1.
+    layers: int
+    #: Number of Gaussians in these layers.
+    gaussians: int
+    #: Bytes of the small file.
+    bytes: int
+    #: Where the layers end in the file that they are taken from: so many bytes of it are enough.
+    end: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,11 @@ La and RGBa, YCbCr, HSV and LAB become straight alpha and RGB, and so does CMYK 
 
 As with Pillow's other formats, pictures come as they are stored, and ``ImageOps.exif_transpose``
 turns them. Metadata that stands after the first layer of a file, which is never an orientation, is
-in ``info`` once the whole picture is loaded. ``save`` stores the ICC profile of the picture by
-itself, and the colour space that is in ``info["cicp"]``, the two codes of ``image_gip.encode``. It
-takes ``icc_profile``, ``cicp``, ``exif`` and ``xmp``. Its other options are those of
-``image_gip.encode``: with ``metadata="none"``, turn the picture before, as nothing in the file
-tells how it is to be turned.
+in ``info`` once the whole picture is loaded. ``save`` stores by itself what tells the colours: the
+ICC profile of the picture, and ``cicp``, ``mastering_display`` and ``content_light`` of ``info``,
+which are those of ``image_gip.encode``. It takes these as options (the profile as ``icc_profile``),
+``exif`` and ``xmp``. Its other options are those of ``image_gip.encode``: with ``metadata="none"``,
+turn the picture before, as nothing in the file tells how it is to be turned.
 """
 
 from __future__ import annotations
@@ -74,6 +74,8 @@ class GipImageFile(ImageFile.ImageFile):
         """Takes the metadata of what was read of the file, as far as it is new."""
         found = {
             "cicp": read.cicp,
+            "mastering_display": read.mastering_display,
+            "content_light": read.content_light,
             "icc_profile": read.icc,
             "exif": None if read.exif is None else b"Exif\0\0" + read.exif,
             "xmp": read.xmp,
@@ -222,7 +224,8 @@ def _accept(prefix: bytes) -> bool:
 
 def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
     asked = image.encoderinfo
-    options: dict[str, Any] = {name: asked[name] for name in _OPTIONS & asked.keys()}
+    options = _modes.stored_colors(image)
+    options |= {name: asked[name] for name in _OPTIONS & asked.keys()}
     # As in Pillow's own formats, the profile goes with the picture, and the rest on request.
     profile = asked.get("icc_profile", image.info.get("icc_profile"))
     if profile is not None:
@@ -232,7 +235,6 @@ def _save(image: Image.Image, file: IO[bytes], filename: str | bytes) -> None:
         options["exif"] = exif.tobytes() if isinstance(exif, Image.Exif) else exif
     if xmp := asked.get("xmp"):
         options["xmp"] = xmp.encode() if isinstance(xmp, str) else xmp
-    options.setdefault("cicp", _modes.stored_cicp(image))
     samples = _modes.samples(image, profile)
     try:
         encoded = encode(samples, **options)
@@ -245,4 +247,4 @@ Image.register_decoder("gip", _Decoder)
 Image.register_open(_FORMAT, GipImageFile, _accept)
 Image.register_save(_FORMAT, _save)
 Image.register_extension(_FORMAT, ".gip")
-Image.register_mime(_FORMAT, "image/x-gip")
+Image.register_mime(_FORMAT, "image/vnd.gip")

@@ -74,6 +74,7 @@ def encode_dataset(
     effort: int = 4,
     tune: Tune = "visual",
     texture: int = 50,
+    first_layer: int | None = None,
     seed: int = 0,
     keep_invisible: bool = False,
     metadata: MetadataPolicy = "all",
@@ -98,6 +99,7 @@ def encode_dataset(
         effort: As in :func:`image_gip.encode`.
         tune: As in :func:`image_gip.encode`.
         texture: As in :func:`image_gip.encode`.
+        first_layer: As in :func:`image_gip.encode`.
         seed: As in :func:`image_gip.encode`.
         keep_invisible: As in :func:`image_gip.encode`.
         metadata: As in :func:`image_gip.encode`.
@@ -111,7 +113,7 @@ def encode_dataset(
     targets = {"bpp": bpp, "bytes": bytes, "quality": quality, "psnr": psnr, "gaussians": gaussians}
     options: dict[str, Any] = {name: v for name, v in targets.items() if v is not None}
     options |= {"effort": effort, "tune": tune, "texture": texture}
-    options |= {"seed": seed, "metadata": metadata}
+    options |= {"first_layer": first_layer, "seed": seed, "metadata": metadata}
     options |= {"keep_invisible": keep_invisible}
     _check_encoder_options(options)
     return _run("encode", options, pictures, out_uri, container, shard_size)

@@ -1,0 +1,27 @@
+/** Placeholders that are cut off a file, without decoding and without WebAssembly. */
+
+import type { Prefix } from './types.js';
+
+export type { Prefix } from './types.js';
+export { GipError, MalformedError, SignatureError, UnexpectedEndError, UnsupportedError } from './errors.js';
+
+/**
+ * The small files that the first layers of a file make, without making them: one for each number of layers, from 1
+ * to that of the layers that `bytes` has completely. That of the first layer is a placeholder of a few hundred bytes.
+ *
+ * Each is a valid file. It keeps what says how the picture is shown: cICP, mDCV, cLLI, the ICC profile, and Exif if
+ * it turns the picture. Texture and other metadata are left out.
+ *
+ * `bytes` is a file or the beginning of one. Throws a `GipError` if that ends before the header does, or breaks a rule
+ * of the format up to the last complete layer. What is copied as it is, such as Gaussians and quantizers, is not looked
+ * at.
+ */
+export function prefixes(bytes: Uint8Array): Prefix[];
+
+/**
+ * The longest of these files that has at most `maxBytes`.
+ *
+ * Throws a `RangeError` if that of the first layer has more, whose message says how many; and a `GipError` as
+ * `prefixes`, or if there is no complete layer.
+ */
+export function prefix(bytes: Uint8Array, maxBytes: number): Uint8Array;
