@@ -8,12 +8,12 @@ import { gzipSync } from 'node:zlib';
 const dist = new URL('../dist/', import.meta.url);
 const compressed = (file) => gzipSync(readFileSync(new URL(file, dist)), { level: 9 }).length;
 
-test('the scripts that show pictures, and the decoder, are at most 106 kB, compressed', () => {
+test('the scripts that show pictures, and the decoder, are at most 107 kB, compressed', () => {
   const files = readdirSync(dist).filter((file) => /\.(js|wasm)$/.test(file) && file !== 'prefix.js');
   const sizes = files.map(compressed);
   const sum = sizes.reduce((a, b) => a + b, 0);
   assert.ok(files.includes('image_gip_bg.wasm') && files.includes('gip-image.js'));
-  assert.ok(sum <= 106_000, files.map((file, at) => `${file}: ${sizes[at]}`).join(', '));
+  assert.ok(sum <= 107_000, files.map((file, at) => `${file}: ${sizes[at]}`).join(', '));
 });
 
 test('the module for prefixes is at most 3 kB, compressed, and all of it', () => {
