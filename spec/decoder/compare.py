@@ -1,4 +1,4 @@
-"""python -m decoder.compare [--seconds N] PATH...: what this decoder makes of files, to compare it with another program.
+"""python -m decoder.compare [--seconds N] PATH...: what this decoder makes of files, to compare with another program.
 
 A PATH is a file or a folder, of which all files are taken in the order of their names. For each one there is a line of
 four columns, separated by tabs:
