@@ -25,6 +25,8 @@ def main():
     picture, error = decode(Path(options.file).read_bytes())
     if error:
         print(f"{options.file}: {error}", file=sys.stderr)
+    for type in picture.skipped if picture else []:
+        print(f"{options.file}: a chunk {type} breaks a rule and is skipped", file=sys.stderr)
     if picture is None:
         return 1
     model = MODELS.index(options.model) if options.model else None

@@ -16,7 +16,6 @@ def check_signature(data):
             raise Refused(UNEXPECTED_END, "", "the file ends in the signature")
         if data[i] != expected:
             if i == VERSION_AT:
-                # The specification names no chunk here; the vectors name H.
                 raise Refused(UNSUPPORTED, "H", f"version {data[i]}")
             raise Refused(SIGNATURE, "", f"byte {i}")
     return len(SIGNATURE_BYTES)

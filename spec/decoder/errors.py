@@ -1,13 +1,17 @@
-"""Kinds of error (section 1), and errors that do not concern the file (sections 9.1 and 10)."""
+"""Kinds of error (section 1), and an error that does not concern the file (section 9.1)."""
 
 SIGNATURE = "signature"
 MALFORMED = "malformed"
 UNSUPPORTED = "unsupported"
 UNEXPECTED_END = "unexpected end"
+LIMIT = "limit"
 
 
 class Refused(Exception):
-    """The file is refused: `kind` is one of the four above, `chunk` the type of the chunk ("" if none is known)."""
+    """The file is refused.
+
+    kind: one of the first four above; chunk: the type of the chunk, "" if none is known.
+    """
 
     def __init__(self, kind, chunk, text):
         name = " " + chunk.encode("unicode_escape").decode() if chunk else ""  # a damaged type can be any bytes
@@ -17,19 +21,25 @@ class Refused(Exception):
 
 
 class Malformed(Exception):
-    """A rule is broken inside a payload. `decode` turns it into `Refused` with the chunk's type."""
+    """A chunk breaks a rule. `decode` turns it into `Refused` with the chunk's type, or skips an ancillary chunk."""
 
     kind = MALFORMED
 
 
 class Unsupported(Exception):
-    """A payload requires something that version 1 does not have. `decode` turns it into `Refused`."""
+    """A chunk requires something that version 1 does not have. `decode` does with it as with `Malformed`."""
 
     kind = UNSUPPORTED
 
 
 class LimitExceeded(Exception):
-    """The file, or a request, asks for more than this decoder does (section 10). The file may be valid."""
+    """The file, or a request, asks for more than this decoder does (section 10). The file may be valid.
+
+    There is no chunk.
+    """
+
+    kind = LIMIT
+    chunk = ""
 
 
 class RequestError(Exception):

@@ -107,7 +107,7 @@ LARGEST_STEP_CODE = 0xF000
 def step_of_code(code):
     """Section 5.3: the step with a code of 16 bits."""
     if code > LARGEST_STEP_CODE:
-        raise Malformed("a step over 2^10")
+        raise Unsupported("a step over 2^10")
     return bits(0x35800000 + code * 2**12)
 
 
@@ -128,19 +128,23 @@ def read_steps(fields, channels, in_header):
 
 
 def read_quantizer(fields):
-    """Section 6: an entry of the header."""
-    kind, depth = fields.u8(), fields.u8()
+    """Section 6: an entry of the header. Each field is checked before the next one is read."""
+    kind = fields.u8()
+    if kind not in (FLOAT, LINEAR, LOGARITHMIC):
+        raise Unsupported(f"a quantizer of kind {kind}")
+    depth = fields.u8()
+    if depth == 0:
+        raise Malformed("a bit depth of 0")
     if kind == FLOAT:
         if depth != 32:
-            raise Malformed("a float that has not 32 bits")
+            raise Unsupported(f"a float of {depth} bits")
         return Quantizer(kind, depth)
-    if kind not in (LINEAR, LOGARITHMIC):
-        raise Unsupported(f"a quantizer of kind {kind}")
-    if not 1 <= depth <= 16:
-        raise Malformed(f"a bit depth of {depth}")
-    scale, offset = fields.f32(), fields.f32()
+    if depth > 16:
+        raise Unsupported(f"a bit depth of {depth}")
+    scale = fields.f32()
     if not F(0) < scale <= F(2.0**32):
         raise Malformed("a scale out of range")
+    offset = fields.f32()
     if not F(-(2.0**32)) <= offset <= F(2.0**32):
         raise Malformed("an offset out of range")
     return Quantizer(kind, depth, scale, offset)
@@ -156,9 +160,7 @@ def read_side(fields):
 
 
 def read_header(payload):
-    """Section 5.1. The CRC has been found right."""
-    if len(payload) > LONGEST:
-        raise Malformed("a header of more than 255 bytes")
+    """Section 5.1: fields are checked in their order. The CRC has been found right, and the payload is not too long."""
     fields = Fields(payload)
     form = fields.u8()
     model = form & 3
@@ -175,11 +177,10 @@ def read_header(payload):
     layers = 0
     if gaussians > 0:
         layers = fields.number()
-        if not 1 <= layers <= gaussians:
+        if not 1 <= layers <= gaussians:  # before the next check, as in the table
             raise Malformed("a number of layers out of range")
         if layers > MOST_LAYERS:
             raise Unsupported("more than 65535 layers")
-    # u8 in 1/255 is the same number as 257 times it in 1/65535, and so is the rounded quotient (section 9.4).
     if depth == 8:
         base = [F(fields.u8()) / F(255) for _ in range(CHANNELS[model])]
     else:
@@ -187,8 +188,10 @@ def read_header(payload):
     cutoff = None
     if kernel == EXPONENTIAL:
         cutoff = fields.f32()
-        if not F(0) < cutoff <= F(64):
-            raise Malformed("a cut-off out of range")
+        if cutoff > F(64):
+            raise Unsupported("a cut-off over 64")
+        if not F(0) < cutoff:  # NaN is not
+            raise Malformed("a cut-off that is not over 0")
     quantizers, steps = None, None
     if gaussians > 0:
         if coding == PACKED:

@@ -1,8 +1,11 @@
-"""Payloads of ancillary chunks: texts and Exif (section 5.5), bounds of layers (section 5.6)."""
+"""Payloads of ancillary chunks: metadata (section 5.5), bounds of layers (section 5.6).
 
-from .errors import Malformed, Unsupported
+`Malformed` here is a reason to skip the chunk (section 4.3), not to refuse the file.
+"""
 
-LENGTHS = {"cICP": 4, "mDCV": 24, "cLLI": 8}  # of payloads in bytes
+from .errors import Malformed
+
+LENGTHS = {"cICP": 4, "mDCV": 24, "cLLI": 8}  # of payloads in bytes; those of other types are free
 
 
 def read_text(payload):
@@ -20,18 +23,16 @@ def read_text(payload):
         raise Malformed("a text that is not UTF-8") from None
 
 
-def check_colors(type, payload):
-    """The payloads of `cICP`, `mDCV` and `cLLI`; any of the other types."""
-    if len(payload) != LENGTHS.get(type, len(payload)):
-        raise Malformed("a wrong length")
-    if type == "cICP" and payload[2] != 0:
-        raise Unsupported("matrix coefficients")
-    if type == "cICP" and payload[3] != 1:
-        raise Unsupported("a range that is not full")
+def check_code_points(payload):
+    """`cICP`, of the right length. The first two codes may have any value."""
+    if payload[2] != 0:
+        raise Malformed("matrix coefficients")
+    if payload[3] != 1:
+        raise Malformed("a range that is not full")
 
 
 def orientation(exif):
-    """The orientation that an `eXIf` tells, 1 to 8, 1 if it tells none. Its layout is that of TIFF 6.0."""
+    """The orientation that an `eXIF` tells, 1 to 8, 1 if it tells none: section 5.5, "found in this way"."""
     order = {b"II": "little", b"MM": "big"}.get(exif[:2])
     if order is None or len(exif) < 8:
         return 1
@@ -47,7 +48,7 @@ def orientation(exif):
     for i in range(unsigned(directory, 2)):
         entry = directory + 2 + 12 * i
         if entry + 12 > len(exif):
-            return 1
+            return 1  # those that follow are not there either
         if unsigned(entry, 2) == 0x0112 and unsigned(entry + 2, 2) == 3 and unsigned(entry + 4, 4) == 1:
             value = unsigned(entry + 8, 2)
             return value if 1 <= value <= 8 else 1

@@ -55,6 +55,20 @@ def decode_gaussians(quantizers, stream, count):
     return np.concatenate(portions)
 
 
+def check_started(quantizers, stream, done):
+    """Section 11: a value that is infinite or NaN counts as soon as its bytes are there.
+
+    Checks those values of Gaussian `done` (from 0) that the cut off `stream` has as a whole.
+    """
+    at = done * bits_of_gaussian(quantizers)
+    for quantizer in quantizers:
+        if at + quantizer.depth > 8 * len(stream):
+            return
+        bits = int.from_bytes(stream[at // 8 : (at + quantizer.depth + 7) // 8], "little") >> at % 8
+        values_of(quantizer, np.array([bits % 2**quantizer.depth], dtype=np.uint64))
+        at += quantizer.depth
+
+
 def check_padding(quantizers, stream, count):
     """Section 7.2: the bits behind the last Gaussian are zero. The stream has the right length."""
     used = count * bits_of_gaussian(quantizers) % 8

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import limits
 from .arith import F, exp
-from .errors import LimitExceeded, RequestError
+from .errors import RequestError
 from .header import EXPONENTIAL
 
 LARGEST_OUTPUT = 2**23  # pixels
@@ -141,20 +140,6 @@ class Scene:
         return x + low - 1, x + high + 1
 
 
-class Budget:
-    """Section 10: bounds the work of one rendering. pixels: how many it has."""
-
-    def __init__(self, pixels):
-        self.work = limits.WORK_PER_PIXEL * pixels + limits.WORK_MORE
-        self.evaluations = limits.EVALUATIONS * self.work
-
-    def spend(self, weights):
-        self.evaluations -= weights.size
-        self.work -= int(np.count_nonzero(weights))
-        if self.work < 0 or self.evaluations < 0:
-            raise LimitExceeded("too much work")
-
-
 def to_pixels(low, high, first, last):
     """The pixels from `first` to `last` whose squares touch [low, high]: (first, last); comparisons come first."""
     if not (low < last + 1 and high > first):
@@ -162,7 +147,7 @@ def to_pixels(low, high, first, last):
     return math.floor(max(low, first)), math.floor(min(high, last))
 
 
-def add_gaussian(scene, n, sums, corner, rows, budget):
+def add_gaussian(scene, n, sums, corner, rows):
     """Adds Gaussian n to the sums in the rows (first, last); halves them where that makes blocks smaller."""
     height, width, channels = sums.shape
     x0, y0 = corner
@@ -173,17 +158,16 @@ def add_gaussian(scene, n, sums, corner, rows, budget):
     area = (rows[1] - rows[0] + 1) * (right - left + 1)
     if area > BLOCK and rows[1] > rows[0]:
         middle = (rows[0] + rows[1]) // 2
-        add_gaussian(scene, n, sums, corner, (rows[0], middle), budget)
-        add_gaussian(scene, n, sums, corner, (middle + 1, rows[1]), budget)
+        add_gaussian(scene, n, sums, corner, (rows[0], middle))
+        add_gaussian(scene, n, sums, corner, (middle + 1, rows[1]))
         return
     weights = scene.weights(n, np.arange(left, right + 1), np.arange(rows[0], rows[1] + 1))
-    budget.spend(weights)
     block = sums[rows[0] - y0 : rows[1] - y0 + 1, left - x0 : right - x0 + 1]
     for c in range(channels):
         block[:, :, c] += scene.amplitudes[n, c] * weights
 
 
-def add_gaussians(scene, sums, corner, budget):
+def add_gaussians(scene, sums, corner):
     """Section 9.4: adds all Gaussians in their order.
 
     sums: binary32, shape (height, width, channels), changed; corner: column and row of the grid of sums[0, 0].
@@ -192,4 +176,4 @@ def add_gaussians(scene, sums, corner, budget):
     low, high = scene.rows_of()
     for n in np.nonzero((low < last + 1) & (high > first))[0]:
         rows = to_pixels(float(low[n]), float(high[n]), first, last)
-        add_gaussian(scene, n, sums, corner, rows, budget)
+        add_gaussian(scene, n, sums, corner, rows)

@@ -7,8 +7,9 @@ from .arith import F, clamp, quiet
 from .decode import map_size
 from .errors import LimitExceeded
 from .model import drawn
-from .render import Budget, Grid, Request, Scene, add_gaussians
+from .render import Grid, Request, Scene, add_gaussians
 from .texture import gains_of_nodes, sums_of_map, texture_of_grid
+from .work import check_work
 
 AT_ONCE = 2**18  # pixels of the grid: a band of output rows covers no more of them, unless it is a single row
 ALPHA_MORE = F(2.0**-16)
@@ -26,7 +27,7 @@ def overlaps(X, i, output, grid):
 
 
 class Rendering:
-    """One rendering. Limits are checked before memory is allocated, except that work is counted as it is done."""
+    """One rendering. Limits are checked before memory is allocated."""
 
     def __init__(self, picture, request):
         header = picture.header
@@ -43,7 +44,7 @@ class Rendering:
         components = picture.all_components()[: request.first]
         gaussians = drawn(header.parameterization, components)
         self.scene = Scene(gaussians, self.grid, header.kernel, header.cutoff)
-        self.budget = Budget(pixels)
+        check_work(self.scene, (left, top), right - left, bottom - top)
         self.gains = None
         if picture.map is not None and request.texture:
             self.gains = gains_of_nodes(sums_of_map(picture.map, *map_size(header)), self.grid)
@@ -55,7 +56,7 @@ class Rendering:
         if self.gains is not None:
             colours = self.header.channels - self.has_alpha
             sums[:, :, :colours] += texture_of_grid(self.gains, self.grid, x, y, width, height)[:, :, np.newaxis]
-        add_gaussians(self.scene, sums, (x, y), self.budget)
+        add_gaussians(self.scene, sums, (x, y))
         return sums
 
     def floats(self, first_row, rows):

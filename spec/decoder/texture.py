@@ -5,7 +5,8 @@ import numpy as np
 from .arith import F, clamp
 from .header import QUARTIC
 from .model import CHOLESKY, drawn
-from .render import Budget, Grid, Scene, add_gaussians
+from .render import Grid, Scene, add_gaussians
+from .work import check_work
 
 MAP_BASE = [F(0), F(0), F(32768) / F(65535)]
 ISOTROPIC, HORIZONTAL, VERTICAL = 0, 1, 2  # patterns
@@ -19,7 +20,8 @@ def sums_of_map(components, columns, rows):
     sums[:] = MAP_BASE
     grid = Grid((columns, rows), (columns, rows), QUARTIC)
     scene = Scene(drawn(CHOLESKY, components), grid, QUARTIC, None)
-    add_gaussians(scene, sums, (0, 0), Budget(columns * rows))
+    check_work(scene, (0, 0), columns, rows)
+    add_gaussians(scene, sums, (0, 0))
     return sums
 
 

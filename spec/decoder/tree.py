@@ -28,12 +28,17 @@ def magnitude_class(magnitude):
     return min(magnitude.bit_length(), 4)
 
 
+def check_density(stream, count):
+    """The number of Gaussians that some bytes, from the state on, can have at most."""
+    if count > DENSEST * len(stream):
+        raise Malformed("more than four Gaussians for each byte")
+
+
 class LayerReader:
     """Reads the Gaussians of one layer of a picture of width x height pixels."""
 
     def __init__(self, stream, count, width, height, steps):
-        if count > DENSEST * len(stream):
-            raise Malformed("more than four Gaussians for each byte")
+        check_density(stream, count)
         self.reader = EntropyReader(stream)
         self.steps = steps
         self.root = root_side(width, height)
