@@ -523,6 +523,31 @@ fn first_errors(sound: &Sound) -> Vec<Vector> {
             sound.cut_after(2, &[b"L", &[50], &[2], &sound.gaussian[..7]]),
         ),
         Vector::invalid(
+            "xfirst-length-fifth",
+            "a length whose fifth byte is over 0x0F, cut off after it",
+            sound.cut_after(1, &[b"tEXt", &[0x80; 5]]),
+        ),
+        Vector::invalid(
+            "xfirst-critical-length",
+            "an unknown critical chunk with a length of 2^31",
+            sound.cut_after(2, &[b"Q", &[0x80, 0x80, 0x80, 0x80, 8]]),
+        ),
+        Vector::invalid(
+            "xfirst-header-layers",
+            "more than 65535 layers, and more layers than Gaussians",
+            sound.with_header(|header| header.layers = 70_000),
+        ),
+        Vector::invalid(
+            "xfirst-layer-nan-early",
+            "a layer with a NaN as its first value, cut off after it",
+            sound.cut_after(2, &[b"L", &[49], &[2], &0x7FC0_0000_u32.to_le_bytes()]),
+        ),
+        Vector::invalid(
+            "xfirst-layer-number-cut",
+            "a layer whose payload ends in its number, cut off in its CRC",
+            sound.cut_after(2, &[b"L", &[1], &[0x80], &[0]]),
+        ),
+        Vector::invalid(
             "xfirst-last-length",
             "a last layer whose length does not fit its Gaussians, cut off after it",
             sound.cut_after(3, &[b"L", &[25]]),
