@@ -153,7 +153,8 @@ def of_first(data: bytes) -> Result:
         result = f"{zlib.crc32(stored.tobytes()):08x}"
     except image_gip.GipError as error:
         kind = next(name for kind, name in KINDS.items() if isinstance(error, kind))
-        chunk = getattr(error, "chunk", None)
+        # Quotes in a type that is not of letters are escaped.
+        chunk = (getattr(error, "chunk", None) or "").replace("\\'", "'").replace('\\"', '"')
         result = f"{kind}{f' {chunk}' if chunk else ''}; {stream.arrived} kept"
     info = stream.info
     return result, [kind for kind, _ in info.skipped] if info else []

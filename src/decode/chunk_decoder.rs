@@ -56,8 +56,9 @@ enum Stage {
     /// There is no current chunk.
     #[default]
     Idle,
-    /// The payload is skipped.
-    Skip,
+    /// The payload is skipped: that of a type that is not known, of the end, or of a chunk that may not stand here,
+    /// for this reason.
+    Skip(Option<&'static str>),
     /// The payload is collected, and read as a whole.
     Collect {
         /// The bytes that have arrived.
@@ -147,11 +148,6 @@ impl ChunkDecoder {
 
     /// Begins a chunk with a payload of `length` bytes.
     pub(super) fn begin(&mut self, chunk: ChunkType, length: u32) -> Result<(), DecodeError> {
-        if let Some(reason) = self.flaw_of_place(chunk) {
-            self.skip(chunk, reason.into());
-            self.stage = Stage::Skip;
-            return Ok(());
-        }
         self.stage = match self.stage_of(chunk, length) {
             Err(DecodeError::Limit { .. }) if self.pending.count() > 0 => {
                 // Decoding the pending layers frees their memory.
@@ -189,7 +185,10 @@ impl ChunkDecoder {
         }
     }
 
-    /// Checks that a chunk may stand here, and decides what becomes of its payload.
+    /// Decides what becomes of the payload of a chunk.
+    ///
+    /// # Errors
+    /// When a critical chunk may not stand here, or a limit is exceeded.
     fn stage_of(&self, chunk: ChunkType, length: u32) -> Result<Stage, DecodeError> {
         let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
         let Some(header) = &self.header else {
@@ -201,6 +200,9 @@ impl ChunkDecoder {
                 _ => malformed("stands before the header"),
             };
         };
+        if let Some(flaw) = self.flaw_of_place(chunk) {
+            return Ok(Stage::Skip(Some(flaw)));
+        }
         match chunk {
             ChunkType::HEADER => malformed("appears twice"),
             ChunkType::LAYER if self.layers.len() == usize::from(header.layers) => {
@@ -217,11 +219,11 @@ impl ChunkDecoder {
                 malformed("fewer layers than the header declares")
             }
             ChunkType::END if length != 0 => malformed("is not empty"),
-            ChunkType::END => Ok(Stage::Skip),
+            ChunkType::END => Ok(Stage::Skip(None)),
             ChunkType::BNDS | ChunkType::TXTR => self.collect_within_limits(length),
             _ if Metadata::includes(chunk) => self.collect_within_limits(length),
             _ if chunk.is_critical() => Err(DecodeError::unknown_critical(chunk)),
-            _ => Ok(Stage::Skip),
+            _ => Ok(Stage::Skip(None)),
         }
     }
 
@@ -295,6 +297,7 @@ impl ChunkDecoder {
                 self.stage = Stage::Complete;
                 return Ok(());
             }
+            (_, &mut Stage::Skip(Some(flaw))) => self.skip(chunk, flaw.into()),
             _ => {}
         }
         self.stage = Stage::Idle;
