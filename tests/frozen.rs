@@ -56,7 +56,7 @@ fn pictures_have_the_samples_that_they_had() {
                 picture.render_u8(&options, &mut samples).expect("a sound request");
                 samples
             }
-            SampleDepth::Sixteen => {
+            _ => {
                 let mut samples = vec![0; length];
                 picture.render_u16(&options, &mut samples).expect("a sound request");
                 samples.iter().flat_map(|sample| sample.to_be_bytes()).collect()
