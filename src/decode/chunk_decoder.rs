@@ -1,6 +1,7 @@
 //! Decodes the chunks of a file one after the other: checks their order and their sizes, and keeps
 //! what they contain (spec, sections 4.3 to 5).
 
+use alloc::format;
 use alloc::vec::Vec;
 
 use super::memory::{peak_memory, reserve};
@@ -346,7 +347,7 @@ impl ChunkDecoder {
         match texture {
             Ok(texture) => self.texture = texture,
             Err(DecodeError::Malformed { reason, .. }) => return Ok(Err(reason)),
-            Err(DecodeError::Unsupported { what, .. }) => return Ok(Err(what.to_string().into())),
+            Err(DecodeError::Unsupported { what, .. }) => return Ok(Err(format!("{what}").into())),
             Err(error) => return Err(error),
         }
         Ok(Ok(()))
