@@ -133,7 +133,7 @@ fn thumb_hash(picture: &TestPicture) -> Result<Placeholders> {
     let hash = thumbhash::rgba_to_thumb_hash(width as usize, height as usize, &rgba);
     let decoded = thumbhash::thumb_hash_to_rgba(&hash);
     let (columns, rows, samples) = decoded.map_err(|()| anyhow!("no ThumbHash of it"))?;
-    let shown = enlarged(&opaque([columns as u32, rows as u32], samples), &original);
+    let shown = enlarged(&opaque([columns as u32, rows as u32], &samples), &original);
     let mut placeholders = Placeholders::default();
     offer(&mut placeholders, &Placeholder::new(hash.len(), shown, &original)?);
     Ok(placeholders)
@@ -148,7 +148,7 @@ fn blur_hash(picture: &TestPicture) -> Result<Placeholders> {
         for rows in 1..=MOST_COMPONENTS {
             let hash = blurhash::encode(columns, rows, width, height, &rgba)?;
             let samples = blurhash::decode(&hash, width, height, 1.0)?;
-            let shown = opaque([width, height], samples);
+            let shown = opaque([width, height], &samples);
             offer(&mut placeholders, &Placeholder::new(hash.len(), shown, &original)?);
         }
     }
@@ -156,7 +156,7 @@ fn blur_hash(picture: &TestPicture) -> Result<Placeholders> {
 }
 
 /// Interleaved samples with an alpha channel, which is left out.
-fn opaque([width, height]: [u32; 2], rgba: Vec<u8>) -> RgbImage {
+fn opaque([width, height]: [u32; 2], rgba: &[u8]) -> RgbImage {
     let samples = rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]).copied().collect();
     RgbImage::from_raw(width, height, samples).expect("they are of this size")
 }

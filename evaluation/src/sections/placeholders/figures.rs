@@ -32,7 +32,7 @@ pub(super) fn measure(bench: &mut Bench) -> Result<String> {
     let mut text = format!(
         "Files that pages show while the picture itself is on its way: of at most {} bytes, as `gip encode --bytes` makes them at effort \
          {}. Each is shown at an eighth of the picture's size, and compared there with the averages \
-         of the picture over squares of eight pixels. A ThumbHash has about 25 bytes; its 32 pixels \
+         of the picture over squares of eight pixels. A ThumbHash has 20 to 25 bytes; its 32 pixels \
          are enlarged. A BlurHash has as many components as fit, at most 9 x 9, and is decoded at this \
          size. WebP, AVIF (at speed 6, and at speed 0 in 4:4:4) and JPEG XL are given the picture at \
          sixteen sizes, at all of their qualities, and are enlarged. (Bicubic enlargement; smaller \

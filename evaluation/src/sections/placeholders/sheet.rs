@@ -13,7 +13,7 @@ const PICTURES: usize = 6;
 /// They are side by side.
 const COLUMNS: u32 = 2;
 const GAP: u32 = 4;
-const QUALITY: u8 = 85;
+const QUALITY: u8 = 70;
 const NAME: &str = "sheet-placeholders.jpg";
 
 /// All placeholders of a picture, side by side: a row for each budget.
