@@ -311,6 +311,27 @@ fn each_tuning_is_the_better_one_by_its_own_measure() {
 }
 
 #[test]
+fn small_files_of_large_pictures_show_them() {
+    // No side is a multiple of that of the squares that the encoder takes averages of.
+    const SIZE: [u32; 2] = [330, 233];
+    for color in COLORS {
+        let samples = scene(SIZE[0], SIZE[1], color.channels());
+        let source = Source::new_u8(SIZE[0], SIZE[1], color, &samples).expect("sizes agree");
+        for tune in [Tune::Visual, Tune::Psnr] {
+            let report = |bytes| {
+                let encoder = quick(Target::Bytes(bytes)).with_tune(tune).with_effort(2);
+                let encoded = encoder.encode(&source).expect("it encodes");
+                assert!(encoded.bytes.len() as u64 <= bytes, "{color:?}, {tune:?}");
+                encoded.report
+            };
+            let reports = [60, 120, 300, 900].map(report);
+            let rises = reports.windows(2).all(|pair| pair[1].psnr > pair[0].psnr + 1.0);
+            assert!(rises, "{color:?}, {tune:?}: {:?}", reports.map(|report| report.psnr));
+        }
+    }
+}
+
+#[test]
 fn small_ramps_are_not_given_up() {
     const SIZE: u32 = 32;
     let ramps: Vec<u8> = (0..SIZE * SIZE)

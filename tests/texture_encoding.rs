@@ -121,6 +121,16 @@ fn a_size_counts_the_texture() {
 }
 
 #[test]
+fn a_small_file_has_no_texture() {
+    let of = |bytes| encoded(&beach(), Encoder::new().with_target(Target::Bytes(bytes)));
+    for bytes in [150, 1000] {
+        let report = of(bytes).report;
+        assert_eq!((report.texture_gaussians, report.texture_bytes), (0, 0), "{bytes}");
+    }
+    assert!(of(1200).report.texture_gaussians > 0);
+}
+
+#[test]
 fn the_strength_is_that_of_the_grains() {
     let source = beach();
     let grains = [0, 25, 50, 100].map(|strength| {

@@ -123,6 +123,11 @@ pub(crate) fn decode_plain(file: &[u8], threads: Threads) -> Result<Vec<u8>> {
     decode_with(file, RenderOptions::new().with_threads(threads).with_texture(false))
 }
 
+/// The same as by default, at another size than the stored one.
+pub(crate) fn decode_at(file: &[u8], (width, height): (u32, u32)) -> Result<Vec<u8>> {
+    decode_with(file, RenderOptions::new().with_size(width, height))
+}
+
 fn decode_with(file: &[u8], options: RenderOptions) -> Result<Vec<u8>> {
     let mut decoder = Decoder::new(file)?;
     decoder.set_options(options);

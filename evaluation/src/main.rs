@@ -33,8 +33,8 @@ use bench::{Bench, Folders};
 use blind::{choices, triplets};
 use report::Section;
 use sections::{
-    ablation, content, decode, monotony, printed, quality, rate, representation, sheet, speed,
-    stability, texture,
+    ablation, content, decode, monotony, placeholders, printed, quality, rate, representation,
+    sheet, speed, stability, texture,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -124,6 +124,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Printed => printed::measure(bench),
         Section::Quality => quality::measure(bench),
         Section::Sheet => sheet::measure(bench),
+        Section::Placeholders => placeholders::measure(bench),
         Section::Speed => speed::measure(bench),
         Section::Decode => decode::measure(bench),
         Section::Stability => stability::measure(bench),

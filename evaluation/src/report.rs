@@ -31,6 +31,8 @@ pub(crate) enum Section {
     Quality,
     /// What one sees at equal size: contact sheets of crops
     Sheet,
+    /// Files of 100 to 800 bytes against ThumbHash, BlurHash and the smallest files of others
+    Placeholders,
     /// Time against quality, and how time and memory grow
     Speed,
     /// Decoding time against other decoders; threads and partial decoding
@@ -45,7 +47,7 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
@@ -53,6 +55,7 @@ impl Section {
         Self::Printed,
         Self::Quality,
         Self::Sheet,
+        Self::Placeholders,
         Self::Speed,
         Self::Decode,
         Self::Stability,
@@ -69,6 +72,7 @@ impl Section {
             Self::Printed => "Beside printed figures",
             Self::Quality => "Quality as asked for",
             Self::Sheet => "Contact sheets",
+            Self::Placeholders => "Placeholders",
             Self::Speed => "Speed against error",
             Self::Decode => "Decoding",
             Self::Stability => "Numerical stability",

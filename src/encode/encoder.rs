@@ -134,7 +134,7 @@ impl Encoder {
 
     /// How much time to spend, from 1 (least) to 7 (most). Default 4. Each effort takes about twice as
     /// long as the one before. A picture of at most 32,768 pixels is encoded with the lower efforts as well,
-    /// and the best file is kept.
+    /// and one that is to have at most 1,000 bytes several times; the best file is kept.
     pub fn with_effort(mut self, effort: u8) -> Self {
         self.effort = effort;
         self
@@ -149,7 +149,7 @@ impl Encoder {
     /// How strong the texture is, from 0 (none) to 100. Default 50, with which pictures look most like their
     /// sources. It takes the place of fine irregular detail that the file has no bits for, such as sand, water
     /// and leaves, and takes 1 to 3 % of the file. Only files of [`Precision::Entropy`] with [`Tune::Visual`] have
-    /// one, and only where the source has such detail.
+    /// one, and only where the source has such detail. A file that is to have at most 1,000 bytes has none.
     pub fn with_texture(mut self, strength: u8) -> Self {
         self.texture = strength;
         self

@@ -14,7 +14,7 @@ use super::quality::Judge;
 use super::rdo::{SearchWork, TargetSearch};
 use super::tiled_source::TiledSource;
 use super::workload::TEXTURE;
-use super::{rate_model, texture};
+use super::{rate_model, sketch, texture};
 use crate::chunk::ChunkType;
 use crate::coding::entropy::QuantizedCodes;
 use crate::gaussian::Gaussian;
@@ -83,7 +83,7 @@ pub(crate) fn finish(
     drop(fit);
     observer.poll()?;
     let search_work = SearchWork::new(job, gaussians.len());
-    let texture = if job.has_texture() {
+    let texture = if job.has_texture() && !sketch::is_small(job.aim) {
         let work = job.workload(gaussians.len()).of(TEXTURE);
         observer.expect(work + search_work.whole());
         let limits = Limits::none();

@@ -26,6 +26,7 @@ mod rdo;
 mod rows;
 mod sample_tile;
 mod shortfall;
+mod sketch;
 mod source;
 mod strips;
 #[cfg(test)]

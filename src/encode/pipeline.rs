@@ -14,6 +14,7 @@ use super::quality::{self, Judge};
 use super::rate_model;
 use super::rdo::SearchWork;
 use super::shortfall::{Reached, Shortfall};
+use super::sketch::{self, Sketch};
 use super::tiled_source::TiledSource;
 use super::verify::Verified;
 use super::workload::PREPARATION;
@@ -49,8 +50,8 @@ pub(crate) fn encode(jobs: &[Job<'_>], observer: &mut Observer<'_>) -> Result<Ou
     Ok(best)
 }
 
-/// The file of a job. If its target is a size, one of more Gaussians where the size has room for them, or of
-/// fewer where these show about as good a picture.
+/// The file of a job. If its target is a size, and it is no sketch, one of more Gaussians where the size has room
+/// for them, or of fewer where these show about as good a picture.
 fn encode_once(
     job: &Job<'_>,
     judge: &Judge<'_>,
@@ -58,6 +59,9 @@ fn encode_once(
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
     let outcome = encode_for_target(job, judge, None, work, observer)?;
+    if sketch::is_for(job) {
+        return Ok(outcome);
+    }
     let Aim::File(FileAim::Size(most_bytes)) = job.aim else { return Ok(outcome) };
     // Files are compared by PSNR with either tune: they are tuned alike, and with so many Gaussians the
     // estimate of quality is often near its highest, where it hardly tells them apart.
@@ -138,7 +142,11 @@ fn encode_for_target(
     let Job { source, precision, training, .. } = *job;
     let preparation = job.workload(0).of(PREPARATION);
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
-    let tiled = TiledSource::new(source, job.tune, observer)?;
+    let sketch = Sketch::of(job, observer)?;
+    let tiled = match &sketch {
+        Some(sketch) => sketch.tiled(source, observer)?,
+        None => TiledSource::new(source, job.tune, observer)?,
+    };
     let (kernel, parameterization) = (training.kernel, training.parameterization);
     let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata)
         .with_first_layer(job.first_layer);
@@ -160,14 +168,20 @@ fn encode_for_target(
     let preparing = tiled.memory() + tiled.scratch_memory;
     let peak_before = work.peak_memory.max(preparing);
     let work = Work { peak_memory: 0, ..work };
-    let mut fit = Fit::new(&tiled, training, budget, precision, layout.base(), job.seed, work);
-    fit.run(job.workload(expected), observer)?;
-    let is_lost_to_rounding = fit.is_lost_to_rounding();
-
-    let (file, mut work) = match precision {
-        Precision::Entropy => entropy::finish(fit, job, judge, budget, &tiled, &layout, observer),
-        Precision::Packed | Precision::Float => {
-            packed::finish(fit, job, judge, budget, &layout, observer)
+    let mut is_lost_to_rounding = false;
+    let (file, mut work) = if let Some(sketch) = &sketch {
+        sketch.encode(job, budget, &tiled, &layout, work, observer)
+    } else {
+        let mut fit = Fit::new(&tiled, training, budget, precision, layout.base(), job.seed, work);
+        fit.run(job.workload(expected), observer)?;
+        is_lost_to_rounding = fit.is_lost_to_rounding();
+        match precision {
+            Precision::Entropy => {
+                entropy::finish(fit, job, judge, budget, &tiled, &layout, observer)
+            }
+            Precision::Packed | Precision::Float => {
+                packed::finish(fit, job, judge, budget, &layout, observer)
+            }
         }
     }?;
 

@@ -80,7 +80,13 @@ impl<'a> Source<'a> {
 
     /// A picture of the same size, model and depth with other samples.
     pub(crate) fn with_samples<'b>(&self, samples: SourceSamples<'b>) -> Source<'b> {
-        let Self { width, height, color, keeps_invisible, curve, .. } = *self;
+        self.resized(self.size(), samples)
+    }
+
+    /// A picture of the same model with another size, and its samples.
+    pub(crate) fn resized<'b>(&self, size: [usize; 2], samples: SourceSamples<'b>) -> Source<'b> {
+        let Self { color, keeps_invisible, curve, .. } = *self;
+        let [width, height] = size.map(|side| side as u32);
         Source { width, height, color, samples, keeps_invisible, curve }
     }
 

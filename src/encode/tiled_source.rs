@@ -38,6 +38,19 @@ impl TiledSource {
         tune: Tune,
         observer: &mut Observer<'_>,
     ) -> Result<Self> {
+        Self::with_loss(
+            source,
+            |source, observer| PictureLoss::new(source, tune, observer),
+            observer,
+        )
+    }
+
+    /// The same, where errors count as is said, given the colours that count.
+    pub(crate) fn with_loss(
+        source: &Source<'_>,
+        loss: impl FnOnce(&Source<'_>, &mut Observer<'_>) -> Result<PictureLoss>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self> {
         let bled = Bled::new(source, observer)?;
         let bled_memory = bled.as_ref().map_or(0, |bled| bled.memory(source));
         let bled_source = bled.as_ref().map(|bled| bled.source(source));
@@ -57,7 +70,7 @@ impl TiledSource {
         };
         let full = (width * height) as f64 * f64::from(FULL_SCALE);
         let mean = sums.map(|sum| (sum as f64 / full) as f32);
-        let loss = PictureLoss::new(source, tune, observer)?;
+        let loss = loss(source, observer)?;
         let scratch_memory = bled_memory + loss.scratch_memory(source);
         Ok(Self { width, height, channels, loss, mean, planes, scratch_memory })
     }

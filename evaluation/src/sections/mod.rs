@@ -14,6 +14,7 @@ mod float_file;
 mod growth;
 mod methods;
 pub(crate) mod monotony;
+pub(crate) mod placeholders;
 pub(crate) mod printed;
 mod product_tests;
 pub(crate) mod quality;

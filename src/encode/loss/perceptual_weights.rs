@@ -102,6 +102,14 @@ impl PerceptualWeights {
         Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })
     }
 
+    /// Those of a picture of some size of which this one is a copy, smaller by a factor.
+    pub(super) fn enlarged(&self, size: [usize; 2], factor: usize) -> Self {
+        let [columns, rows] = size.map(|side| side.div_ceil(BLOCK));
+        let block = |at| self.row(at / columns / factor)[at % columns / factor];
+        let blocks = (0..columns * rows).map(block).collect();
+        Self { columns, blocks, ..*self }
+    }
+
     /// A row of blocks.
     #[inline]
     pub(crate) fn row(&self, row: usize) -> &[BlockWeights] {

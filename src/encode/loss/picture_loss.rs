@@ -23,7 +23,7 @@ const VISUAL_AXIS_STEPS: [f32; 4] = [1.0, 1.625, 1.625, 1.0];
 #[derive(Debug)]
 pub(crate) struct PictureLoss {
     size: [usize; 2],
-    /// Half of the quantization step of the source's depth, where a full sample is 1.
+    /// That of the source.
     pub(super) half_step: f32,
     /// `None` if all errors count the same.
     weights: Option<PerceptualWeights>,
@@ -38,18 +38,29 @@ impl PictureLoss {
         tune: Tune,
         observer: &mut Observer<'_>,
     ) -> Result<Self> {
-        let half_step = 0.5 / f32::from(source.depth().max_sample());
         let weights = match tune {
             Tune::Visual => Some(PerceptualWeights::new(source, observer)?),
             Tune::Psnr => None,
         };
         Ok(Self {
             size: source.size(),
-            half_step,
+            half_step: half_step(source),
             weights,
             color: source.color(),
             has_colors: true,
         })
+    }
+
+    /// That of a picture of which this one is a copy, smaller by a factor.
+    pub(crate) fn enlarged(&self, source: &Source<'_>, factor: usize) -> Self {
+        let Self { weights, color, has_colors, .. } = self;
+        Self {
+            size: source.size(),
+            half_step: half_step(source),
+            weights: weights.as_ref().map(|weights| weights.enlarged(source.size(), factor)),
+            color: *color,
+            has_colors: *has_colors,
+        }
     }
 
     /// The loss of a picture whose channels are no colours.
@@ -185,6 +196,11 @@ impl PictureLoss {
     pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
         self.weights.as_ref().map_or(0, |weights| weights.scratch_memory(source))
     }
+}
+
+/// Half of the quantization step of a source's depth, where a full sample is 1.
+fn half_step(source: &Source<'_>) -> f32 {
+    0.5 / f32::from(source.depth().max_sample())
 }
 
 /// The residuals of sixteen samples, given the differences of a rendering from the source and the samples of

@@ -59,7 +59,7 @@ impl Verdict {
     }
 
     /// The largest distance.
-    fn worst(&self) -> f64 {
+    pub(crate) fn worst(&self) -> f64 {
         self.distance.into_iter().chain(self.mirrored).fold(0.0, f64::max)
     }
 }

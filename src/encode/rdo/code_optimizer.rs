@@ -16,7 +16,7 @@ use crate::limits::Limits;
 use crate::render::Picture;
 
 // Constants: docs/tuning.md, "Search for a target".
-/// A penalty for decoding time, in bits per Gaussian on average; each Gaussian has a share that is
+/// The usual penalty for decoding time, in bits per Gaussian on average; each Gaussian has a share that is
 /// proportional to the number of tiles that it touches.
 const DECODING_TIME_BITS: f32 = 4.0;
 
@@ -51,6 +51,8 @@ pub(super) struct CodeOptimizer<'a> {
     layout: &'a FileLayout<'a>,
     grid: CenterGrid,
     model: ColorModel,
+    /// The penalty for decoding time, in bits per Gaussian on average.
+    decoding_time_bits: f32,
     /// Those of the codes that are optimized at present.
     residuals: Residuals,
 }
@@ -64,7 +66,13 @@ impl<'a> CodeOptimizer<'a> {
         let header = layout.header();
         let grid = CenterGrid::new(header.width, header.height);
         let residuals = Residuals::new(tiled, observer)?;
-        Ok(Self { tiled, layout, grid, model: header.color, residuals })
+        let (model, decoding_time_bits) = (header.color, DECODING_TIME_BITS);
+        Ok(Self { tiled, layout, grid, model, decoding_time_bits, residuals })
+    }
+
+    /// The same without a penalty for decoding time.
+    pub(super) fn at_any_decoding_time(self) -> Self {
+        Self { decoding_time_bits: 0.0, ..self }
     }
 
     /// Rounds `gaussians` to the quantization grid for a step of colour, given by its base-2 logarithm.
@@ -132,7 +140,7 @@ impl<'a> CodeOptimizer<'a> {
         }
         let tree_bits = 8.0 * bytes as f32 - attribute_bits;
         let tree_bits = (tree_bits / codes.len().max(1) as f32).max(0.0);
-        let tile_bits = DECODING_TIME_BITS * codes.len() as f32 / tiles.max(1.0);
+        let tile_bits = self.decoding_time_bits * codes.len() as f32 / tiles.max(1.0);
         let lambda = rate_model::lambda(&quantization) * lambda.exp2() as f32;
         let descent =
             CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda, work };

@@ -94,6 +94,11 @@ impl<'a> TargetSearch<'a> {
         Ok(Self { judge, layout, work, codes })
     }
 
+    /// The same for a file whose time to decode is no matter, as it has few Gaussians.
+    pub(crate) fn at_any_decoding_time(self) -> Self {
+        Self { codes: self.codes.at_any_decoding_time(), ..self }
+    }
+
     /// The most memory of a search for codes of some Gaussians, in bytes, with that of the source.
     pub(crate) fn memory(tiled: &TiledSource, gaussians: &[Gaussian]) -> usize {
         let strip = strips::memory(tiled.width as u32, tiled.height as u32, tiled.channels);
