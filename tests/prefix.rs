@@ -145,22 +145,32 @@ fn packed() -> File {
 #[test]
 fn flaws_are_told() {
     let sound = packed().with(b"iCCP", PROFILE).chunks();
-    let [header, first, second, end] = [0, 2, 3, 4].map(|index| sound[index].clone());
+    let [header, profile, first, second, end] = [0, 1, 2, 3, 4].map(|index| sound[index].clone());
     Prefixes::new(&of_chunks(&sound)).expect("it is sound");
     let mut damaged = first.clone();
     *damaged.last_mut().expect("a CRC") ^= 1;
     let critical = common::chunk(b"Q", &[]);
+    let long = common::chunk(b"H", &[0x30; 256]);
     for (chunks, expected) in [
         (vec![first.clone(), end.clone()], "chunk L (layer): "),
         (vec![header.clone(), header.clone()], "chunk H (header): "),
-        (vec![header.clone(), damaged], "chunk L (layer): the CRC does not match"),
-        (vec![header.clone(), critical], "chunk Q: unsupported"),
-        (vec![header.clone(), first.clone(), second.clone(), second.clone()], "more layers than"),
+        (vec![long], "chunk H (header): unsupported: length 256"),
+        (vec![header.clone(), damaged.clone()], "chunk L (layer): the CRC does not match"),
+        (vec![header.clone(), critical.clone()], "chunk Q: unsupported"),
     ] {
         let error = Prefixes::new(&of_chunks(&chunks)).expect_err("a flaw").to_string();
         assert!(error.contains(expected), "{error}");
     }
     assert!(matches!(Prefixes::new(b"GIF89a"), Err(DecodeError::Signature)));
+    // What comes after the first layer does not take it away.
+    let whole = Prefixes::new(&of_chunks(&sound)).expect("it is sound").iter().next();
+    for flaw in [damaged, critical, header.clone(), common::chunk(b"E", &[0])] {
+        let file = of_chunks(&[header.clone(), profile.clone(), first.clone(), flaw]);
+        let prefixes = Prefixes::new(&file).expect("a layer");
+        assert_eq!((prefixes.iter().next(), prefixes.iter().len()), (whole, 1));
+    }
+    let many = [header, profile, first, second.clone(), second, end];
+    assert_eq!(Prefixes::new(&of_chunks(&many)).expect("two layers").iter().len(), 2);
     // What follows the end is no part of the file.
     let longer = [of_chunks(&sound), vec![7; 9]].concat();
     assert_eq!(Prefixes::new(&longer).expect("it is sound").iter().len(), 2);
@@ -207,7 +217,10 @@ fn what_decoders_skip_is_left_out() {
     let limited = (1, common::chunk(b"cICP", &[1, 1, 0, 0]));
     let second = (2, common::chunk(b"iCCP", b"another"));
     let late = (3, common::chunk(b"cICP", &[1, 13, 0, 1]));
-    for (at, flaw) in [limited, second, late] {
+    // Exif that turns the picture after some that does not.
+    let upright = common::chunk(b"eXIF", UPRIGHT);
+    let turned = (1, [upright, common::chunk(b"eXIF", TURNED)].concat());
+    for (at, flaw) in [limited, second, late, turned] {
         let mut chunks = sound.clone();
         chunks.insert(at, flaw);
         let file = of_chunks(&chunks);
@@ -217,12 +230,38 @@ fn what_decoders_skip_is_left_out() {
 }
 
 #[test]
-fn a_file_without_gaussians_has_no_prefixes() {
-    let file = of_chunks(&[Header::default().chunk(&[]), common::chunk(b"E", &[])]);
+fn of_exif_the_orientation_alone_is_kept() {
+    for order in [TURNED, b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"] {
+        let exif = [order, &[7; 20_000]].concat();
+        let file = packed().with(b"eXIF", &exif).bytes();
+        let prefixes = Prefixes::new(&file).expect("it is sound");
+        for prefix in prefixes.iter() {
+            let small = prefixes.file(prefix);
+            assert_eq!(small.len(), prefix.bytes);
+            assert_eq!(decode_valid(&small).metadata().exif.as_deref(), Some(TURNED));
+        }
+    }
+}
+
+#[test]
+fn a_file_without_gaussians_is_its_own_prefix() {
+    let header = Header::default().chunk(&[]);
+    let text = common::chunk(b"tEXt", b"Title\0Black");
+    let turned = common::chunk(b"eXIF", TURNED);
+    let end = common::chunk(b"E", &[]);
+    let file = of_chunks(&[header.clone(), text, turned.clone(), end.clone()]);
     decode_valid(&file);
     let prefixes = Prefixes::new(&file).expect("a valid file");
-    assert_eq!((prefixes.layers(), prefixes.iter().len()), (0, 0));
-    assert_eq!(prefixes.within(usize::MAX), None);
+    let [prefix] = prefixes.iter().collect::<Vec<_>>()[..] else { panic!("{prefixes:?}") };
+    assert_eq!((prefixes.layers(), prefix.layers, prefix.gaussians), (0, 0, 0));
+    assert_eq!(prefix.end, file.len());
+    let small = prefixes.file(prefix);
+    assert_eq!(small, of_chunks(&[header, turned, end]));
+    assert_eq!(prefix.bytes, small.len());
+    assert_eq!(prefixes.within(small.len() - 1), None);
+    // Not before its end.
+    let cut = Prefixes::new(&file[..file.len() - 1]).expect("the header is there");
+    assert_eq!(cut.iter().len(), 0);
 }
 
 #[test]

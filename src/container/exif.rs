@@ -25,6 +25,14 @@ pub(super) fn reset_orientation(exif: &mut [u8]) {
     }
 }
 
+/// Exif data that say an orientation and nothing else.
+#[cfg(feature = "encode")]
+pub(super) fn of_orientation(orientation: Orientation) -> Vec<u8> {
+    // The directory stands at byte 8, has one entry with one short number, and no other one follows it.
+    let directory = [1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, orientation.to_exif(), 0, 0, 0, 0, 0, 0, 0];
+    [&b"II*\0\x08\0\0\0"[..], &directory].concat()
+}
+
 /// Where the value of the orientation is.
 fn find_orientation(exif: &[u8]) -> Option<(usize, ByteOrder)> {
     let directory = Directory::first(exif)?;

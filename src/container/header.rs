@@ -17,6 +17,9 @@ use crate::kernel::Kernel;
 /// Largest width and height of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 1 << 20;
 
+/// Most bytes of the payload.
+const MAX_LENGTH: u32 = 255;
+
 /// The fields of the first byte of the header, from the lowest bit on.
 const COLOR_MODEL: u8 = 0b0000_0011;
 const SIXTEEN_BITS: u8 = 0b0000_0100;
@@ -78,6 +81,14 @@ pub(crate) enum Dequantizer {
 }
 
 impl Header {
+    /// Refuses a payload that is too long, before it is read.
+    pub(crate) fn check_length(length: u32) -> Result<(), DecodeError> {
+        if length > MAX_LENGTH {
+            return Err(DecodeError::unsupported(ChunkType::HEADER, "length", length));
+        }
+        Ok(())
+    }
+
     /// Reads the payload of the header. There is nothing to turn codes into values if there are no Gaussians.
     pub(crate) fn parse(payload: &[u8]) -> Result<(Self, Option<Dequantizer>), DecodeError> {
         let unsupported =

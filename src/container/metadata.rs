@@ -1,5 +1,7 @@
 //! Metadata: colour space, ICC profile, Exif, XMP and texts (spec, section 5.5).
 
+#[cfg(feature = "encode")]
+use alloc::borrow::Cow;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -123,15 +125,20 @@ impl Metadata {
         }
     }
 
-    /// Whether a chunk that is copied as it is has a sound payload.
+    /// What a placeholder keeps of a chunk, so that it is shown as the whole picture is: its colours as they are, and of
+    /// Exif that turns it the orientation alone. `None` of all else, and of what breaks a rule.
     #[cfg(feature = "encode")]
-    pub(crate) fn is_sound(chunk: ChunkType, payload: &[u8]) -> bool {
+    pub(crate) fn for_placeholder(chunk: ChunkType, payload: &[u8]) -> Option<Cow<'_, [u8]>> {
+        let is_sound = || Self::default().insert(chunk, payload.into()).is_ok();
         match chunk {
-            ChunkType::CICP | ChunkType::MDCV | ChunkType::CLLI => {
-                Self::default().insert(chunk, payload.into()).is_ok()
+            ChunkType::EXIF if Self::turns(payload) => {
+                let orientation = exif::orientation(payload).unwrap_or_default();
+                Some(exif::of_orientation(orientation).into())
             }
-            // Profiles, Exif and XMP may be anything.
-            _ => true,
+            // A profile may be anything, and long.
+            ChunkType::ICCP => Some(payload.into()),
+            _ if Self::is_of_color(chunk) && is_sound() => Some(payload.into()),
+            _ => None,
         }
     }
 
@@ -148,6 +155,12 @@ impl Metadata {
         Self::is_of_color(chunk) || chunk == ChunkType::EXIF && Self::turns(payload)
     }
 
+    /// Whether chunks of a type may say how the picture is shown.
+    #[cfg(feature = "encode")]
+    pub(crate) fn may_be_of_display(chunk: ChunkType) -> bool {
+        Self::is_of_color(chunk) || chunk == ChunkType::EXIF
+    }
+
     /// Whether a chunk is metadata, which [`Metadata::insert`] takes.
     pub(crate) fn includes(chunk: ChunkType) -> bool {
         use ChunkType as Type;
@@ -155,17 +168,15 @@ impl Metadata {
         Self::is_of_color(chunk) || matches!(chunk, Type::EXIF | Type::XMP | Type::TEXT)
     }
 
-    /// An upper bound of the memory that is held, in bytes.
-    pub(crate) fn memory(&self) -> u64 {
+    /// An upper bound of the memory that a chunk with a payload of `length` bytes takes, in bytes.
+    pub(crate) fn memory_of(chunk: ChunkType, length: usize) -> u64 {
         // While the vector of texts grows, it takes memory for up to three elements per text. The
         // fourth stands for the two strings: even a short one takes one of the allocator's smallest
         // blocks.
         const PER_TEXT: usize = 4 * size_of::<Text>();
 
-        let blobs = [&self.icc_profile, &self.exif, &self.xmp];
-        let blobs = blobs.into_iter().flatten().map(Vec::len).sum::<usize>();
-        let texts = self.texts.iter().map(|t| t.keyword.len() + t.text.len()).sum::<usize>();
-        blobs as u64 + texts as u64 + (self.texts.len() * PER_TEXT) as u64
+        let text = if chunk == ChunkType::TEXT { PER_TEXT } else { 0 };
+        (length + text) as u64
     }
 
     /// Checks that all of it can be stored.

@@ -1,6 +1,7 @@
 //! Small files that are the beginning of large ones: the first layers of a file are a picture, and so is a file of them
 //! (spec, section 4.4). Nothing is decoded for it.
 
+use alloc::borrow::Cow;
 use alloc::vec::Vec;
 
 use super::header::{Dequantizer, Header};
@@ -30,15 +31,19 @@ pub struct Prefix {
 ///
 /// A file that is cut off is no whole file, which decoders report as an error. These are: a placeholder of a few
 /// hundred bytes, or a smaller picture for a slow line, from a file that is at hand, without decoding and encoding.
-/// They keep what says how the picture is shown: its colour space and ICC profile, and Exif if it turns the picture.
-/// Texture and other metadata are left out.
+/// They keep what says how the picture is shown: its colour space and ICC profile, and its orientation. Texture and
+/// all other metadata are left out. A file without Gaussians has one prefix, of no layers.
 #[derive(Debug)]
 pub struct Prefixes<'a> {
     header: Header,
     dequantizer: Option<Dequantizer>,
     /// Chunks to keep, all of which stand before the first layer.
-    kept: Vec<(ChunkType, &'a [u8])>,
+    kept: Vec<(ChunkType, Cow<'a, [u8]>)>,
+    /// The types of the chunks that may be kept once and have come, kept or not.
+    seen: Vec<ChunkType>,
     layers: Vec<Layer<'a>>,
+    /// Where the file ends, if that has come.
+    end: Option<usize>,
 }
 
 #[derive(Debug)]
@@ -63,40 +68,53 @@ impl Layer<'_> {
 }
 
 impl<'a> Prefixes<'a> {
-    /// The prefixes of a file, or of the beginning of one.
+    /// The prefixes of a file, or of the beginning of one, or of one that is damaged after its first layer.
     ///
     /// # Errors
-    /// When the header is not complete, or the file is malformed or unsupported up to the last complete layer. The
-    /// Gaussians themselves are not looked at.
+    /// When the first layer is not complete, and the header is not complete either or the file malformed or
+    /// unsupported. The Gaussians themselves are not looked at.
     pub fn new(file: &'a [u8]) -> Result<Self, DecodeError> {
+        let mut found = None;
+        match Self::read(file, &mut found) {
+            Ok(current) => found.ok_or(DecodeError::UnexpectedEnd { chunk: current }),
+            Err(error) => found.filter(|found: &Self| !found.layers.is_empty()).ok_or(error),
+        }
+    }
+
+    /// Reads a file as far as it goes. Returns the chunk that is incomplete.
+    fn read(file: &'a [u8], found: &mut Option<Self>) -> Result<Option<ChunkType>, DecodeError> {
         let mut parser = Parser::new();
         let (mut rest, mut payload) = (file, &file[..0]);
-        let mut found: Option<Self> = None;
         loop {
             match parser.next(&mut rest)? {
-                Event::NeedMore => break,
-                Event::Begin(chunk, _) => {
+                Event::NeedMore => return Ok(parser.current()),
+                Event::Begin(chunk, length) => {
                     if found.is_some() == (chunk == ChunkType::HEADER) {
                         let reason = "the header does not stand at the beginning, and only there";
                         return Err(DecodeError::malformed(chunk, reason));
+                    }
+                    if chunk == ChunkType::HEADER {
+                        Header::check_length(length)?;
                     }
                     payload = &[];
                 }
                 // All of it is there if the chunk is complete.
                 Event::Payload(bytes) => payload = bytes,
-                Event::Complete(ChunkType::END, _) => break,
-                Event::Complete(chunk, _) => match &mut found {
-                    None => found = Some(Self::of_header(payload)?),
+                Event::Complete(chunk, _) => match found {
+                    None => *found = Some(Self::of_header(payload)?),
                     Some(found) => found.add(chunk, payload, file.len() - rest.len())?,
                 },
             }
+            if found.as_ref().is_some_and(|found| found.end.is_some()) {
+                return Ok(None);
+            }
         }
-        found.ok_or(DecodeError::UnexpectedEnd { chunk: parser.current() })
     }
 
     fn of_header(payload: &[u8]) -> Result<Self, DecodeError> {
         let (header, dequantizer) = Header::parse(payload)?;
-        Ok(Self { header, dequantizer, kept: Vec::new(), layers: Vec::new() })
+        let (kept, seen, layers) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { header, dequantizer, kept, seen, layers, end: None })
     }
 
     /// Takes the payload of a chunk that ends at this place in the file.
@@ -115,17 +133,26 @@ impl<'a> Prefixes<'a> {
                 let gaussians = declared.take(&mut bytes)?;
                 self.layers.push(Layer { gaussians, bytes, end, gaussians_before, bytes_before });
             }
-            // Others break a rule if they stand after the first layer: decoders skip them.
-            _ if Metadata::is_of_display(chunk, payload) && self.layers.is_empty() => {
-                let is_second = self.kept.iter().any(|(kept, _)| *kept == chunk);
-                if !is_second && Metadata::is_sound(chunk, payload) {
-                    self.kept.push((chunk, payload));
+            ChunkType::END => self.end = Some(end),
+            // Others of them break a rule: decoders skip them.
+            _ if Metadata::may_be_of_display(chunk) => {
+                if self.layers.is_empty() && !self.seen.contains(&chunk) {
+                    self.keep(chunk, payload);
                 }
             }
             _ if !chunk.is_critical() => {}
             _ => return Err(DecodeError::unknown_critical(chunk)),
         }
         Ok(())
+    }
+
+    /// Keeps the first sound chunk of a type, as far as it says how the picture is shown.
+    fn keep(&mut self, chunk: ChunkType, payload: &'a [u8]) {
+        let kept = Metadata::for_placeholder(chunk, payload);
+        if kept.is_some() || chunk == ChunkType::EXIF {
+            self.seen.push(chunk);
+        }
+        self.kept.extend(kept.map(|payload| (chunk, payload)));
     }
 
     /// The Gaussians and the bytes of all layers so far.
@@ -138,11 +165,19 @@ impl<'a> Prefixes<'a> {
 
     /// All prefixes: first that of the first layer.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Prefix> + '_ {
-        self.layers.iter().enumerate().map(|(number, last)| Prefix {
-            layers: number as u16 + 1,
-            gaussians: last.gaussians_before + last.gaussians,
-            bytes: self.length(number, last),
-            end: last.end,
+        let is_empty = self.header.layers == 0;
+        let count = if is_empty { self.end.iter().len() } else { self.layers.len() };
+        (0..count).map(move |number| {
+            let layers = if is_empty { 0 } else { number + 1 };
+            let last = self.layers.get(number);
+            let end = last.map_or(self.end, |last| Some(last.end)).unwrap_or_default();
+            let gaussians = last.map_or(0, |last| last.gaussians_before + last.gaussians);
+            Prefix {
+                layers: layers as u16,
+                gaussians,
+                bytes: self.length(last, layers, gaussians),
+                end,
+            }
         })
     }
 
@@ -167,7 +202,7 @@ impl<'a> Prefixes<'a> {
         let mut file = ChunkWriter::new();
         file.chunk(ChunkType::HEADER, &[&self.header(layers.len(), gaussians)]);
         for (kind, payload) in &self.kept {
-            file.chunk(*kind, &[payload]);
+            file.chunk(*kind, &[&payload[..]]);
         }
         for (number, layer) in layers.iter().enumerate() {
             let count = LayerCount::written(layer.gaussians, number + 1 == layers.len());
@@ -176,12 +211,11 @@ impl<'a> Prefixes<'a> {
         file.finish()
     }
 
-    /// The length of the file that ends with this layer, before which there are `before` layers.
-    fn length(&self, before: usize, last: &Layer<'_>) -> usize {
+    /// The length of the file of so many layers and Gaussians, of which this layer is the last.
+    fn length(&self, last: Option<&Layer<'_>>, layers: usize, gaussians: u32) -> usize {
         let kept = self.kept.iter().map(|(kind, payload)| kind.framed(payload.len()));
-        let kept = kept.sum::<usize>();
-        let header = self.header(before + 1, last.gaussians_before + last.gaussians);
-        ChunkWriter::length(header.len(), kept + last.bytes_before + last.framed(true))
+        let bytes = last.map_or(0, |last| last.bytes_before + last.framed(true));
+        ChunkWriter::length(self.header(layers, gaussians).len(), kept.sum::<usize>() + bytes)
     }
 
     /// The payload of the header of so many layers and Gaussians.

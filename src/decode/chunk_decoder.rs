@@ -20,8 +20,6 @@ use crate::render::RenderOptions;
 use crate::texture::Texture;
 use crate::threads::Threads;
 
-/// Most bytes in the payload of the header (spec, section 5.1).
-const MAX_HEADER: u32 = 255;
 /// Most skipped chunks that are listed: there may be as many as a file has bytes.
 const MAX_SKIPPED: usize = 16;
 
@@ -41,6 +39,8 @@ pub(super) struct ChunkDecoder {
     /// Entropy-coded layers that have arrived and are not decoded yet.
     pending: PendingLayers,
     pub(super) metadata: Metadata,
+    /// The memory of the metadata, in bytes.
+    metadata_memory: u64,
     /// Chunks that broke a rule, at most [`MAX_SKIPPED`].
     pub(super) skipped: Vec<SkippedChunk>,
     /// The Gaussians that are decoded, in file order.
@@ -125,7 +125,7 @@ impl ChunkDecoder {
     fn ancillary_memory(&self) -> u64 {
         let bounds = self.bounds.as_ref().map_or(0, Vec::len) * size_of::<LayerBounds>();
         let texture = self.texture.as_ref().map_or(0, Texture::memory);
-        self.metadata.memory() + bounds as u64 + texture
+        self.metadata_memory + bounds as u64 + texture
     }
 
     /// Checks what a header declares against the limits.
@@ -194,10 +194,10 @@ impl ChunkDecoder {
         let malformed = |reason| Err(DecodeError::malformed(chunk, reason));
         let Some(header) = &self.header else {
             return match chunk {
-                ChunkType::HEADER if length > MAX_HEADER => {
-                    Err(DecodeError::unsupported(chunk, "length", length))
+                ChunkType::HEADER => {
+                    Header::check_length(length)?;
+                    Ok(Stage::collect(length))
                 }
-                ChunkType::HEADER => Ok(Stage::collect(length)),
                 _ => malformed("stands before the header"),
             };
         };
@@ -328,7 +328,12 @@ impl ChunkDecoder {
             }
             _ => match self.flaw_of_display() {
                 Some(reason) if Metadata::is_of_display(chunk, &payload) => Err(reason),
-                _ => self.metadata.insert(chunk, payload),
+                _ => {
+                    let memory = Metadata::memory_of(chunk, payload.len());
+                    let added = self.metadata.insert(chunk, payload);
+                    self.metadata_memory += added.map_or(0, |()| memory);
+                    added
+                }
             },
         };
         Ok(flaw.map_err(Reason::from))

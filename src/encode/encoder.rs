@@ -156,8 +156,8 @@ impl Encoder {
     }
 
     /// Most bytes of the file that the first layer makes ([`Prefixes`](crate::Prefixes)): a placeholder, with which the
-    /// whole file begins. ICC profile and an orientation in Exif count as well; all other metadata then stand
-    /// after the first layer. Default `None`: the first layer has about a tenth of the file. Files of
+    /// whole file begins. What says its colours and an orientation count as well; all other metadata then stand
+    /// after the first layer, but Exif that turns the picture. Default `None`: the first layer has about a tenth of the file. Files of
     /// [`Precision::Packed`] and [`Precision::Float`] have layers of the usual size in any case.
     pub fn with_first_layer(mut self, bytes: Option<u32>) -> Self {
         self.first_layer = bytes;

@@ -104,8 +104,8 @@ pub enum OptionError {
     },
     /// The first layer cannot be so small.
     #[error(
-        "a first layer that makes a file of {bytes} bytes; that of this picture, with its ICC profile and \
-         orientation, takes at least {least}"
+        "a first layer that makes a file of {bytes} bytes; that of this picture takes at least {least}, with what \
+         says its colours and which way is up"
     )]
     FirstLayer {
         /// Most bytes of the file that was asked for.

@@ -66,9 +66,9 @@ fn what_cannot_be_done_is_told_and_leaves_the_output_alone() {
         assert!(error.contains(expected), "{error}");
         assert_eq!(room.read("small.gip"), b"it was here before");
     }
-    let small = ["encode", "a.png", "b.gip", "--first-layer", "64"];
+    let small = ["encode", "a.png", "b.gip", "--first-layer", "79"];
     let output = room.run(&small);
     assert_eq!(output.status.code(), Some(2));
     let error = text(&output.stderr);
-    assert!(error.contains("a first layer that makes a file of 64 bytes"), "{error}");
+    assert!(error.contains("79 is not in 80..=65536"), "{error}");
 }

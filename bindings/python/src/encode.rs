@@ -53,7 +53,7 @@ const NEWS: f64 = 0.002;
 ///     texture: The strength of the texture, 0 (none) to 100. It takes the place of fine irregular detail that
 ///         the file has no bits for, such as sand, water and leaves. Files with tune="psnr", and those with
 ///         another precision than "entropy", have none.
-///     first_layer: Most bytes, 64 to 65536, of the file that the first layer makes: a placeholder, which `prefix`
+///     first_layer: Most bytes, 80 to 65536, of the file that the first layer makes: a placeholder, which `prefix`
 ///         cuts off, and with which the whole file begins. What says how the picture is shown is in it; other
 ///         metadata then stand after it. Default: the first layer has about a tenth of the file. A precision other
 ///         than "entropy" has layers of the usual size.
@@ -130,7 +130,7 @@ pub(crate) fn encode<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
     let first_layer =
-        first_layer.map(|bytes| bytes.within("first_layer", 64..=65_536)).transpose()?;
+        first_layer.map(|bytes| bytes.within("first_layer", 80..=65_536)).transpose()?;
     let mut stored = metadata::of(cicp, mastering_display, content_light, icc, exif, xmp, texts)?;
     for loss in metadata::retain(&mut stored, metadata)? {
         warn(py, "MetadataWarning", &loss.to_string())?;

@@ -13,20 +13,21 @@ use crate::numbers::Integer;
 ///
 /// Each is a valid file of its own: that of the first layer is a placeholder of a few hundred bytes, and each
 /// further layer adds detail. They keep what says how the picture is shown: `cicp`, `mastering_display`,
-/// `content_light`, `icc`, and Exif if it turns the picture. Texture and other metadata are left out. Nothing is
+/// `content_light`, `icc`, and the orientation in Exif. Texture and other metadata are left out. Nothing is
 /// decoded.
 ///
 /// Args:
-///     src: The file, or the beginning of one: bytes or any contiguous buffer (which is not copied, and must
-///         not change during the call), a path, or a binary file object.
+///     src: The file, the beginning of one, or one that is damaged after its first layer: bytes or any
+///         contiguous buffer (which is not copied, and must not change during the call), a path, or a
+///         binary file object.
 ///
 /// Returns:
 ///     A list of `Prefix`: one for each number of layers, from 1 to that of the layers that `src` has
-///     completely. It is empty if there is none.
+///     completely. It is empty if there is none. A whole file without Gaussians has one, of no layers.
 ///
 /// Raises:
 ///     UnexpectedEndError: `src` ends before its header does.
-///     GipError: The file was refused up to its last complete layer. The Gaussians are not looked at.
+///     GipError: The file was refused before its first layer is complete. The Gaussians are not looked at.
 ///     OSError: The file cannot be read.
 #[pyfunction]
 pub(crate) fn prefixes<'py>(

@@ -8,12 +8,13 @@ export { GipError, MalformedError, SignatureError, UnexpectedEndError, Unsupport
 /**
  * The small files that the first layers of a file make, without making them: one for each number of layers, from 1
  * to that of the layers that `bytes` has completely. That of the first layer is a placeholder of a few hundred bytes.
+ * A whole file without Gaussians has one, of no layers.
  *
- * Each is a valid file. It keeps what says how the picture is shown: cICP, mDCV, cLLI, the ICC profile, and Exif if
- * it turns the picture. Texture and other metadata are left out.
+ * Each is a valid file. It keeps what says how the picture is shown: cICP, mDCV, cLLI, the ICC profile, and the
+ * orientation in Exif. Texture and other metadata are left out.
  *
- * `bytes` is a file or the beginning of one. Throws a `GipError` if that ends before the header does, or breaks a rule
- * of the format up to the last complete layer. What is copied as it is, such as Gaussians and quantizers, is not looked
+ * `bytes` is a file, the beginning of one, or one that is damaged after its first layer. Throws a `GipError` if that
+ * ends before the header does, or breaks a rule of the format before the first layer is complete. What is copied as it is, such as Gaussians and quantizers, is not looked
  * at.
  */
 export function prefixes(bytes: Uint8Array): Prefix[];

@@ -62,26 +62,30 @@ function readHeader(payload) {
   return { gaussians, layers, before, after };
 }
 
-/** Whether Exif data say that the picture is to be turned (spec, section 5.5). */
-function turns(exif) {
+/** The orientation that Exif data say, 1 to 8; 1 if they say none (spec, section 5.5). */
+function orientationOf(exif) {
   const view = new DataView(exif.buffer, exif.byteOffset, exif.byteLength);
-  if (exif.length < 8) return false;
+  if (exif.length < 8) return 1;
   const isLittle = view.getUint32(0) === 0x49492a00;
-  if (!isLittle && view.getUint32(0) !== 0x4d4d002a) return false;
+  if (!isLittle && view.getUint32(0) !== 0x4d4d002a) return 1;
   const directory = view.getUint32(4, isLittle);
-  if (directory + 2 > exif.length) return false;
+  if (directory + 2 > exif.length) return 1;
   const end = directory + 2 + 12 * view.getUint16(directory, isLittle);
   for (let at = directory + 2; at < end && at + 12 <= exif.length; at += 12) {
     const short = (offset) => view.getUint16(at + offset, isLittle);
     if (short(0) === 0x0112 && short(2) === 3 && view.getUint32(at + 4, isLittle) === 1) {
-      return short(8) >= 2 && short(8) <= 8;
+      return short(8) >= 1 && short(8) <= 8 ? short(8) : 1;
     }
   }
-  return false;
+  return 1;
 }
 
-/** Whether a chunk says how the picture is shown, its colours or that it is turned, and is not broken. */
-function isOfDisplay(type, payload) {
+/** Exif data that say an orientation and nothing else: little-endian, a directory of one entry with one short number. */
+const exifOf = (orientation) =>
+  Uint8Array.of(0x49, 0x49, 42, 0, 8, 0, 0, 0, 1, 0, 0x12, 1, 3, 0, 1, 0, 0, 0, orientation, 0, 0, 0, 0, 0, 0, 0);
+
+/** Whether a chunk that may say how the picture is shown, its colours or that it is turned, is not broken. */
+function isSound(type, payload) {
   switch (type) {
     case types.colorSpace:
       // Without a matrix, in full range.
@@ -90,36 +94,44 @@ function isOfDisplay(type, payload) {
       return payload.length === 24;
     case types.contentLight:
       return payload.length === 8;
-    case types.iccProfile:
-      return true;
-    case types.exif:
-      return turns(payload);
     default:
-      return false;
+      return type === types.iccProfile || type === types.exif;
   }
 }
 
-/** The layers of a file, and what of the file the prefixes keep. */
+/** The layers of a file, as far as they are sound, and what of the file the prefixes keep. */
 class Layers {
   #header = null;
   #layers = [];
   /** Chunks to keep, all of which stand before the first layer. */
   #kept = [];
+  /** The types of which a sound chunk has come, kept or not. */
+  #seen = new Set();
+  /** Where the file ends, if that has come. */
+  #end = null;
 
   constructor(bytes) {
     if (!(bytes instanceof Uint8Array)) throw new TypeError('the bytes must be a Uint8Array');
-    for (const { type, payload, end } of chunksOf(bytes)) {
-      if ((this.#header === null) !== (type === types.header)) {
-        throw malformed(type, 'the header does not stand at the beginning, and only there');
-      }
-      if (type === types.header) this.#header = readHeader(payload);
-      else if (type === types.layer) this.#addLayer(payload, end);
-      else if (type.length === 4) this.#addAncillary(type, payload);
-      else if (type !== types.end) throw unsupported(type, 'critical chunk of an unknown type');
+    try {
+      for (const chunk of chunksOf(bytes)) this.#add(chunk);
+    } catch (error) {
+      // What comes after the first layer does not take it away.
+      if (this.#layers.length === 0) throw error;
     }
     if (this.#header === null) {
       throw new UnexpectedEndError('unexpected end of the file before its header ends', 'unexpected-end');
     }
+  }
+
+  #add({ type, payload, end }) {
+    if ((this.#header === null) !== (type === types.header)) {
+      throw malformed(type, 'the header does not stand at the beginning, and only there');
+    }
+    if (type === types.header) this.#header = readHeader(payload);
+    else if (type === types.layer) this.#addLayer(payload, end);
+    else if (type.length === 4) this.#addAncillary(type, payload);
+    else if (type === types.end) this.#end = end;
+    else throw unsupported(type, 'critical chunk of an unknown type');
   }
 
   #addLayer(payload, end) {
@@ -149,13 +161,17 @@ class Layers {
 
   #addAncillary(type, payload) {
     // Others break a rule, and decoders skip them.
-    const mayStandHere = this.#layers.length === 0 && this.#kept.every((kept) => kept.type !== type);
-    if (mayStandHere && isOfDisplay(type, payload)) this.#kept.push({ type, payload });
+    const mayStandHere = this.#layers.length === 0 && !this.#seen.has(type);
+    if (!mayStandHere || !isSound(type, payload)) return;
+    this.#seen.add(type);
+    if (type !== types.exif) this.#kept.push({ type, payload });
+    else if (orientationOf(payload) > 1) this.#kept.push({ type, payload: exifOf(orientationOf(payload)) });
   }
 
   /** The parts of the header of so many of the layers. */
   #headerOf(layers) {
     const { before, after } = this.#header;
+    if (layers === 0) return [before, numberBytes(0), after];
     const gaussians = this.#layers[layers - 1].allGaussians;
     return [before, numberBytes(gaussians), numberBytes(layers), after];
   }
@@ -163,8 +179,12 @@ class Layers {
   /** All prefixes: first that of the first layer. */
   get prefixes() {
     const kept = this.#kept.reduce((sum, { type, payload }) => sum + chunkLength(type, payload.length), 0);
+    const headerLength = (layers) => this.#headerOf(layers).reduce((sum, part) => sum + part.length, 0);
+    if (this.#header.layers === 0 && this.#end !== null) {
+      return [{ layers: 0, gaussians: 0, bytes: fileLength(headerLength(0), kept), end: this.#end }];
+    }
     return this.#layers.map(({ data, end, allGaussians, bytesBefore }, index) => {
-      const header = this.#headerOf(index + 1).reduce((sum, part) => sum + part.length, 0);
+      const header = headerLength(index + 1);
       const layers = bytesBefore + chunkLength(types.layer, data.length);
       return { layers: index + 1, gaussians: allGaussians, bytes: fileLength(header, kept + layers), end };
     });

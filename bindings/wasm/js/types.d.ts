@@ -156,7 +156,7 @@ export type TextureMap = Float32Array;
 
 /** The small file that the first layers of a file make. */
 export interface Prefix {
-  /** How many layers it has, from 1. */
+  /** How many layers it has: 0 in a file without Gaussians. */
   layers: number;
   /** How many Gaussians these have. */
   gaussians: number;

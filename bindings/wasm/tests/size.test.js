@@ -16,8 +16,8 @@ test('the scripts that show pictures, and the decoder, are at most 107 kB, compr
   assert.ok(sum <= 107_000, files.map((file, at) => `${file}: ${sizes[at]}`).join(', '));
 });
 
-test('the module for prefixes is at most 3 kB, compressed, and all of it', () => {
+test('the module for prefixes is at most 3.2 kB, compressed, and all of it', () => {
   const size = compressed('prefix.js');
-  assert.ok(size <= 3_000, size);
+  assert.ok(size <= 3_200, size);
   assert.ok(!/\bimport\b|\bfrom ?["']/.test(readFileSync(new URL('prefix.js', dist), 'utf8')));
 });

@@ -159,11 +159,10 @@ impl<'a> FileLayout<'a> {
         // With Gaussians, it has their steps as well, and a byte for the number of layers.
         let header = self.header.to_payload(None).len();
         let header = header + steps::usual_length(self.header.color.channels()) + 1;
-        let shown = self
-            .metadata
-            .chunks()
-            .filter(|(kind, payload)| Metadata::is_of_display(*kind, payload));
-        let shown = shown.map(|(kind, payload)| kind.framed(payload.len())).sum::<usize>();
+        let shown = self.metadata.chunks().filter_map(|(kind, payload)| {
+            Some(kind.framed(Metadata::for_placeholder(kind, &payload)?.len()))
+        });
+        let shown = shown.sum::<usize>();
         ChunkWriter::length(header, shown + ChunkType::LAYER.framed(0)) + BYTES_OF_NUMBERS
     }
 

@@ -166,7 +166,7 @@ class Info:
 class Prefix:
     """The small file that the first layers of a file make."""
 
-    #: Number of layers, from 1.
+    #: Number of layers: 0 in a file without Gaussians.
     layers: int
     #: Number of Gaussians in these layers.
     gaussians: int

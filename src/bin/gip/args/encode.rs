@@ -92,9 +92,9 @@ pub(crate) struct EncoderArgs {
     #[arg(long, value_name = "T", default_value_t = 50,
           value_parser = clap::value_parser!(u8).range(0..=100))]
     texture: u8,
-    /// Let the first layer make a file of at most N bytes, from 64 to 65536, as a placeholder: `gip prefix` cuts it
+    /// Let the first layer make a file of at most N bytes, from 80 to 65536, as a placeholder: `gip prefix` cuts it
     /// off. Colour space, ICC profile and orientation are in it; all other metadata are stored after it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=65_536))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(80..=65_536))]
     first_layer: Option<u32>,
     /// How the Gaussians are stored.
     #[arg(long, value_enum, default_value_t = PrecisionArg::Entropy)]
