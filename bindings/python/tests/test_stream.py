@@ -93,7 +93,9 @@ def test_metadata_after_the_layers(file: bytes) -> None:
     late = [Chunk("tEXt", b"Title\0A disc"), Chunk("xMPD", b"<x/>")]
     parts = chunks(file)
     first = 1 + [part.kind for part in parts].index("L")
-    spread = joined([parts[0], profile, *parts[1:first], *late[:1], *parts[first:-1], *late[1:], parts[-1]])
+    spread = joined(
+        [parts[0], profile, *parts[1:first], *late[:1], *parts[first:-1], *late[1:], parts[-1]]
+    )
     stream = StreamDecoder()
     seen = {}
     for byte in spread:
