@@ -73,15 +73,18 @@ pub(crate) fn partial(
 
 /// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, with such
 /// alpha as the format takes, and with such metadata as was asked for and the format takes. Without a policy,
-/// which is for thumbnails, it has what is safe, and nobody misses what the format does not take.
+/// which is for thumbnails, it has what is safe, and of what the format does not take only colours are missed.
 pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
     picture.make_upright(picture.metadata.orientation());
     picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));
+    // Codes count before a profile, so one in whose place they are written need not fit.
+    let colors = codec.drop_colors(picture.color(), &mut picture.metadata);
+    picture.warnings.extend(colors);
     picture.drop_unfit_profile();
     if codec == Codec::Gif {
         picture.round_alpha();
     }
-    let dropped = codec.drop_unwritable(picture.color(), &mut picture.metadata);
+    let dropped = codec.drop_unwritable(&mut picture.metadata);
     if policy.is_some() {
         picture.warnings.extend(dropped);
     }
