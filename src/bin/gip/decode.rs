@@ -14,6 +14,9 @@ use crate::codec::Codec;
 use crate::files::{self, Output};
 use crate::picture::StillImage;
 
+/// As many chunks that were skipped as the decoder lists at most.
+const MOST_SKIPPED: usize = 16;
+
 pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
     let codec = Codec::of(&args.output)?;
@@ -51,7 +54,13 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
 
 /// What a user is told of chunks that were skipped.
 pub(crate) fn skipped(stream: &StreamDecoder) -> Vec<String> {
-    stream.skipped().iter().map(ToString::to_string).collect()
+    let mut lines: Vec<_> = stream.skipped().iter().map(ToString::to_string).collect();
+    if lines.len() == MOST_SKIPPED {
+        lines.push(format!(
+            "there may be more: only the first {MOST_SKIPPED} skipped chunks are told"
+        ));
+    }
+    lines
 }
 
 /// Decodes as many Gaussians of an invalid file as possible; `None` if the file is valid.
