@@ -15,7 +15,6 @@ use serde::Serialize;
 
 use super::budget::Budget;
 use super::inputs::{Item, Kind};
-use super::left_out;
 use super::stop::Stop;
 use crate::args;
 use crate::codec::Codec;
@@ -23,7 +22,7 @@ use crate::decode::{self, Wanted};
 use crate::encode;
 use crate::errors::one_line;
 use crate::picture::StillImage;
-use crate::source::{Reading, is_picture};
+use crate::source::{Reading, is_picture, is_unread_picture};
 
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
@@ -93,7 +92,7 @@ impl Task {
         };
         match self {
             _ if is_taken => Kind::Taken,
-            Self::Encode { .. } if left_out::is_unread_picture(path) => Kind::Unread,
+            Self::Encode { .. } if is_unread_picture(path) => Kind::Unread,
             _ => Kind::Other,
         }
     }
