@@ -582,6 +582,7 @@ fn wrong_usage_exits_with_2() {
     room.save("a.png", ColorType::L8);
     let encode = ["encode", "a.png", "a.gip"];
     let decode = ["decode", "a.gip", "b.png"];
+    let batch = ["batch", "a.png", "--out", "out"];
     for (command, flags, allowed) in [
         (&[][..], &[][..], "subcommand"),
         (&["frobnicate"], &[], "unrecognized"),
@@ -599,6 +600,9 @@ fn wrong_usage_exits_with_2() {
         (&encode, &["--gaussians", "5", "--bpp", "1"], "cannot be used with"),
         (&encode, &["--bytes", "5000", "--quality", "60"], "cannot be used with"),
         (&encode, &["--precision", "f16"], "f32, packed"),
+        (&encode, &["--precision", "packed", "--first-layer", "300"], "cannot be used with"),
+        (&encode, &["--precision", "f32", "--first-layer", "300"], "cannot be used with"),
+        (&batch, &["--precision", "packed", "--first-layer", "300"], "cannot be used with"),
         (&encode, &["--threads", "0"], "1..=1024"),
         (&decode, &["--scale", "0"], "from 0.001 to 1000"),
         (&decode, &["--size", "640"], "640x480"),

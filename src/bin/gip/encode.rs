@@ -23,6 +23,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     if !args.force {
         check_name(&output)?;
     }
+    let encoder = args.encoder.encoder()?;
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let limits = args.limits.limits();
     let reading = Reading { limits: limits.clone(), allow_partial: args.allow_partial };
@@ -30,7 +31,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     picture.retain_metadata(args.keep.policy().unwrap_or_default());
     files::warn(&args.input, &picture.warnings);
     let pool = args.threads.pool()?;
-    let encoder = args.encoder.encoder().with_limits(limits);
+    let encoder = encoder.with_limits(limits);
     let encoded = pool.install(|| encode_with_bar(encoder, &mut picture))?;
     output.write(&encoded.bytes, times)?;
 
