@@ -4,6 +4,7 @@
 use std::io::Cursor;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageFormat, ImageReader};
+use image_gip::{Cicp, ColorModel, Encoder, Metadata, Source, Target};
 use moxcms::ColorProfile;
 
 use super::pictures;
@@ -202,6 +203,87 @@ fn code_points_of_png_are_kept() {
     }
     let shown = room.ok(&["info", "a.gip"]);
     assert!(shown.contains("colour space        Display P3, cICP 12/13/0/1"), "{shown}");
+}
+
+/// The profile of a picture of any format.
+fn profile_of(room: &Room, name: &str) -> Option<Vec<u8>> {
+    let reader = ImageReader::open(room.path(name)).expect("it was written");
+    reader.into_decoder().expect("sound").icc_profile().expect("sound")
+}
+
+/// A gray .gip file with these colours.
+fn gray_gip(codes: Option<Cicp>, profile: Option<&Vec<u8>>) -> Vec<u8> {
+    let mut metadata = Metadata::default();
+    (metadata.cicp, metadata.icc_profile) = (codes, profile.cloned());
+    let encoder = Encoder::new().with_target(Target::Gaussians(1)).with_effort(1);
+    let picture = pictures::picture((8, 8), ColorType::L8);
+    let source = Source::new_u8(8, 8, ColorModel::Gray, picture.as_bytes()).expect("64 samples");
+    encoder.with_metadata(metadata).encode(&source).expect("valid").bytes
+}
+
+#[test]
+fn a_gray_picture_has_a_profile_of_rgb_in_webp() {
+    let room = Room::new();
+    let gray = ColorProfile::new_gray_with_gamma(2.2).encode().expect("valid");
+    let rgb = ColorProfile::new_adobe_rgb().encode().expect("valid");
+    let (linear, p3, pq) = (Cicp::new(1, 8), Cicp::new(12, 13), Cicp::new(9, 16));
+    let dropped = "its ICC profile is one of GRAY and cannot be kept";
+    for (codes, profile, space, expected) in [
+        (Some(linear), None, Some(b"RGB "), None),
+        (Some(p3), None, Some(b"RGB "), None),
+        // Codes count before a profile.
+        (Some(p3), Some(&gray), Some(b"RGB "), None),
+        (None, Some(&gray), None, Some(dropped)),
+        (Some(pq), None, None, Some("cICP 9/16/0/1) is not written to WebP")),
+        (None, Some(&rgb), Some(b"RGB "), None),
+    ] {
+        room.write("a.gip", gray_gip(codes, profile));
+        let warnings = room.warnings(&["decode", "a.gip", "a.webp"]);
+        let found = profile_of(&room, "a.webp");
+        let case = format!("{codes:?}: {warnings}");
+        assert_eq!(found.as_ref().map(|found| &found[16..20]), space.map(|s| &s[..]), "{case}");
+        assert_eq!(warnings.lines().count(), expected.iter().count(), "{case}");
+        assert!(expected.is_none_or(|expected| warnings.contains(expected)), "{case}");
+        if codes.is_none() && space.is_some() {
+            assert_eq!(found.as_ref(), profile);
+        }
+        // Other formats have gray.
+        room.warnings(&["decode", "a.gip", "a.jpg"]);
+        let found = profile_of(&room, "a.jpg");
+        assert!(found.is_none_or(|found| found[16..20] == *b"GRAY"), "{case}");
+    }
+}
+
+#[test]
+fn colours_that_a_thumbnail_lacks_are_told() {
+    let room = Room::new();
+    let picture = pictures::picture((8, 8), ColorType::Rgb8);
+    let with_profile = |profile: ColorProfile| {
+        let mut file = Vec::new();
+        let mut encoder = image::codecs::png::PngEncoder::new(&mut file);
+        encoder.set_icc_profile(profile.encode().expect("valid")).expect("PNG has it");
+        picture.write_with_encoder(encoder).expect("in memory");
+        file
+    };
+    let pq = [vec![code_points(9, 16)], light().to_vec()].concat();
+    for (file, told) in [
+        (png(&picture, &pq), &["jpg", "webp", "bmp", "gif"][..]),
+        (png(&picture, &[code_points(12, 13)]), &["bmp", "gif"]),
+        (with_profile(ColorProfile::new_adobe_rgb()), &["bmp", "gif"]),
+        (with_profile(ColorProfile::new_srgb()), &[]),
+    ] {
+        room.write("a.png", file);
+        room.ok(&["encode", "a.png", "a.gip", "--effort", "1", "--gaussians", "1"]);
+        for format in ["png", "jpg", "webp", "bmp", "gif"] {
+            let args = ["batch", "a.gip", "--out", "out", "--thumbnail", "4", "--format", format];
+            let warnings = room.warnings(&args);
+            assert_eq!(warnings.contains(" is not written to "), told.contains(&format));
+            assert!(warnings.lines().count() <= 1, "{warnings}");
+        }
+    }
+    // Codes of sRGB say what is taken for granted.
+    room.write("a.gip", gray_gip(Some(Cicp::SRGB), None));
+    assert_eq!(room.warnings(&["decode", "a.gip", "a.bmp"]), "");
 }
 
 #[test]

@@ -8,7 +8,8 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
 use image_gip::{Region, RenderOptions};
 use serde_json::Value;
 
-use super::common::layered;
+use super::common::texture::Texture;
+use super::common::{chunk, layered};
 use super::pictures::{self, EXIF_ROTATE_90};
 use super::room::{Room, text};
 
@@ -126,6 +127,7 @@ fn prints_for_humans() {
     assert!(line.starts_with("a.gip: 48x36, ") && line.contains(" dB, "), "{line}");
     let info = room.ok(&["info", "a.gip"]);
     assert!(info.contains("48x36, gray, 16 bits per sample"), "{info}");
+    assert!(info.contains(" in 1 layer\n"), "{info}");
     assert!(info.contains("chunk E (end)"), "{info}");
     assert_eq!(room.ok(&["compare", "a.gip", "a.gip"]), "identical\n");
     assert!(room.ok(&["compare", "a.png", "a.gip"]).starts_with("PSNR "));
@@ -156,6 +158,42 @@ fn the_texture_of_a_file_is_told() {
     let report = room.json(&[&encode[..], &["--texture", "0", "--json"]].concat());
     assert_eq!(report["texture_bytes"], 0);
     assert!(room.json(&["info", "a.gip", "--json"])["texture"].is_null());
+}
+
+#[test]
+fn a_texture_that_is_skipped_is_none() {
+    let room = Room::new();
+    let sides = [WIDTH, HEIGHT];
+    let good = chunk(b"tXTR", &Texture::constant(sides, [0.1, 0.0, 0.1]).payload(sides));
+    let broken = chunk(b"tXTR", &[]);
+    room.gip("plain.gip", ColorType::Rgb8);
+    let plain = room.read("plain.gip");
+    let (before, end) = plain.split_at(plain.len() - chunk(b"E", &[]).len());
+    let told = |textures: &[&[u8]]| {
+        room.write("a.gip", [before, &textures.concat(), end].concat());
+        let info = room.json(&["info", "a.gip", "--json"]);
+        let shown = room.ok(&["info", "a.gip"]);
+        let row = shown.lines().find(|line| line.starts_with("texture "));
+        (info["texture"].clone(), row.map(str::to_owned), info["warnings"].clone())
+    };
+    let (texture, row, _) = told(&[&good]);
+    assert_eq!(texture["bytes"], good.len());
+    assert!(row.expect("a row").ends_with(" bits per Gaussian"));
+    let (texture, row, warnings) = told(&[&broken]);
+    assert_eq!((texture, row), (Value::Null, None));
+    assert_eq!(warnings.as_array().map(Vec::len), Some(1));
+    // Their bytes are counted together.
+    let (texture, row, _) = told(&[&broken, &good]);
+    assert_eq!((&texture["bytes"], &texture["bits_per_gaussian"]), (&Value::Null, &Value::Null));
+    assert_eq!(row.as_deref(), Some("texture             1 Gaussians"));
+    // The decoder lists the first 16.
+    for (count, lines) in [(15, 15), (16, 17), (40, 17)] {
+        let (_, _, warnings) = told(&vec![&broken[..]; count]);
+        let warnings = warnings.as_array().expect("an array");
+        assert_eq!(warnings.len(), lines);
+        let last = warnings.last().expect("at least 15").to_string();
+        assert_eq!(last.contains("only the first 16 "), lines > 16, "{last}");
+    }
 }
 
 #[test]
@@ -544,6 +582,7 @@ fn wrong_usage_exits_with_2() {
     room.save("a.png", ColorType::L8);
     let encode = ["encode", "a.png", "a.gip"];
     let decode = ["decode", "a.gip", "b.png"];
+    let batch = ["batch", "a.png", "--out", "out"];
     for (command, flags, allowed) in [
         (&[][..], &[][..], "subcommand"),
         (&["frobnicate"], &[], "unrecognized"),
@@ -561,6 +600,9 @@ fn wrong_usage_exits_with_2() {
         (&encode, &["--gaussians", "5", "--bpp", "1"], "cannot be used with"),
         (&encode, &["--bytes", "5000", "--quality", "60"], "cannot be used with"),
         (&encode, &["--precision", "f16"], "f32, packed"),
+        (&encode, &["--precision", "packed", "--first-layer", "300"], "cannot be used with"),
+        (&encode, &["--precision", "f32", "--first-layer", "300"], "cannot be used with"),
+        (&batch, &["--precision", "packed", "--first-layer", "300"], "cannot be used with"),
         (&encode, &["--threads", "0"], "1..=1024"),
         (&decode, &["--scale", "0"], "from 0.001 to 1000"),
         (&decode, &["--size", "640"], "640x480"),

@@ -292,6 +292,15 @@ fn a_file_that_is_something_else_than_its_name_says_is_told() {
         assert!(room.fails(&["encode", name, "a.gip"]).contains(&expected));
         assert!(room.batch(3, &[name, "--out", "out"]).1.contains(&expected));
     }
+    for (name, expected) in [
+        ("a.heic", "a.heic: HEIC is not read"),
+        ("a.JXL", "a.JXL: JXL is not read"),
+        ("a.avif", "a.avif: AVIF is not read"),
+        ("a.txt", "a.txt: the format is none of those that are read"),
+    ] {
+        room.write(name, "what this begins with is no signature");
+        assert!(room.fails(&["encode", name, "a.gip"]).contains(expected), "{name}");
+    }
     // A picture of another format is one all the same.
     room.write("b.jpg", written(ImageFormat::Png));
     room.write("b.png", written(ImageFormat::Png));

@@ -59,13 +59,21 @@ fn what_cannot_be_done_is_told_and_leaves_the_output_alone() {
         (["prefix", "picture.png", "900", "small.gip"], 1, "not a .gip file"),
         (["prefix", "none.gip", "900", "small.gip"], 1, "none.gip"),
         (["prefix", "a.gip", "many", "small.gip"], 2, "many"),
+        (
+            ["prefix", "a.gip", "300", "picture.png"],
+            1,
+            "picture.png: gip prefix writes .gip files only",
+        ),
     ] {
         let output = room.run(&args);
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(status), "{error}");
         assert!(error.contains(expected), "{error}");
         assert_eq!(room.read("small.gip"), b"it was here before");
+        assert_eq!(room.read("picture.png"), b"no .gip");
     }
+    room.ok(&["prefix", "a.gip", "300", "picture.png", "--force"]);
+    assert!(room.read("picture.png").starts_with(b"\xC7GIP"));
     let small = ["encode", "a.png", "b.gip", "--first-layer", "79"];
     let output = room.run(&small);
     assert_eq!(output.status.code(), Some(2));

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::codecs::{bmp, farbfeld, gif, ico, jpeg, png, qoi, tga, tiff, webp};
 use image::{DynamicImage, ImageEncoder};
-use image_gip::{ColorModel, Metadata, SampleDepth};
+use image_gip::{Cicp, ColorModel, Metadata, MetadataLoss, MetadataPolicy, SampleDepth};
 
 use crate::cicp;
 use crate::errors::WrongUsage;
@@ -83,10 +83,11 @@ impl Codec {
     fn colors(self) -> &'static [ColorModel] {
         use ColorModel::{Gray, GrayAlpha, Rgb, Rgba};
         match self {
-            Self::Png | Self::WebP | Self::Tga | Self::Pam => &[Gray, GrayAlpha, Rgb, Rgba],
+            Self::Png | Self::Tga | Self::Pam => &[Gray, GrayAlpha, Rgb, Rgba],
             Self::Tiff | Self::Bmp => &[Gray, Rgb, Rgba],
             Self::Jpeg | Self::Pnm => &[Gray, Rgb],
-            Self::Qoi | Self::Gif => &[Rgb, Rgba],
+            // The encoder of WebP takes gray, but what it writes is RGB, and so must be its profile.
+            Self::WebP | Self::Qoi | Self::Gif => &[Rgb, Rgba],
             Self::Ico | Self::Farbfeld => &[Rgba],
             Self::Pgm => &[Gray],
             Self::Ppm => &[Rgb],
@@ -143,10 +144,28 @@ impl Codec {
         Ok(())
     }
 
-    /// Drops the metadata that the format has no place for, or that is not written to it. Returns what it was.
-    /// Codes of a colour space become a profile where the format has only profiles, and there is one.
-    pub(crate) fn drop_unwritable(self, color: ColorModel, metadata: &mut Metadata) -> Vec<String> {
+    /// Drops the colour space that the format has no place for. Returns what of it is missed: the colours are
+    /// shown as others. Codes become a profile where the format has only profiles, and there is one.
+    pub(crate) fn drop_colors(self, color: ColorModel, metadata: &mut Metadata) -> Vec<String> {
         let takes_profile = matches!(self, Self::Png | Self::Jpeg | Self::WebP | Self::Tiff);
+        let mut dropped = Vec::new();
+        if let Some(codes) = metadata.cicp.take_if(|_| self != Self::Png) {
+            let profile = cicp::profile(codes, color.channels() < 3);
+            if let Some(profile) = profile.filter(|_| takes_profile) {
+                metadata.icc_profile = Some(profile);
+            } else if codes != Cicp::SRGB {
+                dropped.push(format!("colour space ({})", cicp::name(codes)));
+            }
+        }
+        if metadata.icc_profile.take_if(|_| !takes_profile).is_some_and(is_missed) {
+            dropped.push("colour profile".into());
+        }
+        self.not_written(dropped)
+    }
+
+    /// Drops all other metadata that the format has no place for, or that is not written to it. Returns what it
+    /// was.
+    pub(crate) fn drop_unwritable(self, metadata: &mut Metadata) -> Vec<String> {
         let takes_exif = |exif: &Vec<u8>| match self {
             Self::Png | Self::WebP => true,
             Self::Jpeg => exif.len() <= MAX_JPEG_EXIF,
@@ -154,21 +173,10 @@ impl Codec {
         };
         let mut dropped = Vec::new();
         if self != Self::Png {
-            if let Some(codes) = metadata.cicp.take() {
-                let profile = cicp::profile(codes, color.channels() < 3);
-                if let Some(profile) = profile.filter(|_| takes_profile) {
-                    metadata.icc_profile = Some(profile);
-                } else {
-                    dropped.push(format!("colour space ({})", cicp::name(codes)));
-                }
-            }
             let display = metadata.mastering_display.take().map(drop);
             if display.or(metadata.content_light.take().map(drop)).is_some() {
                 dropped.push("mastering display or content light level".into());
             }
-        }
-        if !takes_profile && metadata.icc_profile.take().is_some() {
-            dropped.push("colour profile".into());
         }
         if metadata.exif.take_if(|exif| !takes_exif(exif)).is_some() {
             dropped.push("Exif".into());
@@ -179,6 +187,11 @@ impl Codec {
         if !std::mem::take(&mut metadata.texts).is_empty() {
             dropped.push("text".into());
         }
+        self.not_written(dropped)
+    }
+
+    /// The warnings of what was dropped.
+    fn not_written(self, dropped: Vec<String>) -> Vec<String> {
         let warn = |what: String| format!("the {what} is not written to {self:?}");
         dropped.into_iter().map(warn).collect()
     }
@@ -234,6 +247,13 @@ impl Codec {
         }
         out
     }
+}
+
+/// Whether colours are shown as others without this profile. Without any, they are taken for sRGB.
+fn is_missed(profile: Vec<u8>) -> bool {
+    let mut metadata = Metadata::default();
+    metadata.icc_profile = Some(profile);
+    metadata.retain(MetadataPolicy::None).contains(&MetadataLoss::ColorProfile)
 }
 
 fn write(mut encoder: impl ImageEncoder, picture: &StillImage) -> Result<()> {

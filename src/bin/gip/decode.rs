@@ -14,6 +14,9 @@ use crate::codec::Codec;
 use crate::files::{self, Output};
 use crate::picture::StillImage;
 
+/// As many chunks that were skipped as the decoder lists at most.
+const MOST_SKIPPED: usize = 16;
+
 pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
     let codec = Codec::of(&args.output)?;
@@ -51,7 +54,13 @@ fn decode(args: &args::Decode, codec: Codec, file: &[u8]) -> Result<StillImage> 
 
 /// What a user is told of chunks that were skipped.
 pub(crate) fn skipped(stream: &StreamDecoder) -> Vec<String> {
-    stream.skipped().iter().map(ToString::to_string).collect()
+    let mut lines: Vec<_> = stream.skipped().iter().map(ToString::to_string).collect();
+    if lines.len() == MOST_SKIPPED {
+        lines.push(format!(
+            "there may be more: only the first {MOST_SKIPPED} skipped chunks are told"
+        ));
+    }
+    lines
 }
 
 /// Decodes as many Gaussians of an invalid file as possible; `None` if the file is valid.
@@ -73,15 +82,18 @@ pub(crate) fn partial(
 
 /// Makes a decoded picture what is written: upright, with a profile only if it fits the samples, with such
 /// alpha as the format takes, and with such metadata as was asked for and the format takes. Without a policy,
-/// which is for thumbnails, it has what is safe, and nobody misses what the format does not take.
+/// which is for thumbnails, it has what is safe, and of what the format does not take only colours are missed.
 pub(crate) fn finish(picture: &mut StillImage, codec: Codec, policy: Option<MetadataPolicy>) {
     picture.make_upright(picture.metadata.orientation());
     picture.retain_metadata(policy.unwrap_or(MetadataPolicy::Safe));
+    // Codes count before a profile, so one in whose place they are written need not fit.
+    let colors = codec.drop_colors(picture.color(), &mut picture.metadata);
+    picture.warnings.extend(colors);
     picture.drop_unfit_profile();
     if codec == Codec::Gif {
         picture.round_alpha();
     }
-    let dropped = codec.drop_unwritable(picture.color(), &mut picture.metadata);
+    let dropped = codec.drop_unwritable(&mut picture.metadata);
     if policy.is_some() {
         picture.warnings.extend(dropped);
     }

@@ -3,7 +3,7 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use image_gip::{Encoded, Encoder, Progress, Source};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -21,8 +21,9 @@ const BAR_LENGTH: u64 = 1000;
 pub(crate) fn run(args: &args::Encode) -> Result<()> {
     let output = Output::new(&args.output)?;
     if !args.force {
-        check_name(&output)?;
+        output.check_name("encode")?;
     }
+    let encoder = args.encoder.encoder()?;
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let limits = args.limits.limits();
     let reading = Reading { limits: limits.clone(), allow_partial: args.allow_partial };
@@ -30,7 +31,7 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
     picture.retain_metadata(args.keep.policy().unwrap_or_default());
     files::warn(&args.input, &picture.warnings);
     let pool = args.threads.pool()?;
-    let encoder = args.encoder.encoder().with_limits(limits);
+    let encoder = encoder.with_limits(limits);
     let encoded = pool.install(|| encode_with_bar(encoder, &mut picture))?;
     output.write(&encoded.bytes, times)?;
 
@@ -41,20 +42,6 @@ pub(crate) fn run(args: &args::Encode) -> Result<()> {
         report.to_line(&args.output, encoded.report.psnr)
     };
     files::print(&text, Some(&args.output))
-}
-
-/// Refuses a name with another extension than .gip: programs would take the file for another
-/// format.
-fn check_name(output: &Output) -> Result<()> {
-    let Output::Regular { path, .. } = output else { return Ok(()) };
-    let extension = path.extension().unwrap_or_default();
-    if !extension.eq_ignore_ascii_case("gip") {
-        bail!(
-            "{}: gip encode writes .gip files only; use a name that ends in .gip, or --force",
-            path.display()
-        );
-    }
-    Ok(())
 }
 
 /// Encodes with a progress bar, which is visible on a terminal only.

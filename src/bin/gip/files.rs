@@ -128,6 +128,20 @@ impl Output {
         Ok(Self::Regular { path, directory })
     }
 
+    /// Refuses a name with another extension than .gip for what this command writes: programs would take the
+    /// file for another format.
+    pub(crate) fn check_name(&self, command: &str) -> Result<()> {
+        let Self::Regular { path, .. } = self else { return Ok(()) };
+        let extension = path.extension().unwrap_or_default();
+        if !extension.eq_ignore_ascii_case("gip") {
+            bail!(
+                "{}: gip {command} writes .gip files only; use a name that ends in .gip, or --force",
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
     /// The times of the source, for this result.
     ///
     /// # Errors

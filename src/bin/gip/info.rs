@@ -67,12 +67,13 @@ struct FileInfo {
     warnings: Vec<String>,
 }
 
-/// The texture: the Gaussians of its map, and what its chunk takes.
+/// The texture: the Gaussians of its map, and what its chunk takes; `None` if the file has other chunks of the
+/// type, which are skipped and counted with it.
 #[derive(Debug, Serialize)]
 struct Texture {
     gaussians: usize,
-    bytes: u64,
-    bits_per_gaussian: f64,
+    bytes: Option<u64>,
+    bits_per_gaussian: Option<f64>,
 }
 
 /// What the first layers are: so many Gaussians, which end at this byte of the file, and what `gip prefix` writes.
@@ -216,11 +217,13 @@ impl FileInfo {
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
         let layers = chunks.iter().find(|chunk| chunk.kind == ChunkType::LAYER);
-        let texture = chunks.iter().find(|chunk| chunk.kind == ChunkType::TXTR).map(|chunk| {
-            let map = stream.picture().and_then(|picture| picture.texture_map());
-            let gaussians = map.map_or(0, |map| map.gaussians().len());
-            let bits_per_gaussian = chunk.bytes as f64 * 8.0 / gaussians.max(1) as f64;
-            Texture { gaussians, bytes: chunk.bytes, bits_per_gaussian }
+        let map = stream.picture().and_then(|picture| picture.texture_map());
+        let texture = map.map(|map| {
+            let gaussians = map.gaussians().len();
+            let only = chunks.iter().find(|c| c.kind == ChunkType::TXTR && c.count == 1);
+            let bytes = only.map(|chunk| chunk.bytes);
+            let bits_per_gaussian = bytes.map(|bytes| bytes as f64 * 8.0 / gaussians.max(1) as f64);
+            Texture { gaussians, bytes, bits_per_gaussian }
         });
         let gaussians = f64::from(header.gaussians.max(1));
         let bits = stream.attribute_bits().unwrap_or_default();
@@ -316,6 +319,11 @@ impl FileInfo {
     }
 }
 
+/// So many layers, in words.
+fn plural(layers: u16) -> String {
+    if layers == 1 { "1 layer".into() } else { format!("{layers} layers") }
+}
+
 /// The stored components in file order.
 fn components(header: &Header, quantizers: &[Quantizer]) -> Vec<Component> {
     let shape = match header.parameterization {
@@ -369,7 +377,8 @@ impl Display for FileInfo {
         }
         row("file", &format_args!("{} bytes, {:.3} bits per pixel", self.bytes, self.bpp))?;
         row("version", &self.version)?;
-        row("Gaussians", &format_args!("{} in {} layers", self.gaussians, self.layers))?;
+        let layers = plural(self.layers);
+        row("Gaussians", &format_args!("{} in {layers}", self.gaussians))?;
         row("kernel", &format_args!("{kernel}, cut-off {cutoff}"))?;
         row("parameterization", &self.parameterization)?;
         row("base colour", &format_args!("{:?} / 65535", self.base_color))?;
@@ -404,18 +413,18 @@ impl Display for FileInfo {
             row(&name, &format_args!("{kind}, {bits} bits{steps}"))?;
         }
         if let Some(Texture { gaussians, bytes, bits_per_gaussian }) = &self.texture {
-            row(
-                "texture",
-                &format_args!(
-                    "{gaussians} Gaussians, {bytes} bytes, {bits_per_gaussian:.2} bits per Gaussian"
-                ),
-            )?;
+            let size = match (bytes, bits_per_gaussian) {
+                (Some(bytes), Some(bits)) => {
+                    format!(", {bytes} bytes, {bits:.2} bits per Gaussian")
+                }
+                _ => String::new(),
+            };
+            row("texture", &format_args!("{gaussians} Gaussians{size}"))?;
         }
         // Of many layers, those of a picture of its parts are of no interest.
         for PrefixInfo { layers, gaussians, bytes, .. } in self.prefixes.iter().take(SHOWN_PREFIXES)
         {
-            let plural = if *layers == 1 { "" } else { "s" };
-            let name = format!("prefix of {layers} layer{plural}");
+            let name = format!("prefix of {}", plural(*layers));
             row(&name, &format_args!("{gaussians} Gaussians, {bytes} bytes"))?;
         }
         for Chunk { name, count, bytes, .. } in &self.chunks {

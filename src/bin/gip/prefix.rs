@@ -9,6 +9,9 @@ use crate::files::{self, Output};
 
 pub(crate) fn run(args: &args::Prefix) -> Result<()> {
     let output = Output::new(&args.output)?;
+    if !args.force {
+        output.check_name("prefix")?;
+    }
     let file = files::read(&args.input)?;
     let prefixes = Prefixes::new(&file).with_context(|| files::input_name(&args.input))?;
     let Some(prefix) = prefixes.within(args.bytes) else {

@@ -8,6 +8,7 @@ use image_gip::{Encoder, Precision, Target, Tune};
 use super::keep::Keep;
 use super::limits::LimitArgs;
 use super::values::{ThreadCount, number};
+use crate::errors::WrongUsage;
 
 /// Encodes a picture as a .gip file.
 ///
@@ -93,7 +94,8 @@ pub(crate) struct EncoderArgs {
           value_parser = clap::value_parser!(u8).range(0..=100))]
     texture: u8,
     /// Let the first layer make a file of at most N bytes, from 80 to 65536, as a placeholder: `gip prefix` cuts it
-    /// off. Colour space, ICC profile and orientation are in it; all other metadata are stored after it.
+    /// off. Colour space, ICC profile and orientation are in it; all other metadata are stored after it. Not with
+    /// --precision packed or f32, whose layers have the usual size.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(80..=65_536))]
     first_layer: Option<u32>,
     /// How the Gaussians are stored.
@@ -122,8 +124,15 @@ impl EncoderArgs {
         "keep_invisible",
     ];
 
-    pub(crate) fn encoder(&self) -> Encoder {
-        Encoder::new()
+    /// # Errors
+    /// When two options exclude each other.
+    pub(crate) fn encoder(&self) -> Result<Encoder, WrongUsage> {
+        if self.first_layer.is_some() && !matches!(self.precision, PrecisionArg::Entropy) {
+            let text = "--first-layer cannot be used with --precision packed or f32, whose layers have \
+                        the usual size";
+            return Err(WrongUsage(text.into()));
+        }
+        let encoder = Encoder::new()
             .with_target(self.target.target())
             .with_tune(self.tune.into())
             .with_effort(self.effort)
@@ -131,7 +140,8 @@ impl EncoderArgs {
             .with_first_layer(self.first_layer)
             .with_precision(self.precision.into())
             .with_seed(self.seed)
-            .with_keep_invisible(self.keep_invisible)
+            .with_keep_invisible(self.keep_invisible);
+        Ok(encoder)
     }
 }
 

@@ -19,7 +19,8 @@ pub(crate) struct Info {
     /// `bits_per_gaussian.coded` counts the framing of the chunks too. `components` has the
     /// quantizer of each component of the packed coding; with the entropy coding it is empty.
     /// `quantization_steps` has the quantization steps of the entropy coding; with the packed coding it
-    /// is null.
+    /// is null. `texture` is null without one; its `bytes` are null if the file has more chunks of its type,
+    /// which are skipped.
     #[arg(long)]
     pub(crate) json: bool,
     #[command(flatten)]

@@ -19,4 +19,7 @@ pub(crate) struct Prefix {
     pub(crate) bytes: usize,
     /// The .gip file to write, or `-` for standard output.
     pub(crate) output: PathBuf,
+    /// Write OUTPUT even if its name does not end in .gip.
+    #[arg(long)]
+    pub(crate) force: bool,
 }

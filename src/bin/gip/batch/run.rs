@@ -35,7 +35,7 @@ const SOME_FAILED: u8 = 3;
 
 pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let start = Instant::now();
-    let task = Task::new(args);
+    let task = Task::new(args)?;
     let selection = Selection::new(&args.include, &args.exclude)?;
     let output = |below: &Path| args.out.join(below).with_extension(task.extension());
     let (items, rest) = inputs::find(&args.inputs, &selection, |path| task.kind(path), output)?;

@@ -15,15 +15,14 @@ use serde::Serialize;
 
 use super::budget::Budget;
 use super::inputs::{Item, Kind};
-use super::left_out;
 use super::stop::Stop;
 use crate::args;
 use crate::codec::Codec;
 use crate::decode::{self, Wanted};
 use crate::encode;
-use crate::errors::one_line;
+use crate::errors::{WrongUsage, one_line};
 use crate::picture::StillImage;
-use crate::source::{Reading, is_picture};
+use crate::source::{Reading, is_picture, is_unread_picture};
 
 /// What is done to every file, on one thread each.
 #[derive(Debug)]
@@ -59,7 +58,9 @@ pub(crate) struct Facts {
 }
 
 impl Task {
-    pub(crate) fn new(args: &args::Batch) -> Self {
+    /// # Errors
+    /// When options of the encoder exclude each other.
+    pub(crate) fn new(args: &args::Batch) -> Result<Self, WrongUsage> {
         let policy = args.keep.policy();
         let limits = args.limits.limits();
         let reading = Reading { limits: limits.clone(), allow_partial: args.allow_partial };
@@ -69,10 +70,11 @@ impl Task {
                 if bounds.is_some() { policy } else { policy.or(Some(MetadataPolicy::All)) };
             let options = RenderOptions::new().with_threads(Threads::One);
             let options = options.with_texture(!args.no_texture);
-            return Self::Decode { extension, reading, options, bounds, policy };
+            return Ok(Self::Decode { extension, reading, options, bounds, policy });
         }
-        let encoder = args.encoder.encoder().with_limits(limits).with_threads(Threads::One);
-        Self::Encode { encoder: Box::new(encoder), reading, policy: policy.unwrap_or_default() }
+        let encoder = args.encoder.encoder()?.with_limits(limits).with_threads(Threads::One);
+        let encoder = Box::new(encoder);
+        Ok(Self::Encode { encoder, reading, policy: policy.unwrap_or_default() })
     }
 
     /// The extension of the results.
@@ -93,7 +95,7 @@ impl Task {
         };
         match self {
             _ if is_taken => Kind::Taken,
-            Self::Encode { .. } if left_out::is_unread_picture(path) => Kind::Unread,
+            Self::Encode { .. } if is_unread_picture(path) => Kind::Unread,
             _ => Kind::Other,
         }
     }

@@ -21,7 +21,9 @@ mod screen;
 mod square;
 mod stored;
 mod tiff;
+mod unread;
 mod webp;
 
 pub(crate) use format::is_picture;
 pub(crate) use read::Reading;
+pub(crate) use unread::is_unread_picture;

@@ -9,6 +9,7 @@ use image_gip::{Decoder, Limits};
 
 use super::format::{Format, START};
 use super::stored::Stored;
+use super::unread::unread;
 use super::{fault, formats, gip, tiff};
 use crate::files;
 use crate::limits::check_size;
@@ -76,7 +77,10 @@ impl Reading {
 
 fn format(path: &Path, start: &[u8]) -> Result<Format> {
     let format = Format::by_signature(start).or_else(|| Format::by_name(path));
-    let format = format.context("the format is none of those that are read")?;
+    let format = format.with_context(|| match unread(path) {
+        Some(name) => format!("{name} is not read"),
+        None => "the format is none of those that are read".into(),
+    })?;
     if !format.is_read() {
         bail!("{} is not read", format.name());
     }
