@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use common::{crc32, decode_valid};
-use image_gip::{RenderOptions, SampleDepth};
+use common::{crc32, decode_valid, render};
+use image_gip::RenderOptions;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
@@ -45,24 +45,10 @@ fn pictures_have_the_samples_that_they_had() {
         let path = format!("tests/frozen/{name}");
         assert_eq!(crc_of(&path), *crc, "{name}");
         let decoder = decode_valid(&fs::read(Path::new(ROOT).join(path)).expect("a file"));
-        let picture = decoder.picture().expect("a whole file");
         let (width, height) = size.split_once('x').expect("width and height");
         let [width, height] = [width, height].map(|side| side.parse().expect("pixels"));
         let options = RenderOptions::new().with_size(width, height);
-        let length = picture.output_len(&options).expect("within the limits");
-        let bytes = match picture.header().depth {
-            SampleDepth::Eight => {
-                let mut samples = vec![0; length];
-                picture.render_u8(&options, &mut samples).expect("a sound request");
-                samples
-            }
-            _ => {
-                let mut samples = vec![0; length];
-                picture.render_u16(&options, &mut samples).expect("a sound request");
-                samples.iter().flat_map(|sample| sample.to_be_bytes()).collect()
-            }
-        };
-        assert_eq!(format!("{:08x}", crc32(&bytes)), *result, "{name}, {size}");
+        assert_eq!(format!("{:08x}", render(&decoder, &options)), *result, "{name}, {size}");
         names.push(name.clone());
     }
     names.dedup();

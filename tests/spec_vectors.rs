@@ -22,11 +22,8 @@ use std::fs;
 use std::path::Path;
 
 use common::oracle::{self, Request};
-use common::{File, Header, crc32, decode, decode_pieces, of_chunks};
-use image_gip::{
-    ChunkType, ColorModel, DecodeError, Limits, Region, RenderOptions, SampleDepth, StreamDecoder,
-    Threads,
-};
+use common::{File, Header, crc32, decode, decode_pieces, of_chunks, render};
+use image_gip::{ChunkType, ColorModel, DecodeError, Limits, Region, RenderOptions, Threads};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/spec/vectors");
 
@@ -136,21 +133,6 @@ fn header(color: u8, width: u32, height: u32) -> Header {
     let mut base = [0; 4];
     base[..=usize::from(color)].fill(0x8080);
     Header { color, width, height, base, ..Header::default() }
-}
-
-/// The CRC-32 of the interleaved samples at the file's depth, 16-bit ones big-endian.
-fn render(decoder: &StreamDecoder, options: &RenderOptions) -> u32 {
-    let picture = decoder.picture().expect("the header has arrived");
-    let mut bytes = vec![0; picture.output_len(options).expect("fits")];
-    match picture.header().depth {
-        SampleDepth::Eight => picture.render_u8(options, &mut bytes).expect("a sound request"),
-        _ => {
-            let mut samples = vec![0; bytes.len()];
-            picture.render_u16(options, &mut samples).expect("a sound request");
-            bytes = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
-        }
-    }
-    crc32(&bytes)
 }
 
 /// The letters of a type, without what the crate says that they stand for.

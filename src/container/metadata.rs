@@ -131,8 +131,9 @@ impl Metadata {
     pub(crate) fn for_placeholder(chunk: ChunkType, payload: &[u8]) -> Option<Cow<'_, [u8]>> {
         let is_sound = || Self::default().insert(chunk, payload.into()).is_ok();
         match chunk {
-            ChunkType::EXIF if Self::turns(payload) => {
-                let orientation = exif::orientation(payload).unwrap_or_default();
+            ChunkType::EXIF => {
+                let turned = |orientation: &Orientation| *orientation != Orientation::NoTransforms;
+                let orientation = exif::orientation(payload).filter(turned)?;
                 Some(exif::of_orientation(orientation).into())
             }
             // A profile may be anything, and long.

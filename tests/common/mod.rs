@@ -16,7 +16,7 @@ pub(crate) mod synthesis;
 pub(crate) mod texture;
 
 use entropy::Code;
-use image_gip::{DecodeError, Gaussian, Limits, StreamDecoder};
+use image_gip::{DecodeError, Gaussian, Limits, RenderOptions, SampleDepth, StreamDecoder};
 pub(crate) use numbers::{number, read_number};
 
 /// Section 4.1.
@@ -387,6 +387,21 @@ pub(crate) fn without_last_word(layer: &[u8]) -> Vec<u8> {
 /// Signature and chunks.
 pub(crate) fn of_chunks(chunks: &[Vec<u8>]) -> Vec<u8> {
     [&SIGNATURE, chunks.concat().as_slice()].concat()
+}
+
+/// The CRC-32 of the interleaved samples at the file's depth, 16-bit ones big-endian.
+pub(crate) fn render(decoder: &StreamDecoder, options: &RenderOptions) -> u32 {
+    let picture = decoder.picture().expect("the header has arrived");
+    let mut bytes = vec![0; picture.output_len(options).expect("fits")];
+    match picture.header().depth {
+        SampleDepth::Eight => picture.render_u8(options, &mut bytes).expect("a sound request"),
+        _ => {
+            let mut samples = vec![0; bytes.len()];
+            picture.render_u16(options, &mut samples).expect("a sound request");
+            bytes = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
+        }
+    }
+    crc32(&bytes)
 }
 
 /// Feeds `bytes` in the given pieces and says that nothing more comes.

@@ -470,7 +470,6 @@ fn first_errors(sound: &Sound) -> Vec<Vector> {
         chunk
     };
     let with = |at: usize, chunk: Vec<u8>| sound.with_chunks(|chunks| chunks.insert(at, chunk));
-    let instead = |at: usize, chunk: Vec<u8>| sound.with_chunks(|chunks| chunks[at] = chunk);
     let layer = [&[2][..], &sound.gaussian.repeat(2)].concat();
     vec![
         Vector::invalid(
@@ -492,12 +491,12 @@ fn first_errors(sound: &Sound) -> Vec<Vector> {
         Vector::invalid(
             "xfirst-header-format",
             "an H of one byte, whose bit 7 is set",
-            instead(0, chunk(b"H", &[0x80])),
+            sound.replaced(0, b"H", &[0x80]),
         ),
         Vector::invalid(
             "xfirst-header-crc",
             "an H with bit 7 set and a wrong CRC",
-            instead(0, wrong_crc(b"H", &[0x80])),
+            sound.with_chunks(|chunks| chunks[0] = wrong_crc(b"H", &[0x80])),
         ),
         Vector::invalid(
             "xfirst-header-side",
@@ -507,7 +506,7 @@ fn first_errors(sound: &Sound) -> Vec<Vector> {
         Vector::invalid(
             "xfirst-header-quantizer",
             "an H that ends after the kind of a quantizer, which is not known",
-            instead(0, chunk(b"H", &[&sound.fields(|_| ())[..], &[3]].concat())),
+            sound.replaced(0, b"H", &[&sound.fields(|_| ())[..], &[3]].concat()),
         ),
         Vector::invalid("xfirst-layer-many", "a layer too many, cut off in its payload", {
             sound.cut_after(4, &[b"L", &[9], b"ab"])

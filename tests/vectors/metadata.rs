@@ -6,6 +6,16 @@ use super::common::{GRAY, chunk};
 use super::sound::{MASTERING, TURNED, random_file};
 use super::{Vector, header};
 
+/// Little-endian TIFF that says to have so many entries at this byte, and has these from byte 10 on.
+fn directory(at: u8, count: u8, entries: &[[u8; 12]]) -> Vec<u8> {
+    [b"II*\0", &[at, 0, 0, 0, count, 0][..], &entries.concat()].concat()
+}
+
+/// An entry with the tag of the orientation.
+fn entry(kind: u8, count: u8, value: u8) -> [u8; 12] {
+    [0x12, 1, kind, 0, count, 0, 0, 0, value, 0, 0, 0]
+}
+
 /// What looks like an orientation after a layer and is none.
 pub(super) fn valid() -> Vec<Vector> {
     let late_exif = |name, shows, exif: &[u8]| {
@@ -13,10 +23,6 @@ pub(super) fn valid() -> Vec<Vector> {
         let mut chunks = file.chunks();
         chunks.insert(2, chunk(b"eXIF", exif));
         Vector::valid_chunks(name, shows, file, &chunks)
-    };
-    let entry = |kind: u8, count: u8, value: u8| [0x12, 1, kind, 0, count, 0, 0, 0, value, 0, 0, 0];
-    let directory = |at: u8, count: u8, entries: &[[u8; 12]]| {
-        [b"II*\0", &[at, 0, 0, 0, count, 0][..], &entries.concat()].concat()
     };
     let turned = entry(3, 1, 6);
     vec![
@@ -67,9 +73,6 @@ pub(super) fn skipping() -> Vec<Vector> {
         let bytes = sound.with_chunks(|c| drop(c.splice(1..1, [chunk.clone(), chunk])));
         skipping(name, shows, bytes)
     };
-    // Little-endian TIFF whose directory, at byte 8, has these entries, and then these bytes.
-    let tiff = |count: u8, rest: &[u8]| [b"II*\0\x08\0\0\0", &[count, 0][..], rest].concat();
-    let orientation = |value: u8| [0x12, 1, 3, 0, 1, 0, 0, 0, value, 0, 0, 0];
     let late_exif = |name, shows, exif: &[u8]| inserted(name, shows, 2, b"eXIF", exif);
     vec![
         twice("skip-twice-icc", "two ICC profiles", b"iCCP", b"p"),
@@ -125,10 +128,10 @@ pub(super) fn skipping() -> Vec<Vector> {
         late_exif(
             "skip-exif-entries",
             "the same, with more entries than there are and no end",
-            &tiff(9, &orientation(6)),
+            &directory(8, 9, &[entry(3, 1, 6)]),
         ),
         late_exif("skip-exif-two", "the same, of two orientations: the first counts", &{
-            tiff(2, &[orientation(3), orientation(1)].concat())
+            directory(8, 2, &[entry(3, 1, 3), entry(3, 1, 1)])
         }),
         inserted(
             "skip-text",
