@@ -1,6 +1,7 @@
 //! The loss, which the fit and the descent minimize: what an error is, how much it counts at its place and
 //! on its scale, and its gradient. What changes the loss changes this room alone.
 
+mod activity;
 mod color_curvature;
 mod error;
 mod gradient;

@@ -6,8 +6,7 @@
 //! So a coarse error, which shifts the means of small blocks of pixels, counts more than a fine one,
 //! and both count less in texture than on even ground.
 
-use core::ops::Range;
-
+use super::activity::{self, Luma};
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
@@ -29,9 +28,9 @@ pub(super) const COLOR: [f32; SCALES] = [0.85, 0.1, 0.5];
 /// The weight is the variance to the power of minus this.
 const MASKING: f64 = 0.4;
 /// What is added to a variance: the square of a few quantization steps of 8 bits.
-const LEAST_VARIANCE: f64 = (4.0 / 255.0) * (4.0 / 255.0);
+pub(super) const LEAST_VARIANCE: f64 = (4.0 / 255.0) * (4.0 / 255.0);
 /// The variances are those in square boxes with these radii in pixels.
-const RADII: [usize; 3] = [2, 5, 14];
+pub(super) const RADII: [usize; 3] = [2, 5, 14];
 /// The largest and the least weight on a scale, as a factor on its geometric mean.
 const MOST: f64 = 8.0;
 /// How often an error counts in a gradient without noise, where people see blotches and bands that measures
@@ -67,23 +66,21 @@ impl PerceptualWeights {
         let [columns, rows] = source.size().map(|side| side.div_ceil(BLOCK));
         let mut blocks = vec![[0.0; SCALES]; columns * rows];
         let mut means = [0.0; SCALES];
+        let mut logarithms = vec![[0.0; SCALES]; columns * rows];
+        let bands = logarithms.chunks_mut(columns * BAND).enumerate();
+        observer.map(bands, |(band, blocks)| {
+            let first = band * BAND;
+            let rows = first..first + blocks.len() / columns;
+            for background in backgrounds {
+                let background = source.is_premultiplied().then_some(*background);
+                let luma = Luma { source, shares: &shares[..colors], background };
+                activity::add_logarithms(&luma, rows.clone(), blocks);
+            }
+        })?;
+        let power = -MASKING / (RADII.len() * backgrounds.len()) as f64;
         for (scale, share) in BY_SCALE.into_iter().enumerate() {
-            let mut logarithms = vec![0.0; blocks.len()];
-            let bands = logarithms.chunks_mut(columns * BAND).enumerate();
-            observer.map(bands, |(band, blocks)| {
-                let first = band * BAND;
-                let end = first + blocks.len() / columns;
-                let rows = first..end;
-                for background in backgrounds {
-                    let over = source.is_premultiplied().then_some(*background);
-                    let luma = LumaBand::new(source, &shares[..colors], scale, rows.clone(), over);
-                    luma.add_logarithms(first, blocks);
-                }
-                for block in blocks {
-                    *block /= backgrounds.len() as f32;
-                }
-            })?;
-            let (values, mean) = normalized(&logarithms);
+            let logarithms = logarithms.iter().map(|block| power * f64::from(block[scale]));
+            let (values, mean) = normalized(logarithms);
             observer.poll()?;
             means[scale] = mean;
             for (block, value) in blocks.iter_mut().zip(values) {
@@ -129,11 +126,9 @@ impl PerceptualWeights {
 
     /// Size in bytes of what else [`PerceptualWeights::new`] needs.
     pub(crate) fn scratch_memory(&self, source: &Source<'_>) -> usize {
-        let [width, height] = source.size();
+        let [_, height] = source.size();
         let tasks = height.div_ceil(BAND * BLOCK).min(rayon::current_num_threads());
-        let rows = (BAND * BLOCK + 2 * RADII[RADII.len() - 1]).min(height);
-        let sums = tasks * (width + 1) * (rows + 1) * size_of::<[f64; 2]>();
-        sums + self.blocks.len() * size_of::<f32>()
+        tasks * activity::memory(source, BAND) + size_of_val(&self.blocks[..])
     }
 }
 
@@ -153,12 +148,6 @@ fn stress(blocks: &mut [BlockWeights], columns: usize, factor: impl Fn(usize, us
     blocks.iter_mut().flatten().for_each(|value| *value /= mean);
 }
 
-/// What a sample of a colour looks like, scaled to 16 bits.
-fn seen(source: &Source<'_>, at: usize) -> f32 {
-    let sample = f32::from(source.wide_sample(at));
-    source.curve().map_or(sample, |curve| curve.at(sample / 65535.0) * 65535.0)
-}
-
 /// The mean luma of a block's codes, where a full sample is 1.
 fn code(source: &Source<'_>, shares: &[f32], [x, y]: [usize; 2]) -> f32 {
     let ([width, height], channels) = (source.size(), source.color().channels());
@@ -175,118 +164,13 @@ fn code(source: &Source<'_>, shares: &[f32], [x, y]: [usize; 2]) -> f32 {
 }
 
 /// Weights from their logarithms, with a mean of 1, and their mean before.
-fn normalized(logarithms: &[f32]) -> (impl Iterator<Item = f64>, f64) {
-    let count = logarithms.len() as f64;
-    let middle = logarithms.iter().map(|&value| f64::from(value)).sum::<f64>() / count;
-    let clamped =
-        move |&value: &f32| (f64::from(value) - middle).clamp(-MOST.ln(), MOST.ln()).exp();
-    let mean = logarithms.iter().map(clamped).sum::<f64>() / count;
-    (logarithms.iter().map(move |value| clamped(value) / mean), mean * middle.exp())
-}
-
-/// A radius in pixels of a scale, rounded.
-fn scaled(radius: usize, scale: usize) -> usize {
-    ((radius + (1 << scale) / 2) >> scale).max(1)
-}
-
-/// Sums over the rectangles from the first row and column of a part of the picture's luma.
-struct LumaBand {
-    scale: usize,
-    /// First row, and numbers of columns and rows, at this scale.
-    first: usize,
-    width: usize,
-    height: usize,
-    /// Sums of values and of squares, with a column and a row of zeros before.
-    sums: Vec<[f64; 2]>,
-}
-
-impl LumaBand {
-    /// The luma on a scale around some rows of blocks, of the colours as they are or over a background.
-    fn new(
-        source: &Source<'_>,
-        shares: &[f32],
-        scale: usize,
-        Range { start: first, end }: Range<usize>,
-        background: Option<f32>,
-    ) -> Self {
-        let side = 1 << scale;
-        let most = scaled(RADII[RADII.len() - 1], scale);
-        let size = source.size();
-        let [width, height] = size.map(|length| length.div_ceil(side));
-        let channels = source.color().channels();
-        let first = (first * (BLOCK / side)).saturating_sub(most);
-        let end = (end * (BLOCK / side) + most).min(height);
-        let stride = width + 1;
-        let mut sums = vec![[0.0; 2]; stride * (end - first + 1)];
-        let mut line = vec![0.0; size[0]];
-        let mut means = vec![0.0; width];
-        for y in first..end {
-            means.fill(0.0);
-            let rows = y * side..((y + 1) * side).min(size[1]);
-            let count = rows.len();
-            for row in rows {
-                for (x, value) in line.iter_mut().enumerate() {
-                    let at = (row * size[0] + x) * channels;
-                    let samples = (at..).zip(shares);
-                    *value =
-                        samples.map(|(at, share)| share * seen(source, at) / 65535.0).sum::<f32>();
-                    if let Some(background) = background {
-                        let alpha = source.wide_sample((row * size[0] + x + 1) * channels - 1);
-                        let alpha = f32::from(alpha) / 65535.0;
-                        *value = *value * alpha + background * (1.0 - alpha);
-                    }
-                }
-                for (mean, part) in means.iter_mut().zip(line.chunks(side)) {
-                    *mean += part.iter().sum::<f32>() / (part.len() * count) as f32;
-                }
-            }
-            let (before, after) = sums.split_at_mut((y - first + 1) * stride);
-            let before = &before[(y - first) * stride..];
-            let mut sum = [0.0; 2];
-            for (x, &mean) in means.iter().enumerate() {
-                let value = f64::from(mean);
-                sum = [sum[0] + value, sum[1] + value * value];
-                after[x + 1] = [before[x + 1][0] + sum[0], before[x + 1][1] + sum[1]];
-            }
-        }
-        Self { scale, first, width, height: end - first, sums }
-    }
-
-    /// Adds the logarithms of the weights of rows of blocks, of which the first has the index
-    /// `first` in the picture: means over the values of a block on this scale.
-    fn add_logarithms(&self, first: usize, blocks: &mut [f32]) {
-        let side = BLOCK >> self.scale;
-        let columns = self.width.div_ceil(side);
-        for (index, block) in blocks.iter_mut().enumerate() {
-            let (left, top) =
-                (index % columns * side, (first + index / columns) * side - self.first);
-            let (mut sum, mut count) = (0.0, 0.0);
-            for y in top..(top + side).min(self.height) {
-                for x in left..(left + side).min(self.width) {
-                    let product: f64 =
-                        RADII.map(|radius| self.variance(x, y, radius)).iter().product();
-                    sum += product.ln();
-                    count += 1.0;
-                }
-            }
-            *block += (-MASKING / RADII.len() as f64 * sum / count) as f32;
-        }
-    }
-
-    /// The variance in the box around a value, plus the least variance.
-    fn variance(&self, x: usize, y: usize, radius: usize) -> f64 {
-        let radius = scaled(radius, self.scale);
-        let (left, right) = (x.saturating_sub(radius), (x + radius + 1).min(self.width));
-        let (top, bottom) = (y.saturating_sub(radius), (y + radius + 1).min(self.height));
-        let stride = self.width + 1;
-        let corner = |x: usize, y: usize| self.sums[y * stride + x];
-        let [a, b, c, d] =
-            [corner(left, top), corner(right, top), corner(left, bottom), corner(right, bottom)];
-        let [sum, squares] = [0, 1].map(|which| d[which] - b[which] - c[which] + a[which]);
-        let count = ((right - left) * (bottom - top)) as f64;
-        let mean = sum / count;
-        (squares / count - mean * mean).max(0.0) + LEAST_VARIANCE
-    }
+fn normalized(logarithms: impl Iterator<Item = f64> + Clone) -> (impl Iterator<Item = f64>, f64) {
+    let count = logarithms.clone().count() as f64;
+    let middle = logarithms.clone().sum::<f64>() / count;
+    let clamped = logarithms.map(|value| (value - middle).clamp(-MOST.ln(), MOST.ln()).exp());
+    let values: Vec<f64> = clamped.collect();
+    let mean = values.iter().sum::<f64>() / count;
+    (values.into_iter().map(move |value| value / mean), mean * middle.exp())
 }
 
 #[cfg(test)]
