@@ -22,7 +22,7 @@ const AIMED_PSNR_EXCESS: f64 = 0.02;
 /// The log ratios of size that are good enough: a file that is a little too large will be shortened.
 const TOLERANCE_OF_SIZE: (f64, f64) = (-0.009, 0.04);
 /// The log ratios of size that are left to the shortening, even if there are passes left.
-const WELL_SHORTENED: (f64, f64) = (0.003, 0.014);
+const WELL_SHORTENED: (f64, f64) = (0.003, 0.02);
 /// What is added to a log ratio on the wrong side of the tolerance, so that every log ratio on the
 /// right side is preferred.
 const WRONG_SIDE_PENALTY: f64 = 1e3;

@@ -24,7 +24,7 @@ use crate::threads::Threads;
 /// For the efforts 1 to 7: iterations of training, and passes of rate-distortion optimization over
 /// the codes of an entropy-coded file. In a short run, time is better spent on iterations.
 const EFFORTS: [(u32, u32); 7] =
-    [(30, 1), (75, 2), (170, 4), (350, 8), (700, 10), (1_400, 10), (2_800, 12)];
+    [(36, 1), (75, 2), (170, 4), (350, 8), (700, 10), (1_400, 10), (2_800, 12)];
 /// Fewest iterations for a target that sets the error instead of the number of Gaussians: a fit
 /// of fewer iterations needs far too many Gaussians to reach the error.
 const MIN_ITERATIONS_BY_ERROR: u32 = 180;

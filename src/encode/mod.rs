@@ -23,6 +23,8 @@ mod progress;
 mod quality;
 mod rate_model;
 mod rdo;
+mod reduced;
+mod resolutions;
 mod rows;
 mod sample_tile;
 mod shortfall;

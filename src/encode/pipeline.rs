@@ -13,12 +13,13 @@ use super::progress::Observer;
 use super::quality::{self, Judge};
 use super::rate_model;
 use super::rdo::SearchWork;
+use super::resolutions::Resolutions;
 use super::shortfall::{Reached, Shortfall};
 use super::sketch::{self, Sketch};
 use super::tiled_source::TiledSource;
 use super::verify::Verified;
 use super::workload::PREPARATION;
-use super::{entropy, packed, verify};
+use super::{entropy, packed, resolutions, verify};
 
 // Constants: docs/tuning.md, "Search for a target".
 /// If the target is a size, and fewer pixels than this come to each Gaussian, the file is compared with one
@@ -172,7 +173,9 @@ fn encode_for_target(
     let (file, mut work) = if let Some(sketch) = &sketch {
         sketch.encode(job, budget, &tiled, &layout, work, observer)
     } else {
-        let mut fit = Fit::new(&tiled, training, budget, precision, layout.base(), job.seed, work);
+        let copies = resolutions::copies(job, observer)?;
+        let sources = Resolutions { picture: &tiled, copies: &copies };
+        let mut fit = Fit::new(sources, training, budget, precision, layout.base(), job.seed, work);
         fit.run(job.workload(expected), observer)?;
         is_lost_to_rounding = fit.is_lost_to_rounding();
         match precision {

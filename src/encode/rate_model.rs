@@ -11,7 +11,7 @@ use super::loss::{ColorCurvature, Distortion};
 use super::options::Tune;
 use crate::coding::entropy::{MAX_EXPONENT, MOST_CODE, Quantization, steps, to_axes};
 use crate::color::ColorModel;
-use crate::gaussian::Gaussian;
+use crate::gaussian::{Gaussian, component_count};
 
 // Constants: docs/tuning.md, "Rate model".
 /// The bits of a component ([`component_bits`]) on average over the Gaussians of a usual picture.
@@ -28,6 +28,12 @@ const STEP_RANGE: (f64, f64) = (1e-4, 16.0);
 /// The Lagrange multiplier lambda, in squared steps of colour per bit: with it, making all steps a
 /// little finer lowers the distortion by as much as lambda times the bits that it adds.
 pub(crate) const LAMBDA: f32 = 0.322;
+
+/// Bits of a Gaussian that is weaker than a step, and more for each bit of a component.
+const LEAST_BITS: f64 = 9.0;
+const BITS_OF_COMPONENT: f64 = 1.0;
+/// Gaussians that the size is foretold by.
+const MOST_OF_SAMPLE: usize = 1000;
 
 /// Bits that an entropy-coded Gaussian takes on average, where a component takes `component_bits`. A
 /// file of a given size is fitted with as many Gaussians as fit in at this rate: fewer and more
@@ -112,6 +118,60 @@ pub(crate) fn step_exponent(
     steps.max(1.0).log2().round().min(MAX_EXPONENT as f32) as u32
 }
 
+/// How the size of a file depends on the step: a Gaussian takes some bits, and some more for each bit of its
+/// components ([`component_bits`]).
+#[derive(Debug)]
+pub(crate) struct SizeModel {
+    /// The energies of some of the Gaussians.
+    energies: Vec<f64>,
+    /// Bits of all Gaussians for one bit of each of these.
+    factor: f64,
+    bits_by_component: f64,
+}
+
+impl SizeModel {
+    pub(crate) fn new(gaussians: &[Gaussian], channels: usize) -> Self {
+        let interval = (gaussians.len() / MOST_OF_SAMPLE).max(1);
+        let sample = gaussians.iter().step_by(interval);
+        let energies: Vec<f64> = sample.map(|gaussian| f64::from(gaussian.energy())).collect();
+        Self {
+            factor: gaussians.len() as f64 / energies.len().max(1) as f64,
+            energies,
+            bits_by_component: BITS_OF_COMPONENT * component_count(channels) as f64,
+        }
+    }
+
+    /// The base-2 logarithm of the bits with a step.
+    fn log_bits(&self, step: f64) -> f64 {
+        let squared = (2.0 * step).exp2();
+        let bits = |energy: &f64| 0.5 * (1.0 + energy / squared).log2();
+        let by_components: f64 = self.energies.iter().map(bits).sum();
+        let all = LEAST_BITS * self.energies.len() as f64 + self.bits_by_component * by_components;
+        (self.factor * all.max(1.0)).log2()
+    }
+
+    /// The step with which a file has about so many bits.
+    pub(crate) fn step_for_bits(&self, bits: f64) -> f64 {
+        self.step_for(bits.max(1.0).log2())
+    }
+
+    /// The step with which the base-2 logarithm of the size changes by so much, from that of a step on.
+    pub(crate) fn step_for_change(&self, step: f64, change: f64) -> f64 {
+        // What the model does not know, it does not know of the other step either.
+        self.step_for(self.log_bits(step) + change)
+    }
+
+    /// The step with these bits, as a base-2 logarithm.
+    fn step_for(&self, log_bits: f64) -> f64 {
+        let (mut fine, mut coarse) = (STEP_RANGE.0.log2(), STEP_RANGE.1.log2());
+        for _ in 0..24 {
+            let middle = 0.5 * (fine + coarse);
+            if self.log_bits(middle) > log_bits { fine = middle } else { coarse = middle }
+        }
+        0.5 * (fine + coarse)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,6 +192,31 @@ mod tests {
                 .map(|component_bits| bits_per_gaussian(tune, component_bits));
             assert!(10.0 < weak && weak < usual && usual < strong && strong < 100.0);
         }
+    }
+
+    #[test]
+    fn the_model_of_the_size_finds_steps() {
+        let mut rng = fastrand::Rng::with_seed(6);
+        let gaussian = |_| {
+            let [l11, l22] = [(); 2].map(|()| 1.0 + 9.0 * rng.f32());
+            let color = [rng.f32() - 0.5, rng.f32() - 0.5, rng.f32() - 0.5, 0.0];
+            Gaussian { center: [0.0; 2], cholesky: [l11, 0.0, l22], color }
+        };
+        // More than those of the sample.
+        let gaussians: Vec<_> = (0..2500).map(gaussian).collect();
+        let model = SizeModel::new(&gaussians, 3);
+        let step = model.step_for_bits(60_000.0);
+        let component_bits: f64 =
+            (gaussians.iter()).map(|gaussian| component_bits(gaussian, color_step(step))).sum();
+        let bits = LEAST_BITS * 2500.0 + 8.0 * BITS_OF_COMPONENT * component_bits;
+        assert!((bits / 60_000.0 - 1.0).abs() < 0.02, "{bits}");
+        // Twice as many bits, and back.
+        let finer = model.step_for_change(step, 1.0);
+        assert!(finer < step && (model.step_for_change(finer, -1.0) - step).abs() < 1e-3);
+        // No step gives less than the least bits, nor more than the finest one.
+        assert!((model.step_for_bits(1.0) - STEP_RANGE.1.log2()).abs() < 1e-3);
+        assert!((model.step_for_bits(1e9) - STEP_RANGE.0.log2()).abs() < 1e-3);
+        assert!(SizeModel::new(&[], 3).step_for_bits(1000.0).is_finite());
     }
 
     #[test]

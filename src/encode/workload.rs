@@ -34,6 +34,11 @@ impl Workload {
         Self { pixels: pixels as f64, gaussians: gaussians as f64 }
     }
 
+    /// The same at a resolution that is halved this often.
+    pub(crate) fn halved(&self, halvings: usize) -> Self {
+        Self { pixels: self.pixels * 0.25_f64.powi(halvings as i32), ..*self }
+    }
+
     /// The work of something with these rates.
     pub(crate) fn of(&self, (pixel, gaussian): Rates) -> f64 {
         self.pixels * pixel + self.gaussians * gaussian
@@ -45,9 +50,11 @@ impl Workload {
         self.of((ITERATION.0 + COVERAGE * covered, share * ITERATION.1))
     }
 
-    /// Training from nothing, where growth takes six tenths of the iterations.
+    /// Training from nothing, where growth takes six tenths of the iterations, most of them at half of the
+    /// resolution.
     pub(crate) fn training(&self, iterations: u32) -> f64 {
-        f64::from(iterations) * (0.6 * self.iteration(0.4) + 0.4 * self.iteration(1.0))
+        let growth = 0.4 * self.halved(1).iteration(0.4) + 0.2 * self.iteration(0.8);
+        f64::from(iterations) * (growth + 0.4 * self.iteration(1.0))
     }
 
     /// Training after Gaussians were added or removed.

@@ -35,7 +35,7 @@ use crate::simd::LANES;
 const FIRST_STEP_SIZE: f32 = 0.4;
 /// The change of the step size, and its range.
 const FASTER: f32 = 1.2;
-const SLOWER: f32 = 0.8;
+const SLOWER: f32 = 0.85;
 const MUCH_SLOWER: f32 = 0.25;
 const LEAST_STEP_SIZE: f32 = 0.02;
 const MOST_STEP_SIZE: f32 = 3.0;
@@ -55,6 +55,11 @@ pub(super) struct State {
 impl State {
     pub(super) const NEW: Self =
         Self { mean: Components::ZERO, step_size: FIRST_STEP_SIZE, weight: 0.0 };
+
+    /// Multiplies the gradients that it remembers by a factor.
+    pub(super) fn scale(&mut self, factor: f32) {
+        self.mean = Components::from_array(self.mean.to_array().map(|mean| mean * factor));
+    }
 
     /// Makes the next steps smaller after a setback, without waiting for the gradient to turn round.
     pub(super) fn slow_down(&mut self) {

@@ -17,11 +17,13 @@ impl Fit<'_> {
     /// `foreseen`.
     pub(super) fn wanted(&self, foreseen: f64) -> usize {
         let RenderingError { squared, distortion } = self.error;
+        let component_bits = || self.component_bits(Distortion(distortion.0 * foreseen));
+        // As many pixels of the picture as come to one of the copy.
+        let factor = foreseen * 4_f64.powi(self.halvings as i32);
         let error = RenderingError {
-            squared: SquaredError(squared.0 * foreseen),
-            distortion: Distortion(distortion.0 * foreseen),
+            squared: SquaredError(squared.0 * factor),
+            distortion: Distortion(distortion.0 * factor),
         };
-        let component_bits = || self.component_bits(error.distortion);
         self.budget.wanted(self.len(), error, component_bits, self.most())
     }
 

@@ -69,6 +69,15 @@ impl Parameterization {
         }
     }
 
+    /// The shape values of a Gaussian that is larger by a factor.
+    pub(crate) fn scaled(self, [a, b, c]: [f32; 3], factor: f32) -> [f32; 3] {
+        match self {
+            Self::Cholesky => [a * factor, b * factor, c * factor],
+            Self::Covariance => [a, b, c].map(|entry| entry * (factor * factor)),
+            Self::RotationScale => [a * factor, b * factor, c],
+        }
+    }
+
     /// The shape values of the covariance that `values` stand for, plus `variance` times the identity.
     pub(crate) fn widened(self, values: [f32; 3], variance: f32) -> [f32; 3] {
         let [l11, l21, l22] = self.to_cholesky(values);
@@ -209,6 +218,23 @@ mod tests {
 
     proptest! {
         #![proptest_config(config(128))]
+
+        #[test]
+        fn a_shape_is_scaled_in_every_parameterization(
+            l11 in 0.3_f32..50.0, l21 in -50.0_f32..50.0, l22 in 0.3_f32..50.0,
+            factor in 0.1_f32..10.0,
+        ) {
+            let expected = covariance(Parameterization::Cholesky, [l11, l21, l22]);
+            let scale = factor * factor * (expected[0] + expected[2]);
+            for parameterization in PARAMETERIZATIONS {
+                let values = parameterization.shape_of([l11, l21, l22]);
+                let found = covariance(parameterization, parameterization.scaled(values, factor));
+                for (found, expected) in found.iter().zip(expected) {
+                    let error = (found - factor * factor * expected).abs();
+                    prop_assert!(error <= 1e-5 * scale, "{parameterization:?}");
+                }
+            }
+        }
 
         #[test]
         fn every_parameterization_keeps_the_covariance(

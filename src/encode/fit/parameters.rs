@@ -13,6 +13,7 @@ use super::state::{States, reordered, retain};
 use super::training::Optimizer;
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
+use crate::gaussian::Parameterization;
 use crate::render::splat::Splat;
 
 /// Gaussians that one task steps and sums up.
@@ -47,6 +48,15 @@ impl Parameters {
         self.states.clear();
         self.states.extend(values.len());
         self.values = values;
+    }
+
+    /// Multiplies all lengths by a factor.
+    pub(crate) fn scale(&mut self, factor: f32, parameterization: Parameterization) {
+        for values in &mut self.values {
+            values.center = values.center.map(|at| at * factor);
+            values.shape = parameterization.scaled(values.shape, factor);
+        }
+        self.states.scale(factor);
     }
 
     /// Lets the Gaussians for whose values `is_slow` is true take smaller steps.

@@ -33,6 +33,17 @@ impl States {
         }
     }
 
+    /// Goes on where all lengths are larger by a factor, and sums over pixels by its square.
+    pub(super) fn scale(&mut self, factor: f32) {
+        match self {
+            // Its averages are of the parameterization, and short.
+            Self::Adam(_, states) => states.fill(adam::State::NEW),
+            Self::GaussNewton(_, states) => {
+                states.iter_mut().for_each(|state| state.scale(factor * factor));
+            }
+        }
+    }
+
     pub(super) fn clear(&mut self) {
         match self {
             Self::Adam(_, states) => states.clear(),

@@ -15,6 +15,7 @@ use crate::encode::error::Result;
 use crate::encode::loss::{RenderingError, SquaredError};
 use crate::encode::options::{MAX_GAUSSIANS, Precision};
 use crate::encode::progress::Observer;
+use crate::encode::resolutions::Resolutions;
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::{Gaussian, component_count};
 use crate::render::splat::Splat;
@@ -47,6 +48,10 @@ pub(super) enum Next {
 /// The Gaussians of a picture during training.
 #[derive(Debug)]
 pub(crate) struct Fit<'a> {
+    resolutions: Resolutions<'a>,
+    /// How often the resolution is halved at present.
+    pub(super) halvings: usize,
+    /// The source at this resolution.
     pub(super) tiled: &'a TiledSource,
     pub(super) training: &'a Training,
     pub(super) budget: Budget,
@@ -75,7 +80,7 @@ pub(crate) struct Fit<'a> {
 
 impl<'a> Fit<'a> {
     pub(crate) fn new(
-        tiled: &'a TiledSource,
+        resolutions: Resolutions<'a>,
         training: &'a Training,
         budget: Budget,
         precision: Precision,
@@ -83,17 +88,16 @@ impl<'a> Fit<'a> {
         seed: u64,
         work: Work,
     ) -> Self {
+        let tiled = resolutions.picture;
         Self {
+            resolutions,
+            halvings: 0,
             tiled,
             training,
             budget,
             precision,
             base,
-            bounds: Bounds::new(
-                training.parameterization,
-                tiled.channels,
-                [tiled.width as u32, tiled.height as u32],
-            ),
+            bounds: bounds_of(training, tiled),
             parameters: Parameters::new(&training.optimizer),
             quantizers: None,
             float_error: SquaredError::default(),
@@ -142,6 +146,27 @@ impl<'a> Fit<'a> {
         self.quantizers.is_some() && self.best_error().squared.0 > LOST * self.float_error.0
     }
 
+    /// Goes on at another resolution, where the picture is halved this often.
+    pub(super) fn set_halvings(&mut self, halvings: usize) {
+        if halvings == self.halvings {
+            return;
+        }
+        let factor = (self.halvings as f32 - halvings as f32).exp2();
+        self.parameters.scale(factor, self.training.parameterization);
+        self.halvings = halvings;
+        self.tiled = self.resolutions.halved(halvings);
+        self.bounds = bounds_of(self.training, self.tiled);
+        self.pass = Pass::new(self.tiled);
+        self.invalidate();
+    }
+
+    /// How often the resolution may be halved for so many Gaussians.
+    pub(super) fn halvings_for(&self, count: usize) -> usize {
+        let Some(density) = self.training.coarse_to_fine else { return 0 };
+        let has_enough = |pixels: &usize| *pixels >= count.saturating_mul(density as usize);
+        self.resolutions.copies.iter().map(TiledSource::pixels).take_while(has_enough).count()
+    }
+
     /// What training has cost so far.
     pub(crate) fn work(&self) -> Work {
         self.work
@@ -154,7 +179,7 @@ impl<'a> Fit<'a> {
 
     /// Most Gaussians that the picture may get: one per pixel.
     pub(crate) fn most(&self) -> usize {
-        self.tiled.pixels().min(MAX_GAUSSIANS as usize)
+        self.resolutions.picture.pixels().min(MAX_GAUSSIANS as usize)
     }
 
     /// Whether the last step lost what training had. Codes that flip make the error jump, which is no
@@ -281,10 +306,16 @@ impl<'a> Fit<'a> {
     /// Size in bytes.
     pub(super) fn memory(&self) -> usize {
         let best = self.best.as_ref().map_or(0, |best| best.values.capacity());
-        self.tiled.memory()
+        self.resolutions.memory()
             + self.pass.memory()
             + self.parameters.memory()
             + best * size_of::<Components>()
             + self.splats.capacity() * size_of::<Splat>()
     }
+}
+
+/// The bounds of trained values for a source.
+fn bounds_of(training: &Training, tiled: &TiledSource) -> Bounds {
+    let size = [tiled.width as u32, tiled.height as u32];
+    Bounds::new(training.parameterization, tiled.channels, size)
 }

@@ -18,6 +18,10 @@ use crate::kernel::Kernel;
 pub struct Training {
     /// Number of iterations, at least 1 (paper: 50,000).
     pub iterations: u32,
+    /// Pixels per Gaussian, at least 1, from which on a lower resolution is enough: training begins with a copy
+    /// of the picture of half the resolution, a quarter or an eighth that has so many, and leaves it when there
+    /// are more Gaussians, or half of the iterations are over (paper: `None`, no copies).
+    pub coarse_to_fine: Option<u32>,
     /// The kernel that is fitted and stored (paper: [`Kernel::PAPER`]). [`Precision::Entropy`]
     /// needs [`Kernel::Quartic`].
     ///
@@ -260,6 +264,7 @@ impl Training {
         let hurry = 1.0 / iterations.max(30) as f32;
         Self {
             iterations,
+            coarse_to_fine: Some(16),
             kernel: Kernel::Quartic,
             parameterization: Parameterization::Cholesky,
             densification: Densification {
@@ -317,6 +322,7 @@ impl Training {
         };
         let rules = [
             (self.iterations >= 1, "iterations must be at least 1"),
+            (self.coarse_to_fine != Some(0), "coarse_to_fine must be at least 1"),
             (share(d.initial), "densification.initial must be in (0, 1]"),
             (share(d.end), "densification.end must be in (0, 1]"),
             (

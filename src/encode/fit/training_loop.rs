@@ -13,6 +13,8 @@ use crate::encode::workload::Workload;
 /// The error after training as a share of the error during growth: training continues to lower the
 /// error when no more Gaussians are added.
 const FORESEEN: f64 = 0.75;
+/// The share of the iterations from which on the resolution is that of the picture.
+const COARSE_UNTIL: f32 = 0.5;
 
 /// What an iteration depends on.
 #[derive(Clone, Copy, Debug)]
@@ -32,17 +34,26 @@ impl Fit<'_> {
     pub(crate) fn run(&mut self, workload: Workload, observer: &mut Observer<'_>) -> Result<()> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
+        self.set_halvings(self.halvings_for(0));
         self.forward(Next::Growth, observer)?;
         let first = densification.initial * self.wanted(1.0) as f32;
-        self.grow((first.ceil() as usize).max(1), 0, observer)?;
+        let first = (first.ceil() as usize).max(1);
+        if self.halvings_for(first) < self.halvings {
+            self.set_halvings(self.halvings_for(first));
+            self.forward(Next::Growth, observer)?;
+        }
+        self.grow(first, 0, observer)?;
         let mut kept = usize::MAX;
         let planned = self.work.iterations + iterations;
         for iteration in 0..*iterations {
             let done = iteration + 1;
+            let is_late = iteration as f32 >= COARSE_UNTIL * *iterations as f32;
+            let most = if is_late { 0 } else { self.halvings };
+            self.set_halvings(self.halvings_for(self.len()).min(most));
             let growths_left = plan.growths_left(done);
             let grown = 2.0 * f64::from(iteration) / f64::from(*iterations);
             let step = Iteration {
-                work: workload.iteration(grown.min(1.0)),
+                work: workload.halved(self.halvings).iteration(grown.min(1.0)),
                 starts_quantization: iteration == plan.quantized_from,
                 factor: schedule.factor(iteration, *iterations),
                 planned,
@@ -132,6 +143,7 @@ impl Fit<'_> {
     /// Ends training: renders the values of the last step, keeps them if they are the best, and
     /// frees memory.
     fn settle(&mut self, observer: &mut Observer<'_>) -> Result<()> {
+        self.set_halvings(0);
         self.binned_for = 0;
         self.forward(Next::Pass, observer)?;
         self.keep_if_best();

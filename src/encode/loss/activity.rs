@@ -4,8 +4,18 @@ use core::ops::Range;
 
 use fearless_simd::{Level, dispatch};
 
-use super::perceptual_weights::{BLOCK, LEAST_VARIANCE, RADII, SCALES};
 use crate::encode::source::{SPAN, Source};
+
+/// Scales on which errors count: single pixels, and means over 2 x 2 and 4 x 4 pixels.
+pub(crate) const SCALES: usize = 3;
+/// Side in pixels of the blocks that have weights, which is that of the coarsest scale.
+pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
+
+// Constants: docs/tuning.md, "What a person sees".
+/// What is added to a variance: the square of a few quantization steps of 8 bits.
+pub(super) const LEAST_VARIANCE: f64 = (4.0 / 255.0) * (4.0 / 255.0);
+/// The variances are those in square boxes with these radii in pixels.
+pub(super) const RADII: [usize; 3] = [2, 5, 14];
 
 /// Where luma comes from.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +106,6 @@ fn planes(luma: &Luma<'_>, blocks: Range<usize>) -> [Plane; SCALES] {
 
 /// The luma of a row of pixels.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "see `fit/training_tile.rs`")]
 fn read_line(luma: &Luma<'_>, y: usize, line: &mut [f32]) {
     let Luma { source, shares, background } = *luma;
     let mut planes = [[0.0; SPAN]; 4];
@@ -149,7 +158,6 @@ impl Boxes {
 
     /// Adds the values of a row, and their squares, times a factor.
     #[inline(always)]
-    #[expect(clippy::needless_range_loop, reason = "see `fit/training_tile.rs`")]
     fn add(&mut self, row: &[f32], factor: f64) {
         let [sums, squares] = &mut self.columns;
         let (sums, squares) = (&mut sums[..row.len()], &mut squares[..row.len()]);

@@ -6,8 +6,9 @@
 //! picture, residuals are 0. Residuals of alpha are not averaged. The distortion is quadratic in the
 //! residuals.
 
+use super::activity::{BLOCK, SCALES};
 use super::error::Distortion;
-use super::perceptual_weights::{BLOCK, COLOR, PerceptualWeights, SCALES};
+use super::perceptual_weights::{COLOR, PerceptualWeights};
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its

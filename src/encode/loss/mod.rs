@@ -9,10 +9,11 @@ mod perceptual_weights;
 mod picture_loss;
 mod placement;
 
+pub(crate) use activity::BLOCK;
 pub(crate) use color_curvature::{ColorCurvature, Matrix};
 pub(crate) use error::{Distortion, RenderingError, SquaredError};
 #[cfg(test)]
 pub(crate) use gradient::plain_distortion;
-pub(crate) use perceptual_weights::{BLOCK, PerceptualWeights};
+pub(crate) use perceptual_weights::PerceptualWeights;
 pub(crate) use picture_loss::{PictureLoss, residual};
 pub use placement::ErrorNorm;

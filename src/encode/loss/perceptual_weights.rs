@@ -6,16 +6,11 @@
 //! So a coarse error, which shifts the means of small blocks of pixels, counts more than a fine one,
 //! and both count less in texture than on even ground.
 
-use super::activity::{self, Luma};
+use super::activity::{self, BLOCK, Luma, RADII, SCALES};
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
 use crate::encode::source::Source;
-
-/// Scales on which errors count: single pixels, and means over 2 x 2 and 4 x 4 pixels.
-pub(crate) const SCALES: usize = 3;
-/// Side in pixels of the blocks that have weights, which is that of the coarsest scale.
-pub(crate) const BLOCK: usize = 1 << (SCALES - 1);
 
 /// The weights of a block for squared errors on each scale.
 pub(crate) type BlockWeights = [f32; SCALES];
@@ -27,10 +22,6 @@ const BY_SCALE: [f64; SCALES] = [0.4, 0.35, 0.25];
 pub(super) const COLOR: [f32; SCALES] = [0.85, 0.1, 0.5];
 /// The weight is the variance to the power of minus this.
 const MASKING: f64 = 0.4;
-/// What is added to a variance: the square of a few quantization steps of 8 bits.
-pub(super) const LEAST_VARIANCE: f64 = (4.0 / 255.0) * (4.0 / 255.0);
-/// The variances are those in square boxes with these radii in pixels.
-pub(super) const RADII: [usize; 3] = [2, 5, 14];
 /// The largest and the least weight on a scale, as a factor on its geometric mean.
 const MOST: f64 = 8.0;
 /// How often an error counts in a gradient without noise, where people see blotches and bands that measures
@@ -175,6 +166,7 @@ fn normalized(logarithms: impl Iterator<Item = f64> + Clone) -> (impl Iterator<I
 
 #[cfg(test)]
 mod tests {
+    use super::super::activity::LEAST_VARIANCE;
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::appearance::Curve;

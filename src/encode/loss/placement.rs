@@ -1,6 +1,6 @@
 //! Where new Gaussians go: the error of single pixels (paper, section "Distortion Driven Densification").
 
-use super::perceptual_weights::BLOCK;
+use super::activity::BLOCK;
 use super::picture_loss::PictureLoss;
 use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
 use crate::render::tile_grid::TILE_HEIGHT;

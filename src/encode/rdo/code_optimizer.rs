@@ -35,6 +35,8 @@ pub(super) struct Optimized {
     /// The codes before their centres were rounded for the file, sorted by how much each lowers the error
     /// per bit, the most first.
     pub(super) by_use: Vec<Code>,
+    /// Those of Gaussians that were removed, sorted likewise.
+    pub(super) spare: Vec<Code>,
 }
 
 impl Optimized {
@@ -144,12 +146,12 @@ impl<'a> CodeOptimizer<'a> {
         let lambda = rate_model::lambda(&quantization) * lambda.exp2() as f32;
         let descent =
             CoordinateDescent { coder, model: self.model, tree_bits, tile_bits, lambda, work };
-        let by_use = descent.pass(&mut self.residuals, &codes, &contexts, observer)?;
+        let [by_use, spare] = descent.pass(&mut self.residuals, &codes, &contexts, observer)?;
         // Coding needs memory of its own.
         drop((contexts, codes));
         drop(layers);
         let codes = QuantizedCodes { quantization, codes: by_use.clone() };
-        Ok(Optimized { coded: self.layout.coded(codes, observer)?, by_use })
+        Ok(Optimized { coded: self.layout.coded(codes, observer)?, by_use, spare })
     }
 
     /// Sets the residuals to those of the codes as the decoder renders them.

@@ -67,11 +67,16 @@ impl Candidate {
     }
 }
 
+/// A code, with [`Candidate::use_of_bits`] and the index of its Gaussian.
+type Ranked = (f32, u32, Code);
+
 /// The result of optimizing the Gaussians of a band.
 #[derive(Debug, Default)]
 struct PassedBand {
-    /// The Gaussians that remain: [`Candidate::use_of_bits`], index and code.
-    found: Vec<(f32, u32, Code)>,
+    /// The Gaussians that remain.
+    found: Vec<Ranked>,
+    /// Those that were removed, although they lower the error.
+    spare: Vec<Ranked>,
     /// Gaussians that reach beyond the band, with the factor that they are added to the rendering with, and
     /// the rows of the band, where that is done.
     beyond: Vec<(Gaussian, f32, Range<usize>)>,
@@ -112,8 +117,9 @@ impl Cheapest {
 
 impl CoordinateDescent<'_> {
     /// One pass: improves or removes every Gaussian. `contexts` has the context of each code. `residuals`
-    /// are those of the rendering of `codes`, and in the end those of the new codes. Returns the new codes,
-    /// sorted by how much each lowers the error per bit, the most first.
+    /// are those of the rendering of `codes`, and in the end those of the new codes. Returns the new codes, and
+    /// those of removed Gaussians that lower the error, both sorted by how much each lowers it per bit, the
+    /// most first.
     ///
     /// Bands of the picture are processed in parallel; the result does not depend on the threads.
     pub(crate) fn pass(
@@ -122,7 +128,7 @@ impl CoordinateDescent<'_> {
         codes: &[Code],
         contexts: &[CodeContext<'_>],
         observer: &mut Observer<'_>,
-    ) -> Result<Vec<Code>> {
+    ) -> Result<[Vec<Code>; 2]> {
         // Gaussians outside the picture are not among them, and thereby removed.
         let size = residuals.size();
         let entries = observer.map(codes.iter().enumerate(), |(index, code)| {
@@ -132,7 +138,7 @@ impl CoordinateDescent<'_> {
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
         let rounds = Round::all(&mut entries);
         let work = self.work / rounds.iter().map(Round::work).sum::<f64>();
-        let mut passed = Vec::with_capacity(codes.len());
+        let mut passed = [Vec::with_capacity(codes.len()), Vec::new()];
         for round in &rounds {
             let round_work = work * round.work();
             let tasks = bands_of(residuals, round);
@@ -142,18 +148,21 @@ impl CoordinateDescent<'_> {
                 })?;
             observer.advance(round_work)?;
             let mut whole = residuals.whole();
-            for PassedBand { found, beyond } in passed_bands {
-                passed.extend(found);
+            for PassedBand { found, spare, beyond } in passed_bands {
+                passed[0].extend(found);
+                passed[1].extend(spare);
                 for (gaussian, factor, rows) in beyond {
                     whole.add(&gaussian, factor, 0..rows.start);
                     whole.add(&gaussian, factor, rows.end..usize::MAX);
                 }
             }
         }
-        passed.par_sort_unstable_by(|(use_of_a, a, _), (use_of_b, b, _)| {
-            use_of_b.total_cmp(use_of_a).then(a.cmp(b))
-        });
-        Ok(passed.into_iter().map(|(.., code)| code).collect())
+        Ok(passed.map(|mut ranked| {
+            ranked.par_sort_unstable_by(|(use_of_a, a, _), (use_of_b, b, _)| {
+                use_of_b.total_cmp(use_of_a).then(a.cmp(b))
+            });
+            ranked.into_iter().map(|(.., code)| code).collect()
+        }))
     }
 
     /// Improves or removes Gaussians whose windows are inside of a band.
@@ -169,8 +178,9 @@ impl CoordinateDescent<'_> {
         let rows = band.rows();
         for &Entry { index, .. } in entries {
             let (code, context) = (codes[index as usize], contexts[index as usize]);
-            let choice = self.choose(window, &band, code, context);
-            let chosen = choice.map(|choice| choice.code);
+            let Some(best) = self.choose(window, &band, code, context) else { continue };
+            let is_kept = self.cost(&best) < 0.0;
+            let chosen = is_kept.then_some(best.code);
             if chosen != Some(code) {
                 for (code, factor) in [(Some(code), -1.0), (chosen, 1.0)] {
                     let Some(gaussian) = code.map(|code| self.gaussian(&code)) else { continue };
@@ -183,8 +193,12 @@ impl CoordinateDescent<'_> {
                     }
                 }
             }
-            let found = choice.map(|choice| (choice.use_of_bits(), index, choice.code));
-            of_band.found.extend(found);
+            let ranked = (best.use_of_bits(), index, best.code);
+            if is_kept {
+                of_band.found.push(ranked);
+            } else if best.error < 0.0 {
+                of_band.spare.push(ranked);
+            }
         }
         of_band
     }
@@ -194,8 +208,7 @@ impl CoordinateDescent<'_> {
         quantization.gaussian(code, &quantization.shape(code), grid, self.model)
     }
 
-    /// The code of least cost among a code and its candidates; `None` if it costs less to remove
-    /// the Gaussian.
+    /// The code of least cost among a code and its candidates; `None` if the Gaussian is outside the picture.
     fn choose(
         &self,
         window: &mut Window,
@@ -218,7 +231,7 @@ impl CoordinateDescent<'_> {
                 best = other;
             }
         }
-        (self.cost(&best) < 0.0).then_some(best)
+        Some(best)
     }
 
     /// The Lagrangian cost of a code, relative to that of removing the Gaussian.

@@ -12,7 +12,7 @@ use crate::encode::file::{CodedLayers, FileLayout};
 use crate::encode::loss::Distortion;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
-use crate::encode::rate_model;
+use crate::encode::rate_model::{self, SizeModel};
 use crate::encode::strips;
 use crate::encode::tiled_source::TiledSource;
 use crate::encode::verify::Verified;
@@ -24,6 +24,13 @@ const MOST_ROUNDING_TRIES: u32 = 8;
 const MOST_TRIES: u32 = 4;
 /// With at most this log ratio of rounded codes, the step that follows from it is good.
 const CLOSE_OF_ROUNDED: f64 = 0.025;
+/// The size that the first step aims at, as a log ratio: a file that is a little too large is shortened, and
+/// one that is too small gets Gaussians back.
+const AIMED: f64 = -0.004;
+/// What passes take off the bits that the model of the size gives ([`SizeModel`]), as a base-2 logarithm, and how
+/// much steeper the size falls with the step: more and more Gaussians are too weak for a coarser one.
+const FALL_OF_BITS: f64 = 0.17;
+const STEEPER: f64 = 1.5;
 /// Gaussians of at most this energy are weak: most of them are not worth their bits.
 const WEAK: i64 = 2;
 /// The fall of size and of error, as base-2 logarithms, that further passes of coordinate descent bring
@@ -48,6 +55,8 @@ const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
 const FINEST: f64 = -4.0;
 /// Bytes that one of the least useful Gaussians takes, about.
 const BYTES_OF_LEAST_USEFUL: f64 = 2.3;
+/// How often a file that is too small gets some of them back.
+const MOST_FILLINGS: u32 = 4;
 /// The least share of a number of Gaussians that is asked for which a file has, if need be with finer
 /// steps: the step that suits the error is too coarse where they make hardly anything of the picture.
 const LEAST_KEPT: f64 = 0.5;
@@ -64,7 +73,7 @@ fn weak_share(coded: &CodedLayers) -> f64 {
 
 /// The fall of the size in the first pass, as a base-2 logarithm, given the share of weak Gaussians.
 fn settling_of_rounded(weak: f64) -> f64 {
-    (0.02 + 1.9 * weak).min(0.1).max(1.15 * weak)
+    0.02 + 1.05 * weak
 }
 
 /// By how much size and error will still fall after so many passes.
@@ -215,7 +224,14 @@ impl<'a> TargetSearch<'a> {
         let mut optimized = self.descended(gaussians, search.at, first, observer)?;
         let (mut pass, mut step, mut lambda): (u32, f64, f64) = (first, search.at, 0.0);
         loop {
-            let log_ratio = self.log_ratio(&optimized.coded, aim, observer)?;
+            let mut log_ratio = self.log_ratio(&optimized.coded, aim, observer)?;
+            if let FileAim::Size(_) = aim
+                && pass >= self.work.passes
+                && aim.violation(log_ratio, weak_share(&optimized.coded)) > 0.0
+                && log_ratio < 0.0
+            {
+                (optimized, log_ratio) = self.filled(optimized, log_ratio, aim, observer)?;
+            }
             let expected = log_ratio - settling(pass) + settling(self.work.passes.max(pass + 1));
             let is_within_lambda = aim.is_within_lambda(expected);
             // The squared error of codes that are rounded twice is too large.
@@ -269,21 +285,25 @@ impl<'a> TargetSearch<'a> {
         if !matches!(aim, FileAim::Size(_)) {
             return Ok(step);
         }
-        let mut search = StepSearch::new(step, aim.by_step(), finest);
+        // What is no code: chunks, metadata, texture.
+        let empty = self.codes.rounded(&[], step, observer)?;
+        let fixed = aim.wanted() * self.log_ratio(&empty, aim, observer)?.exp2();
+        let room = (AIMED.exp2() * aim.wanted() - fixed).max(1.0);
+        let model = SizeModel::new(gaussians, self.layout.header().color.channels());
+        let mut step = model.step_for_bits(8.0 * room * FALL_OF_BITS.exp2()).max(finest);
         for _ in 0..MOST_ROUNDING_TRIES {
-            let coded = self.codes.rounded(gaussians, search.at, observer)?;
+            let coded = self.codes.rounded(gaussians, step, observer)?;
             let fall =
                 settling_of_rounded(weak_share(&coded)) + settling(1) - settling(self.work.passes);
-            let log_ratio = self.log_ratio(&coded, aim, observer)? - fall - aim.middle();
-            if log_ratio.abs() < CLOSE_OF_ROUNDED {
-                return Ok((search.at - log_ratio / aim.by_step()).max(finest));
-            }
-            if search.is_exhausted(log_ratio) {
+            let bytes = aim.wanted() * self.log_ratio(&coded, aim, observer)?.exp2() - fixed;
+            let log_ratio = (bytes.max(1.0) / room).log2() - fall;
+            let is_exhausted = step <= finest && log_ratio < 0.0;
+            step = model.step_for_change(step, -log_ratio / STEEPER).max(finest);
+            if is_exhausted || log_ratio.abs() < CLOSE_OF_ROUNDED {
                 break;
             }
-            search.report(log_ratio);
         }
-        Ok(search.at)
+        Ok(step)
     }
 
     /// The codes of a step after some passes.
@@ -328,6 +348,31 @@ impl<'a> TargetSearch<'a> {
         Ok(log_ratio)
     }
 
+    /// The codes with the most useful of those that were removed, as many as a file that is too small has room
+    /// for, and their log ratio from the size.
+    fn filled(
+        &self,
+        mut optimized: Optimized,
+        mut log_ratio: f64,
+        aim: FileAim,
+        observer: &mut Observer<'_>,
+    ) -> Result<(Optimized, f64)> {
+        let Optimized { coded, by_use, spare } = &mut optimized;
+        for _ in 0..MOST_FILLINGS {
+            let missing = aim.wanted() * (1.0 - log_ratio.exp2());
+            let count = (missing / BYTES_OF_LEAST_USEFUL).ceil() as usize;
+            if log_ratio >= 0.0 || count == 0 || spare.is_empty() {
+                break;
+            }
+            by_use.extend(spare.drain(..count.min(spare.len())));
+            let quantization = coded.quantization.clone();
+            let codes = QuantizedCodes { quantization, codes: by_use.clone() };
+            *coded = self.layout.coded(codes, observer)?;
+            log_ratio = self.log_ratio(coded, aim, observer)?;
+        }
+        Ok((optimized, log_ratio))
+    }
+
     /// The codes without the least useful ones, such that the file has at most so many bytes.
     fn shortened(
         &self,
@@ -335,7 +380,7 @@ impl<'a> TargetSearch<'a> {
         bytes: u64,
         observer: &mut Observer<'_>,
     ) -> Result<CodedLayers> {
-        let Optimized { mut coded, mut by_use } = optimized;
+        let Optimized { mut coded, mut by_use, .. } = optimized;
         let all = by_use.len();
         let mut size = self.layout.write_entropy(&coded, observer)?.len() as u64;
         let largest = size;
@@ -365,7 +410,7 @@ impl<'a> TargetSearch<'a> {
         aim: FileAim,
         observer: &mut Observer<'_>,
     ) -> Result<(CodedLayers, f64)> {
-        let Optimized { mut coded, mut by_use } = optimized;
+        let Optimized { mut coded, mut by_use, .. } = optimized;
         if log_ratio > 0.0 || aim.violation(log_ratio, 0.0) == 0.0 {
             return Ok((coded, log_ratio));
         }

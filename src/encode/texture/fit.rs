@@ -17,6 +17,7 @@ use crate::encode::progress::Observer;
 use crate::encode::quality::Judge;
 use crate::encode::rate_model;
 use crate::encode::rdo::{SearchWork, TargetSearch};
+use crate::encode::resolutions::Resolutions;
 use crate::encode::source::Source;
 use crate::encode::tiled_source::TiledSource;
 use crate::encode::verify::squared_error;
@@ -98,7 +99,15 @@ fn coded(
     let tiled = TiledSource::new(map, job.tune, observer)?.without_colors();
     let budget = Budget::DistortionPerGaussian(rate_model::distortion_per_gaussian(step));
     let (precision, work) = (Precision::Entropy, Work::default());
-    let mut fit = Fit::new(&tiled, &training, budget, precision, layout.base(), job.seed, work);
+    let mut fit = Fit::new(
+        Resolutions::single(&tiled),
+        &training,
+        budget,
+        precision,
+        layout.base(),
+        job.seed,
+        work,
+    );
     fit.run(job.workload(0), observer)?;
     let (gaussians, distortion) = (fit.gaussians(), fit.best_error().distortion);
     drop(fit);

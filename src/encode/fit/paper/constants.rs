@@ -18,6 +18,7 @@ impl Training {
     pub fn paper() -> Self {
         Self {
             iterations: 50_000,
+            coarse_to_fine: None,
             kernel: Kernel::PAPER,
             parameterization: Parameterization::Covariance,
             densification: Densification {
