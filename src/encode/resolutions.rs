@@ -50,18 +50,16 @@ pub(crate) fn copies(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Vec<T
             break;
         }
         let samples = averages(source, factor, observer)?;
-        copies.push(match source.depth() {
+        let eight: Vec<u8>;
+        let samples = match source.depth() {
             SampleDepth::Eight => {
                 let rounded = |&sample: &u16| ((u32::from(sample) + 128) / 257) as u8;
-                let samples: Vec<u8> = samples.iter().map(rounded).collect();
-                let copy = source.resized(size, SourceSamples::Eight(&samples));
-                TiledSource::new(&copy, job.tune, observer)?
+                eight = samples.iter().map(rounded).collect();
+                SourceSamples::Eight(&eight)
             }
-            SampleDepth::Sixteen => {
-                let copy = source.resized(size, SourceSamples::Sixteen(&samples));
-                TiledSource::new(&copy, job.tune, observer)?
-            }
-        });
+            SampleDepth::Sixteen => SourceSamples::Sixteen(&samples),
+        };
+        copies.push(TiledSource::new(&source.resized(size, samples), job.tune, observer)?);
     }
     Ok(copies)
 }

@@ -192,24 +192,6 @@ fn scaled(Gaussian { center, cholesky, color }: Gaussian, factor: f32) -> Gaussi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::ColorModel;
-    use crate::encode::progress::unobserved;
-    use crate::encode::testing::source;
-
-    #[test]
-    fn a_copy_has_the_averages_of_what_shows() {
-        // Squares of 2 x 2, the last of which are cut off.
-        let gray = source([3, 3], ColorModel::Gray, &[10, 20, 7, 30, 40, 9, 50, 70, 1]);
-        let found = unobserved(|observer| averages(&gray, 2, observer));
-        assert_eq!(found, [25, 8, 60, 1].map(|sample| sample * 257));
-        let pixels = [[200, 50], [80, 150], [9, 0], [9, 0]];
-        let seen = source([2, 2], ColorModel::GrayAlpha, pixels.as_flattened());
-        let found = unobserved(|observer| averages(&seen, 2, observer));
-        assert_eq!(found, [110 * 257, 50 * 257]);
-        let all = seen.keeping_invisible(true);
-        let found = unobserved(|observer| averages(&all, 2, observer));
-        assert_eq!(found, [19_147, 50 * 257]);
-    }
 
     #[test]
     fn a_copy_has_about_as_many_pixels_whatever_the_picture() {

@@ -36,7 +36,7 @@ impl States {
     /// Goes on where all lengths are larger by a factor, and sums over pixels by its square.
     pub(super) fn scale(&mut self, factor: f32) {
         match self {
-            // Its averages are of the parameterization, and short.
+            // Its averages are those of gradients by the trained values, which begin anew.
             Self::Adam(_, states) => states.fill(adam::State::NEW),
             Self::GaussNewton(_, states) => {
                 states.iter_mut().for_each(|state| state.scale(factor * factor));

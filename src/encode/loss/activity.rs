@@ -28,7 +28,7 @@ pub(super) struct Luma<'a> {
 }
 
 /// Rows of means of luma over squares of pixels. At the edges of the picture, fewer pixels are in a square.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Plane {
     /// The index in the picture of the first row.
     first: usize,
@@ -59,7 +59,7 @@ pub(super) fn add_logarithms(luma: &Luma<'_>, rows: Range<usize>, blocks: &mut [
 }
 
 /// A radius in pixels of a scale, rounded.
-pub(super) fn scaled(radius: usize, scale: usize) -> usize {
+fn scaled(radius: usize, scale: usize) -> usize {
     ((radius + (1 << scale) / 2) >> scale).max(1)
 }
 
