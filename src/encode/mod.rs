@@ -18,6 +18,7 @@ mod options;
 mod outcome;
 mod own_frame;
 mod packed;
+mod pairs;
 mod pipeline;
 mod progress;
 mod quality;

@@ -9,6 +9,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use crate::encode::loss::{PictureLoss, RenderingError};
 use crate::encode::mul_add::MulAdd;
+use crate::encode::pairs::folded;
 use crate::encode::sample_tile::{SampleTile, TILE_WIDTH, TilePlane, centers};
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::component_count;
@@ -276,10 +277,4 @@ fn lane_sums<S: Simd>([a, b, c, d, e, f, g, h]: [f32x16<S>; 8]) -> Slot {
     let all = folded(abcd, efgh);
     let (low, _) = folded(all, all).split();
     low.to_array()
-}
-
-/// The sums of pairs of neighbouring lanes: those of `a` in the low half, of `b` in the high half.
-#[inline(always)]
-fn folded<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
-    a.unzip_low(b) + a.unzip_high(b)
 }

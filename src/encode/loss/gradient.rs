@@ -6,117 +6,102 @@
 //! picture, residuals are 0. Residuals of alpha are not averaged. The distortion is quadratic in the
 //! residuals.
 
-use super::activity::{BLOCK, SCALES};
+use fearless_simd::{Simd, f32x4, f32x16, prelude::*};
+
+use super::activity::BLOCK;
 use super::error::Distortion;
-use super::perceptual_weights::{COLOR, PerceptualWeights};
-use crate::encode::sample_tile::{TILE_WIDTH, TilePlane};
+use super::perceptual_weights::{BlockWeights, COLOR, PerceptualWeights};
+use crate::encode::pairs::{doubled, doubled_half, doubled_quarter, folded, folded_half};
+use crate::encode::sample_tile::{TilePlane, centers};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
 /// distortion by them, and returns the distortion. `size` is the number of columns and rows inside
 /// the picture; residuals outside are 0, and so are their gradients.
 ///
-/// The compiler turns the loops into code of the SIMD level that the caller is dispatched to. They are
-/// over indices, as in `fit/training_tile.rs`.
+/// Loops are over indices, as in `fit/training_tile.rs`.
 #[inline(always)]
-#[expect(clippy::needless_range_loop, reason = "see above")]
-pub(super) fn differentiate<const CHANNELS: usize>(
+pub(super) fn differentiate<S: Simd, const CHANNELS: usize>(
+    simd: S,
     weights: &PerceptualWeights,
     [x, y]: [usize; 2],
     [columns, rows]: [usize; 2],
     planes: &mut [TilePlane; CHANNELS],
 ) -> Distortion {
     let (luma, colors) = (weights.luma, weights.colors);
-    let mut inside = [0.0; TILE_WIDTH];
-    for x in 0..TILE_WIDTH {
-        inside[x] = if x < columns { 1.0 } else { 0.0 };
-    }
-    let mut total = [0.0; TILE_WIDTH];
+    let zero = f32x16::splat(simd, 0.0);
+    let one = f32x16::splat(simd, 1.0);
+    let inside = centers(simd, 0).simd_lt(columns as f32).select(one, zero);
+    let mut total = zero;
     for first in (0..rows).step_by(BLOCK) {
         let blocks = &weights.row((y + first) / BLOCK)[x / BLOCK..];
-        let mut by_scale = [[0.0; TILE_WIDTH]; SCALES];
-        for x in 0..TILE_WIDTH {
-            // Where there is no block, residuals are 0.
-            let block = blocks[(x / BLOCK).min(blocks.len() - 1)];
-            for scale in 0..SCALES {
-                by_scale[scale][x] = block[scale];
-            }
-        }
-        let [fine, medium, coarse] = by_scale;
-        let mut lines = [[0.0; TILE_WIDTH]; BLOCK];
+        let [fine, medium, coarse] =
+            [by_block(simd, blocks, 0), by_block(simd, blocks, 1), by_block(simd, blocks, 2)];
+        let fine_by_pair = doubled_quarter(fine);
+        let medium_by_pair = doubled_quarter(medium);
+        let flat = doubled_half(fine_by_pair + medium_by_pair + doubled_quarter(coarse));
+        let fine = doubled_half(fine_by_pair);
+        let medium = medium_by_pair.combine(medium_by_pair);
+        let mut residuals = [[zero; BLOCK]; CHANNELS];
+        let mut lines = [zero; BLOCK];
         for channel in 0..CHANNELS {
             for row in 0..BLOCK {
-                for x in 0..TILE_WIDTH {
-                    lines[row][x] += luma[channel] * planes[channel][first + row][x];
-                }
+                let line = f32x16::load_array_ref(simd, &planes[channel][first + row]);
+                residuals[channel][row] = line;
+                lines[row] += line * luma[channel];
             }
         }
+        let [medium_share, coarse_share] = [1.0 - COLOR[1], 1.0 - COLOR[2]];
+        let of_luma = by_means(lines, medium * medium_share, coarse * coarse_share);
         // Half the gradient by luma.
-        let mut by_luma = [[0.0; TILE_WIDTH]; BLOCK];
-        let (pairs, whole) = block_means(&lines);
+        let mut by_luma = [zero; BLOCK];
         for row in 0..BLOCK {
-            for x in 0..TILE_WIDTH {
-                let by_means = coarse[x] * (1.0 - COLOR[2]) * whole[x]
-                    + medium[x] * (1.0 - COLOR[1]) * pairs[row / 2][x];
-                let by_pixel = fine[x] * (1.0 - COLOR[0]) * lines[row][x];
-                by_luma[row][x] = (by_means + by_pixel) * inside[x];
-            }
+            let by_pixel = fine * (1.0 - COLOR[0]) * lines[row];
+            by_luma[row] = (of_luma[row / 2] + by_pixel) * inside;
         }
-        let (mut by_sample, mut flat) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
-        for x in 0..TILE_WIDTH {
-            by_sample[x] = fine[x] * COLOR[0];
-            flat[x] = fine[x] + medium[x] + coarse[x];
-        }
+        let by_sample = fine * COLOR[0];
         for channel in 0..CHANNELS {
             let is_color = channel < colors;
             // All of the weight of alpha is that of its single pixels.
-            let by_sample = if is_color { &by_sample } else { &flat };
-            let mut by_mean = [[0.0; TILE_WIDTH]; 2];
+            let by_sample = if is_color { by_sample } else { flat };
+            let mut by_mean = [zero; 2];
             if is_color {
-                lines.copy_from_slice(&planes[channel][first..first + BLOCK]);
-                let (pairs, whole) = block_means(&lines);
-                for pair in 0..2 {
-                    for x in 0..TILE_WIDTH {
-                        let by_means =
-                            coarse[x] * COLOR[2] * whole[x] + medium[x] * COLOR[1] * pairs[pair][x];
-                        by_mean[pair][x] = by_means * inside[x];
-                    }
-                }
+                let [upper, lower] =
+                    by_means(residuals[channel], medium * COLOR[1], coarse * COLOR[2]);
+                by_mean = [upper * inside, lower * inside];
             }
             for row in 0..BLOCK.min(rows - first) {
-                let residuals = &mut planes[channel][first + row];
-                for x in 0..TILE_WIDTH {
-                    let gradient = by_sample[x] * residuals[x]
-                        + by_mean[row / 2][x]
-                        + luma[channel] * by_luma[row][x];
-                    total[x] += gradient * residuals[x];
-                    residuals[x] = gradient;
-                }
+                let residual = residuals[channel][row];
+                let gradient =
+                    by_sample * residual + by_mean[row / 2] + by_luma[row] * luma[channel];
+                total += gradient * residual;
+                gradient.store_array(&mut planes[channel][first + row]);
             }
         }
     }
-    Distortion(total.iter().map(|&sum| f64::from(sum)).sum())
+    Distortion(total.to_array().iter().map(|&sum| f64::from(sum)).sum())
 }
 
-/// The means over 2 x 2 pixels, of both pairs of rows, and over 4 x 4 pixels, in every column of their blocks.
+/// The weights of four blocks on a scale. Where there is no block, residuals are 0.
 #[inline(always)]
-fn block_means(lines: &[[f32; TILE_WIDTH]; BLOCK]) -> ([[f32; TILE_WIDTH]; 2], [f32; TILE_WIDTH]) {
-    let (mut pairs, mut whole) = ([[0.0; TILE_WIDTH]; 2], [0.0; TILE_WIDTH]);
-    let (mut half, mut sums) = ([0.0; TILE_WIDTH], [0.0; TILE_WIDTH]);
-    for pair in 0..2 {
-        for x in 0..TILE_WIDTH {
-            sums[x] = lines[2 * pair][x] + lines[2 * pair + 1][x];
-        }
-        for x in 0..TILE_WIDTH {
-            pairs[pair][x] = 0.25 * (sums[x] + sums[x ^ 1]);
-        }
-    }
-    for x in 0..TILE_WIDTH {
-        half[x] = 0.25 * (pairs[0][x] + pairs[1][x]);
-    }
-    for x in 0..TILE_WIDTH {
-        whole[x] = half[x] + half[x ^ 2];
-    }
-    (pairs, whole)
+fn by_block<S: Simd>(simd: S, blocks: &[BlockWeights], scale: usize) -> f32x4<S> {
+    let last = blocks.len() - 1;
+    f32x4::from_fn(simd, |block| blocks[block.min(last)][scale])
+}
+
+/// Half the gradient of the errors of means by the samples of the upper two and of the lower two lines of blocks.
+/// `medium` has the weights of the means over 2 x 2 pixels, those of the upper lines in the low half;
+/// `coarse` those of the means over 4 x 4 pixels.
+#[inline(always)]
+fn by_means<S: Simd>(
+    lines: [f32x16<S>; BLOCK],
+    medium: f32x16<S>,
+    coarse: f32x4<S>,
+) -> [f32x16<S>; 2] {
+    let [first, second, third, fourth] = lines;
+    let pairs = folded(first + second, third + fourth) * 0.25;
+    let (upper, lower) = pairs.split();
+    let whole = doubled_quarter(folded_half((upper + lower) * 0.25) * coarse);
+    doubled(pairs * medium + whole.combine(whole))
 }
 
 /// The distortion of a picture's residuals, in interleaved order, directly from its definition.
@@ -161,9 +146,12 @@ pub(crate) fn plain_distortion(
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
     use crate::color::ColorModel;
     use crate::encode::progress::unobserved;
+    use crate::encode::sample_tile::TILE_WIDTH;
     use crate::encode::testing::source;
     use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -199,7 +187,9 @@ mod tests {
             for x in (0..width).step_by(TILE_WIDTH) {
                 let inside = [(width - x).min(TILE_WIDTH), (height - y).min(TILE_HEIGHT)];
                 let mut planes = tile::<CHANNELS>(&residuals, size, [x, y]);
-                distortion += differentiate(&weights, [x, y], inside, &mut planes).0;
+                dispatch!(Level::new(), simd => {
+                    distortion += differentiate(simd, &weights, [x, y], inside, &mut planes).0;
+                });
                 for (channel, plane) in planes.iter().enumerate() {
                     for (row, line) in plane.iter().enumerate() {
                         for (column, &gradient) in line.iter().enumerate() {

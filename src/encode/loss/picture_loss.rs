@@ -168,7 +168,7 @@ impl PictureLoss {
         }
         let squared = total.to_array().iter().map(|&squared| f64::from(squared)).sum();
         let distortion = match &self.weights {
-            Some(weights) => gradient::differentiate(weights, corner, size, planes),
+            Some(weights) => gradient::differentiate(simd, weights, corner, size, planes),
             None => Distortion(squared),
         };
         RenderingError { squared: SquaredError(squared), distortion }
@@ -176,14 +176,15 @@ impl PictureLoss {
 
     /// Replaces the residuals of a tile by half the gradient of the distortion, as [`Self::of_tile`] has it.
     #[inline(always)]
-    pub(crate) fn differentiate<const CHANNELS: usize>(
+    pub(crate) fn differentiate<S: Simd, const CHANNELS: usize>(
         &self,
+        simd: S,
         corner: [usize; 2],
         size: [usize; 2],
         planes: &mut [TilePlane; CHANNELS],
     ) {
         if let Some(weights) = &self.weights {
-            gradient::differentiate(weights, corner, size, planes);
+            gradient::differentiate(simd, weights, corner, size, planes);
         }
     }
 

@@ -141,7 +141,7 @@ impl Residuals {
                             planes[channel][y][columns..].fill(0.0);
                         }
                     }
-                    loss.differentiate(corner, [columns, rows], &mut planes);
+                    loss.differentiate(simd, corner, [columns, rows], &mut planes);
                     for channel in 0..CHANNELS {
                         for y in 0..rows {
                             let at = (y * CHANNELS + channel) * stride + x;
