@@ -55,14 +55,4 @@ impl Buffer {
         // SAFETY: the same contract.
         unsafe { pointers::store(to, buffer, "the buffer") }
     }
-
-    /// The bytes.
-    ///
-    /// # Safety
-    /// The buffer was filled, and is not freed during `'a`.
-    #[cfg(test)]
-    pub(crate) unsafe fn bytes<'a>(&self) -> &'a [u8] {
-        // SAFETY: the same contract.
-        unsafe { core::slice::from_raw_parts(self.data, self.size) }
-    }
 }

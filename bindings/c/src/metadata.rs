@@ -18,7 +18,7 @@ pub const GIP_METADATA_MASTERING_DISPLAY: u32 = 2;
 /// gip_metadata.content_light is there.
 pub const GIP_METADATA_CONTENT_LIGHT: u32 = 4;
 
-/// Bytes of somebody else. `data` may be null if `size` is 0, which stands for what is not there.
+/// Bytes of somebody else. A size of 0, whatever the pointer is, stands for what is not there.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Blob {
@@ -134,9 +134,10 @@ impl Texts {
 
 impl Blob {
     fn of(bytes: Option<&Vec<u8>>) -> Self {
-        let bytes = bytes.map_or(&[][..], Vec::as_slice);
-        let data = if bytes.is_empty() { ptr::null() } else { bytes.as_ptr() };
-        Self { data, size: bytes.len() }
+        bytes.map_or(Self { data: ptr::null(), size: 0 }, |bytes| {
+            let (data, size) = (bytes.as_ptr(), bytes.len());
+            Self { data, size }
+        })
     }
 
     /// The bytes of a caller.

@@ -1,7 +1,7 @@
 //! Structures that begin with their size, so that later versions of the header can add fields at their end.
 
 use core::mem::MaybeUninit;
-use core::ptr;
+use core::{ptr, slice};
 
 use crate::status::Failure;
 
@@ -60,12 +60,13 @@ pub(crate) unsafe fn read<T: Structure>(from: *const T) -> Result<T, Failure> {
     let (known, bytes) = (size.min(size_of::<T>()), from.cast::<u8>());
     // SAFETY: so many bytes are in both.
     unsafe { ptr::copy_nonoverlapping(bytes, structure.as_mut_ptr().cast::<u8>(), known) };
-    for at in known..size {
-        // SAFETY: it is inside of the caller's structure.
-        if unsafe { bytes.add(at).read() } != 0 {
-            let message = format!("a {} has a field that this library does not know", T::NAME);
-            return Err(Failure::argument(message));
-        }
+    // SAFETY: it is inside of the caller's structure, or its end.
+    let rest = unsafe { bytes.add(known) };
+    // SAFETY: so many bytes are left there.
+    let rest = unsafe { slice::from_raw_parts(rest, size - known) };
+    if rest.iter().any(|&byte| byte != 0) {
+        let message = format!("a {} has a field that this library does not know", T::NAME);
+        return Err(Failure::argument(message));
     }
     // SAFETY: all bytes are set, and the trait says that any will do.
     Ok(unsafe { structure.assume_init() })
