@@ -5,7 +5,7 @@ use core::ffi::{CStr, c_int, c_void};
 use core::mem::MaybeUninit;
 use core::ptr;
 
-use image_gip::{RenderOptions, StreamDecoder};
+use image_gip::{RenderOptions, StreamDecoder, Threads};
 
 use crate::buffer::{Buffer, gip_buffer_free};
 use crate::decoder::{
@@ -24,7 +24,8 @@ use crate::source::CSource;
 use crate::status::{Status, gip_last_error, guard};
 use crate::view::{Color, Samples, View};
 
-const RGBA: &[u8] = include_bytes!("../../../spec/vectors/entropy-rgba8.gip");
+const PICTURE: &[u8] = include_bytes!("../../../spec/vectors/gray-alpha8.gip");
+const ENTROPY: &[u8] = include_bytes!("../../../spec/vectors/entropy-rgba8.gip");
 const METADATA: &[u8] = include_bytes!("../../../spec/vectors/metadata.gip");
 const SKIPPED: &[u8] = include_bytes!("../../../spec/vectors/skip-twice-icc.gip");
 
@@ -97,26 +98,21 @@ fn rendered(decoder: *mut Decoder, view: &View, padding: usize) -> Vec<u8> {
 #[test]
 fn every_way_to_render_gives_the_samples_of_the_crate() {
     let mut stream = StreamDecoder::new();
-    stream.feed(RGBA).expect("a valid file");
+    stream.feed(PICTURE).expect("a valid file");
     let picture = stream.picture().expect("it has a header");
-    let options = RenderOptions::new();
+    let options = RenderOptions::new().with_threads(Threads::One);
     let mut samples = vec![0; picture.output_len(&options).expect("no limit is exceeded")];
     picture.render_u8(&options, &mut samples).expect("no limit is exceeded");
-    let decoders = [open(RGBA), fed(RGBA, 1), fed(RGBA, 1000)];
-    for decoder in decoders {
-        for threads in [0, 2] {
-            for padding in [0, 4] {
-                let view = View { threads, ..sized() };
-                assert_eq!(rendered(decoder, &view, padding), samples);
-                let view = View { samples: Samples::F32 as u32, ..view };
-                let together = rendered(decoder, &view, padding);
-                let view = View { samples: Samples::F32Planes as u32, ..view };
-                let planes = rendered(decoder, &view, padding);
-                assert_eq!(together.len(), planes.len());
-                let view = View { samples: Samples::U16 as u32, color: Color::Rgb as u32, ..view };
-                assert_eq!(rendered(decoder, &view, padding).len(), samples.len() / 4 * 6);
-            }
-        }
+    for (decoder, threads, padding) in
+        [(open(PICTURE), 0, 0), (open(PICTURE), 2, 4), (fed(PICTURE, 1), 1, 4)]
+    {
+        let view = View { threads, ..sized() };
+        assert_eq!(rendered(decoder, &view, padding), samples);
+        let view = View { samples: Samples::F32Planes as u32, ..sized() };
+        assert_eq!(rendered(decoder, &view, padding).len(), 4 * samples.len());
+        // Composed over black, and widened.
+        let view = View { samples: Samples::U16 as u32, color: Color::Rgb as u32, ..sized() };
+        assert_eq!(rendered(decoder, &view, padding).len(), samples.len() / 2 * 6);
         free(decoder);
     }
 }
@@ -160,7 +156,7 @@ fn what_is_borrowed_of_a_decoder_remains_while_it_is_used() {
 
 #[test]
 fn gaussians_and_prefixes_are_copied() {
-    let decoder = open(RGBA);
+    let decoder = open(ENTROPY);
     // SAFETY: the decoder is valid.
     assert_eq!(unsafe { gip_decoder_finish(decoder, 1) }, Status::Ok);
     let (mut gaussians, mut copied) = ([MaybeUninit::<CGaussian>::uninit(); 2], 0);
@@ -174,7 +170,7 @@ fn gaussians_and_prefixes_are_copied() {
 
     let mut buffer = Buffer { data: ptr::null_mut(), size: 0 };
     // SAFETY: all pointers are valid.
-    let status = unsafe { gip_prefix(RGBA.as_ptr(), RGBA.len(), RGBA.len(), &raw mut buffer) };
+    let status = unsafe { gip_prefix(ENTROPY.as_ptr(), ENTROPY.len(), ENTROPY.len(), &raw mut buffer) };
     assert_eq!(status, Status::Ok, "{}", last_error());
     // SAFETY: it was filled.
     free(open(unsafe { core::slice::from_raw_parts(buffer.data, buffer.size) }));
@@ -252,7 +248,7 @@ fn panics_end_at_the_boundary() {
     assert_eq!(last_error(), "a bug: on purpose");
 
     // A decoder in whose middle there was one is used no more, but freed.
-    let decoder = open(RGBA);
+    let decoder = open(ENTROPY);
     let status = guard(|| {
         // SAFETY: the decoder is valid.
         let _state = unsafe { Decoder::of(decoder) }?.write()?;
