@@ -585,7 +585,7 @@ typedef struct gip_info {
 } gip_info;
 
 /**
- * Bytes of somebody else. `data` may be null if `size` is 0, which stands for what is not there.
+ * Bytes of somebody else. A size of 0, whatever the pointer is, stands for what is not there.
  */
 typedef struct gip_blob {
     /**
@@ -1053,7 +1053,7 @@ const char *gip_version(void);
  * Returns 1 if a file that begins with these bytes is a .gip file, of any version, and 0 if it is none or
  * if there are fewer than 8 bytes, or `data` is null. More than 8 are not looked at.
  */
-int gip_is_gip(const uint8_t *data,
+int gip_is_gip(const void *data,
                size_t size);
 
 /**
@@ -1078,7 +1078,7 @@ gip_status gip_decoder_new(const struct gip_limits *limits, struct gip_decoder *
  * gip_decoder_free. `limits` may be null for the defaults. `*decoder` is set to the new decoder, or to null
  * on failure: for a file that is damaged before its first layer.
  */
-gip_status gip_decoder_open(const uint8_t *data,
+gip_status gip_decoder_open(const void *data,
                             size_t size,
                             const struct gip_limits *limits,
                             struct gip_decoder **decoder);
@@ -1099,7 +1099,7 @@ void gip_decoder_free(struct gip_decoder *decoder);
  * Gaussians before the error.
  */
 gip_status gip_decoder_feed(struct gip_decoder *decoder,
-                            const uint8_t *data,
+                            const void *data,
                             size_t size,
                             size_t *used);
 
@@ -1218,7 +1218,7 @@ gip_status gip_encode(const struct gip_source *source,
  * layer has more than `most` bytes, GIP_STATUS_NEED_MORE if no layer is complete, and else what
  * gip_decoder_feed says of a damaged file.
  */
-gip_status gip_prefix(const uint8_t *data,
+gip_status gip_prefix(const void *data,
                       size_t size,
                       size_t most,
                       struct gip_buffer *prefix);

@@ -1,6 +1,6 @@
 //! The decoder object: bytes that arrive in pieces, or a file in memory.
 
-use core::ffi::{CStr, c_char};
+use core::ffi::{CStr, c_char, c_void};
 use core::{ptr, slice};
 use std::ffi::CString;
 use std::io::{self, Read};
@@ -195,7 +195,7 @@ pub unsafe extern "C" fn gip_decoder_new(
 /// on failure: for a file that is damaged before its first layer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gip_decoder_open(
-    data: *const u8,
+    data: *const c_void,
     size: usize,
     limits: *const CLimits,
     decoder: *mut *mut Decoder,
@@ -207,7 +207,7 @@ pub unsafe extern "C" fn gip_decoder_open(
         let limits = unsafe { self::limits(limits) }?;
         // SAFETY: the caller passes so many bytes, and leaves them alone.
         unsafe { pointers::bytes(data, size, "data") }?;
-        let file = Bytes { next: data, size };
+        let file = Bytes { next: data.cast(), size };
         let file = image_gip::Decoder::new_with_limits(file, limits)?;
         // SAFETY: the place was checked.
         unsafe { Decoder::hand_over(decoder, Input::Memory(file)) }
@@ -237,7 +237,7 @@ pub unsafe extern "C" fn gip_decoder_free(decoder: *mut Decoder) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gip_decoder_feed(
     decoder: *mut Decoder,
-    data: *const u8,
+    data: *const c_void,
     size: usize,
     used: *mut usize,
 ) -> Status {

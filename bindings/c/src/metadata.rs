@@ -146,7 +146,7 @@ impl Blob {
     /// They are there, if there are any.
     unsafe fn bytes(self, name: &str) -> Result<Option<Vec<u8>>, Failure> {
         // SAFETY: the same contract.
-        let bytes = unsafe { pointers::bytes(self.data, self.size, name) }?;
+        let bytes = unsafe { pointers::bytes(self.data.cast(), self.size, name) }?;
         Ok((!bytes.is_empty()).then(|| bytes.to_vec()))
     }
 }

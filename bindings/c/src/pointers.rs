@@ -1,5 +1,6 @@
 //! What callers point to.
 
+use core::ffi::c_void;
 use core::slice;
 
 use crate::status::Failure;
@@ -42,12 +43,12 @@ pub(crate) unsafe fn store<T>(to: *mut T, value: T, name: &str) -> Result<(), Fa
 /// # Safety
 /// If there are any and the pointer is not null, nobody changes or frees them during `'a`.
 pub(crate) unsafe fn bytes<'a>(
-    data: *const u8,
+    data: *const c_void,
     size: usize,
     name: &str,
 ) -> Result<&'a [u8], Failure> {
     // SAFETY: the same contract.
-    unsafe { elements(data, size, name) }
+    unsafe { elements(data.cast::<u8>(), size, name) }
 }
 
 /// As [`bytes`], of any type without invalid values.

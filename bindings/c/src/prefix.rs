@@ -1,5 +1,7 @@
 //! Small files that are the beginning of large ones.
 
+use core::ffi::c_void;
+
 use image_gip::Prefixes;
 
 use crate::buffer::Buffer;
@@ -16,7 +18,7 @@ use crate::status::{Failure, Status, guard};
 /// gip_decoder_feed says of a damaged file.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gip_prefix(
-    data: *const u8,
+    data: *const c_void,
     size: usize,
     most: usize,
     prefix: *mut Buffer,

@@ -1,6 +1,6 @@
 //! Which library this is, and whether bytes are for it.
 
-use core::ffi::{c_char, c_int};
+use core::ffi::{c_char, c_int, c_void};
 use std::panic;
 
 use image_gip::{DecodeError, StreamDecoder};
@@ -46,7 +46,7 @@ pub extern "C" fn gip_version() -> *const c_char {
 /// Returns 1 if a file that begins with these bytes is a .gip file, of any version, and 0 if it is none or
 /// if there are fewer than 8 bytes, or `data` is null. More than 8 are not looked at.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn gip_is_gip(data: *const u8, size: usize) -> c_int {
+pub unsafe extern "C" fn gip_is_gip(data: *const c_void, size: usize) -> c_int {
     let begins = || {
         // SAFETY: the caller passes so many bytes.
         let bytes = unsafe { pointers::bytes(data, size, "data") }.unwrap_or_default();

@@ -25,10 +25,10 @@ static void versions(void)
     CHECK(gip_abi_version() == GIP_ABI_VERSION);
     snprintf(text, sizeof text, "%d.%d.%d", GIP_VERSION_MAJOR, GIP_VERSION_MINOR, GIP_VERSION_PATCH);
     CHECK(strcmp(text, gip_version()) == 0);
-    CHECK(gip_is_gip((const uint8_t *)"\xC7GIP\r\n\x01\n", 8) == 1);
-    CHECK(gip_is_gip((const uint8_t *)"\xC7GIP\r\n\x02\n", 8) == 1);
-    CHECK(gip_is_gip((const uint8_t *)"\xC7GIP\r\n\x01\n", 7) == 0);
-    CHECK(gip_is_gip((const uint8_t *)"\x89PNG\r\n\x1A\n", 8) == 0);
+    CHECK(gip_is_gip("\xC7GIP\r\n\x01\n", 8) == 1);
+    CHECK(gip_is_gip("\xC7GIP\r\n\x02\n", 8) == 1);
+    CHECK(gip_is_gip("\xC7GIP\r\n\x01\n", 7) == 0);
+    CHECK(gip_is_gip("\x89PNG\r\n\x1A\n", 8) == 0);
     CHECK(gip_is_gip(NULL, 8) == 0 && gip_is_gip(NULL, 0) == 0);
 }
 
@@ -331,13 +331,13 @@ static void refused(void)
     EXPECT(GIP_STATUS_ARGUMENT, gip_render(decoder, NULL, NULL, 0, sizeof samples));
     CHECK(!gip_decoder_skipped(NULL, 0) && !gip_decoder_skipped(decoder, 0));
     gip_decoder_free(decoder);
-    EXPECT(GIP_STATUS_SIGNATURE, gip_decoder_open((const uint8_t *)"GIF89a..", 8, NULL, &decoder));
+    EXPECT(GIP_STATUS_SIGNATURE, gip_decoder_open("GIF89a..", 8, NULL, &decoder));
     CHECK(!decoder && strstr(gip_last_error(), "not a .gip file"));
     EXPECT(GIP_STATUS_UNEXPECTED_END, gip_decoder_open(NULL, 0, NULL, &decoder));
     EXPECT(GIP_STATUS_ARGUMENT, gip_prefix(file, size, 1 << 20, NULL));
     EXPECT(GIP_STATUS_ARGUMENT, gip_prefix(file, size, 1, &buffer));
     EXPECT(GIP_STATUS_NEED_MORE, gip_prefix(file, 12, 1 << 20, &buffer));
-    EXPECT(GIP_STATUS_SIGNATURE, gip_prefix((const uint8_t *)"GIF89a..", 8, 1 << 20, &buffer));
+    EXPECT(GIP_STATUS_SIGNATURE, gip_prefix("GIF89a..", 8, 1 << 20, &buffer));
     CHECK(!buffer.data && buffer.size == 0);
     gip_buffer_free(NULL);
     gip_buffer_free(&buffer);

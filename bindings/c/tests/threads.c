@@ -41,7 +41,7 @@ static void *decode_own(void *failing)
         CHECK(render(decoder, 1 + round % 2) == whole);
         gip_decoder_free(decoder);
         if (failing) {
-            EXPECT(GIP_STATUS_SIGNATURE, gip_decoder_open((const uint8_t *)"GIF89a..", 8, NULL, &decoder));
+            EXPECT(GIP_STATUS_SIGNATURE, gip_decoder_open("GIF89a..", 8, NULL, &decoder));
             CHECK(strstr(gip_last_error(), "not a .gip file"));
         } else {
             /* The failures are the other thread's. */
