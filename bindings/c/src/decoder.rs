@@ -1,8 +1,7 @@
 //! The decoder object: bytes that arrive in pieces, or a file in memory.
 
-use core::ffi::{CStr, c_char, c_void};
+use core::ffi::{c_char, c_void};
 use core::{ptr, slice};
-use std::ffi::CString;
 use std::io::{self, Read};
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
@@ -11,6 +10,7 @@ use image_gip::{DecodeError, Limits, Metadata, Picture, RenderOptions, StreamDec
 use crate::limits::CLimits;
 use crate::metadata::Texts;
 use crate::status::{Failure, Status, guard};
+use crate::strings::CallersText;
 use crate::{pointers, structures, threads};
 
 /// A decoder of one file. Several threads may call functions with the same decoder at the same time, but
@@ -24,7 +24,7 @@ pub(crate) struct State {
     pub(crate) input: Input,
     /// What the caller has pointers to.
     pub(crate) texts: Texts,
-    warnings: Vec<CString>,
+    warnings: Vec<CallersText>,
     /// What was wrong with the file when it was read last.
     failure: Option<Failure>,
 }
@@ -309,9 +309,9 @@ pub unsafe extern "C" fn gip_decoder_skipped(decoder: *mut Decoder, index: usize
         let State { input, warnings, .. } = &mut *state;
         // Those that were handed out stay where they are.
         for skipped in &input.stream().skipped()[warnings.len()..] {
-            warnings.push(CString::new(skipped.to_string()).unwrap_or_default());
+            warnings.push(CallersText::new(&skipped.to_string()));
         }
-        found = warnings.get(index).map_or(ptr::null(), |text| CStr::as_ptr(text));
+        found = warnings.get(index).map_or(ptr::null(), CallersText::as_ptr);
         Ok(())
     });
     found

@@ -28,6 +28,7 @@ mod progress;
 mod source;
 
 mod pointers;
+mod strings;
 mod structures;
 mod threads;
 

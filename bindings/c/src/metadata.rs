@@ -2,13 +2,13 @@
 
 use core::ffi::{CStr, c_char};
 use core::ptr;
-use std::ffi::CString;
 
 use image_gip::{Cicp, ContentLight, MasteringDisplay, Metadata, Text};
 
 use crate::decoder::{Decoder, Input, State};
 use crate::pointers;
 use crate::status::{Failure, Status, guard};
+use crate::strings::CallersText;
 use crate::structures::{self, structure};
 
 /// gip_metadata.cicp is there.
@@ -109,7 +109,7 @@ structure!(CMetadata, "gip_metadata", content_light: CContentLight);
 /// The texts that a caller has pointers to, with their NULs.
 #[derive(Debug, Default)]
 pub(crate) struct Texts {
-    strings: Vec<[CString; 2]>,
+    strings: Vec<[CallersText; 2]>,
     pointers: Vec<CText>,
 }
 
@@ -122,9 +122,8 @@ impl Texts {
     /// The pointers to all texts of a file. Those that were handed out remain valid unless there are more.
     fn of(&mut self, texts: &[Text]) -> &[CText] {
         for Text { keyword, text, .. } in &texts[self.strings.len()..] {
-            // The format has no NUL in either.
-            let strings = [keyword, text].map(|text| CString::new(&**text).unwrap_or_default());
-            let [keyword, text] = strings.each_ref().map(|string| string.as_ptr());
+            let strings = [keyword, text].map(|text| CallersText::new(text));
+            let [keyword, text] = strings.each_ref().map(CallersText::as_ptr);
             self.pointers.push(CText { keyword, text });
             self.strings.push(strings);
         }
