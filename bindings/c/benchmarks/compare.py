@@ -3,7 +3,8 @@
     make benchmark
     python3 benchmarks/compare.py target/release PICTURE.ppm
 
-They are measured in turns, and all figures are medians: other work on the machine slows down both alike.
+They are measured in turns, and all figures are medians: other work on the machine slows down
+both alike.
 """
 
 import argparse
@@ -48,7 +49,8 @@ def main() -> None:
             medians = {name: statistics.median(of) for name, of in times.items()}
             ratios = [b / a for a, b in zip(times["native"], times["library"], strict=True)]
             print(
-                f"{task}: native {medians['native']:.2f} ms, C library {medians['library']:.2f} ms, "
+                f"{task}: native {medians['native']:.2f} ms, "
+                f"C library {medians['library']:.2f} ms, "
                 f"{100 * (medians['library'] / medians['native'] - 1):+.1f} %; "
                 f"in turns {100 * (statistics.median(ratios) - 1):+.1f} %"
             )

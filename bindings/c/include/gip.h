@@ -1179,7 +1179,8 @@ gip_status gip_output_size(const struct gip_decoder *decoder,
  * before; 0 stands for rows without padding. Bytes between rows are left alone.
  *
  * `view` may be null for the whole picture as it is stored. `out` has `size` bytes, and is aligned for its
- * samples, as `stride` is. It must not overlap the file.
+ * samples, as `stride` is. It must not overlap the file. Rows with padding, GIP_SAMPLES_F32 and what is
+ * composed take memory for a copy of the output beside, which gip_limits.max_memory does not count.
  *
  * Of a file in memory, what the view needs is read and decoded, and a damaged file fails. Of a file that is
  * fed, the Gaussians that have arrived are rendered, after a failure as well; before the header has arrived

@@ -3,9 +3,9 @@
 
 use core::ffi::{CStr, c_int, c_void};
 use core::mem::MaybeUninit;
-use core::ptr;
+use core::{ptr, slice};
 
-use image_gip::{RenderOptions, StreamDecoder, Threads};
+use image_gip::{ColorModel, Encoder, RenderOptions, Source, StreamDecoder, Target, Threads};
 
 use crate::buffer::{Buffer, gip_buffer_free};
 use crate::decoder::{
@@ -95,7 +95,7 @@ fn rendered(decoder: *mut Decoder, view: &View, padding: usize) -> Vec<u8> {
         // SAFETY: the row is inside.
         let first = unsafe { memory.as_ptr().cast::<u8>().add(row * stride) };
         // SAFETY: it was rendered.
-        bytes.extend_from_slice(unsafe { core::slice::from_raw_parts(first, output.row_size) });
+        bytes.extend_from_slice(unsafe { slice::from_raw_parts(first, output.row_size) });
     }
     bytes
 }
@@ -138,10 +138,10 @@ fn what_is_borrowed_of_a_decoder_remains_while_it_is_used() {
     assert_eq!(unsafe { gip_decoder_info(decoder, &raw mut info) }, Status::Ok);
     assert!(!rendered(decoder, &sized(), 0).is_empty());
     // SAFETY: the decoder is as it was.
-    let exif = unsafe { core::slice::from_raw_parts(metadata.exif.data, metadata.exif.size) };
+    let exif = unsafe { slice::from_raw_parts(metadata.exif.data, metadata.exif.size) };
     assert!(exif.starts_with(b"II") || exif.starts_with(b"MM"));
     // SAFETY: as above.
-    let texts = unsafe { core::slice::from_raw_parts(metadata.texts, metadata.text_count) };
+    let texts = unsafe { slice::from_raw_parts(metadata.texts, metadata.text_count) };
     for CText { keyword, text } in texts {
         // SAFETY: as above.
         assert!(!unsafe { CStr::from_ptr(*keyword) }.is_empty());
@@ -181,7 +181,7 @@ fn gaussians_and_prefixes_are_copied() {
         unsafe { gip_prefix(ENTROPY.as_ptr().cast(), ENTROPY.len(), 1 << 20, &raw mut buffer) };
     assert_eq!(status, Status::Ok, "{}", last_error());
     // SAFETY: it was filled.
-    free(open(unsafe { core::slice::from_raw_parts(buffer.data, buffer.size) }));
+    free(open(unsafe { slice::from_raw_parts(buffer.data, buffer.size) }));
     // SAFETY: the buffer is valid.
     unsafe { gip_buffer_free(&raw mut buffer) };
     assert!(buffer.data.is_null());
@@ -245,6 +245,13 @@ fn progress_is_told_to_the_thread_that_calls() {
     };
     assert_eq!(status, Status::Ok, "{}", last_error());
     assert!(!calls.is_empty() && calls.is_sorted());
+    // The file is that of the crate, of the picture without padding.
+    let pixels = [0, 9, 20, 30, 50, 70, 80, 90, 7, 8, 9, 10];
+    let source = Source::new_u8(4, 3, ColorModel::Gray, &pixels).expect("a picture");
+    let encoder = Encoder::new().with_target(Target::Gaussians(2)).with_effort(1);
+    let encoded = encoder.encode(&source).expect("nothing is out of range");
+    // SAFETY: the buffer is valid.
+    assert_eq!(unsafe { slice::from_raw_parts(buffer.data, buffer.size) }, encoded.bytes);
     // SAFETY: the buffer is valid.
     unsafe { gip_buffer_free(&raw mut buffer) };
 }
