@@ -94,6 +94,31 @@ impl DecodeError {
     }
 }
 
+/// Why a header and Gaussians are no picture that the format can hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum PictureError {
+    /// A field of the header is out of range.
+    #[error("{0}")]
+    Header(&'static str),
+    /// There are too many Gaussians.
+    #[error("{found} Gaussians; there may be at most {allowed}")]
+    Count {
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        allowed: u32,
+    },
+    /// A Gaussian is not drawn by the rules of the format, or would not be as a file would have it.
+    #[error("Gaussian {index}: {rule}")]
+    Gaussian {
+        /// The index of the first one of which this is so.
+        index: usize,
+        /// The rule that it breaks.
+        rule: &'static str,
+    },
+}
+
 /// A request of the caller that cannot be fulfilled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]

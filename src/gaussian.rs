@@ -15,6 +15,9 @@ pub(crate) const MIN_DIAGONAL: f32 = 1.0 / 4096.0;
 /// Largest magnitude of a coordinate, and of an entry of the Cholesky factor, of a Gaussian that is
 /// drawn, in pixels.
 pub(crate) const MAX_EXTENT: f32 = 16_777_216.0;
+/// Most Gaussians of a file that is written: as many as a decoder accepts by default.
+#[cfg(feature = "encode")]
+pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
 /// Largest magnitude of an amplitude of a Gaussian that is drawn.
 pub(crate) const MAX_COLOR: f32 = 65_536.0;
 
@@ -74,6 +77,25 @@ impl Gaussian {
             && (MIN_DIAGONAL..=MAX_EXTENT).contains(&l22)
             && l21.abs() <= MAX_EXTENT
             && self.color.iter().all(|c| c.abs() <= MAX_COLOR)
+    }
+
+    /// The rule that a Gaussian which is not drawn breaks.
+    pub(crate) fn flaw(&self) -> Option<&'static str> {
+        let [l11, l21, l22] = self.cholesky;
+        let is_diagonal = |entry: &f32| (MIN_DIAGONAL..=MAX_EXTENT).contains(entry);
+        let rules = [
+            (
+                self.center.iter().all(|c| c.abs() <= MAX_EXTENT),
+                "its centre must be within +-2^24 pixels",
+            ),
+            (
+                [l11, l22].iter().all(is_diagonal),
+                "l11 and l22 of its Cholesky factor must be 2^-12 to 2^24 pixels",
+            ),
+            (l21.abs() <= MAX_EXTENT, "l21 of its Cholesky factor must be within +-2^24 pixels"),
+            (self.color.iter().all(|c| c.abs() <= MAX_COLOR), "its colour must be within +-2^16"),
+        ];
+        rules.into_iter().find(|(holds, _)| !holds).map(|(_, rule)| rule)
     }
 
     /// A Gaussian from its components in the order of the file (spec, section 8.1).
@@ -223,6 +245,24 @@ mod tests {
             prop_assert!((a * i + b * j - 1.0).abs() < scale);
             prop_assert!((a * j + b * k).abs() < scale);
             prop_assert!((b * j + c * k - 1.0).abs() < scale);
+        }
+    }
+
+    #[test]
+    fn what_is_not_drawn_has_a_flaw() {
+        let good = Gaussian { center: [3.0, -9.0], cholesky: [2.0, -1.0, 0.5], color: [0.5; 4] };
+        assert!(good.is_drawable() && good.flaw().is_none());
+        for bad in [f32::NAN, f32::INFINITY, 1e9] {
+            let flawed = [
+                Gaussian { center: [bad, 0.0], ..good },
+                Gaussian { cholesky: [bad, 0.0, 1.0], ..good },
+                Gaussian { cholesky: [1.0, bad, 1.0], ..good },
+                Gaussian { cholesky: [1.0, 0.0, -1.0], ..good },
+                Gaussian { color: [0.0, 0.0, 0.0, bad], ..good },
+            ];
+            for flawed in flawed {
+                assert!(!flawed.is_drawable() && flawed.flaw().is_some(), "{flawed:?}");
+            }
         }
     }
 

@@ -75,6 +75,14 @@ impl Kernel {
         }
     }
 
+    /// Whether the cut-off is one that a file can have.
+    pub(crate) fn is_valid(self) -> bool {
+        match self {
+            Self::Exponential { cutoff } => cutoff > 0.0 && cutoff <= MAX_CUTOFF,
+            Self::Quartic => true,
+        }
+    }
+
     /// The exponential kernel with a cut-off that a file declares.
     pub(crate) fn exponential(cutoff: f32) -> Result<Self, DecodeError> {
         match cutoff {

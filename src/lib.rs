@@ -63,6 +63,8 @@
 //!   [`Quantizer`]s or [`QuantizationSteps`] that relate codes to values.
 //! - **Encoding** (feature `encode`): `encode`, or an `Encoder`, which encodes a
 //!   `Source` for a `Target` and returns the file with a `Report`.
+//! - **Gaussians from elsewhere:** [`Picture::from_gaussians`] renders them, with a [`Header::new`], and `Writer`
+//!   (feature `encode`) makes a file of them.
 //! - **The `image` crate** (feature `image`): `register` makes `image::open` read `.gip`.
 //!
 //! # Stability
@@ -132,9 +134,11 @@ pub use decode::{ChunkStatistics, Decoded, Samples, StreamDecoder, decode};
 #[cfg(feature = "encode")]
 pub use encode::{
     EncodeError, Encoded, Encoder, OptionError, Precision, Progress, Report, Shortfall, Source,
-    SourceError, Target, Tune, encode,
+    SourceError, Target, Tune, WriteError, Writer, encode,
 };
-pub use error::{DecodeError, LimitKind, Reason, RequestError, SkippedChunk, Unsupported};
+pub use error::{
+    DecodeError, LimitKind, PictureError, Reason, RequestError, SkippedChunk, Unsupported,
+};
 pub use gaussian::{Gaussian, Parameterization};
 pub use kernel::Kernel;
 pub use limits::Limits;

@@ -10,7 +10,7 @@ use crate::chunk::{ChunkType, VERSION};
 use crate::coding::entropy::{LayerCoder, Quantization};
 use crate::coding::packed::Quantizer;
 use crate::color::{ColorModel, SampleDepth};
-use crate::error::DecodeError;
+use crate::error::{DecodeError, PictureError};
 use crate::gaussian::{Parameterization, component_count};
 use crate::kernel::Kernel;
 
@@ -81,6 +81,52 @@ pub(crate) enum Dequantizer {
 }
 
 impl Header {
+    /// The header of a picture of Gaussians that come from elsewhere, for [`Picture::from_gaussians`] and
+    /// `Writer`: with 8 bits per sample, the quartic kernel, Cholesky factors as the stored shape, and black (and
+    /// transparent) as the base colour. Its fields can be changed; those out of range are refused where the header is
+    /// used.
+    ///
+    /// [`Picture::from_gaussians`]: crate::Picture::from_gaussians
+    #[must_use]
+    pub const fn new(width: u32, height: u32, color: ColorModel) -> Self {
+        Self {
+            version: VERSION,
+            coding: Coding::Packed,
+            width,
+            height,
+            color,
+            depth: SampleDepth::Eight,
+            gaussians: 0,
+            layers: 0,
+            kernel: Kernel::Quartic,
+            parameterization: Parameterization::Cholesky,
+            base_color: [0; 4],
+        }
+    }
+
+    /// Refuses fields that no file can have. Coding and numbers of Gaussians and layers are those of the file.
+    pub(crate) fn check(&self) -> Result<(), PictureError> {
+        let sides = [self.width, self.height];
+        let steps = match self.depth {
+            SampleDepth::Eight => 257,
+            SampleDepth::Sixteen => 1,
+        };
+        let base = &self.base_color[..self.color.channels()];
+        let rules = [
+            (
+                sides.iter().all(|side| (1..=MAX_SIDE).contains(side)),
+                "width and height must be 1 to 2^20 pixels",
+            ),
+            (
+                base.iter().all(|value| value % steps == 0),
+                "the base colour must be multiples of 257, as samples have 8 bits",
+            ),
+            (self.kernel.is_valid(), "the cut-off of the kernel must be over 0 and at most 64"),
+        ];
+        let broken = rules.into_iter().find(|(holds, _)| !holds);
+        broken.map_or(Ok(()), |(_, rule)| Err(PictureError::Header(rule)))
+    }
+
     /// Refuses a payload that is too long, before it is read.
     pub(crate) fn check_length(length: u32) -> Result<(), DecodeError> {
         if length > MAX_LENGTH {

@@ -2,8 +2,9 @@
 
 use super::error::OptionError;
 use super::loss::Distortion;
-use super::options::{MAX_GAUSSIANS, Target};
+use super::options::Target;
 use super::rate_model;
+use crate::gaussian::MAX_GAUSSIANS;
 
 /// By how much a PSNR may exceed its target, in dB.
 pub(crate) const PSNR_TOLERANCE: f64 = 0.05;

@@ -255,13 +255,7 @@ impl Encoder {
                 passes: *passes,
             })
             .collect();
-        let mut run = || pipeline::encode(&jobs, &mut observer);
-        let outcome = match self.threads {
-            // On one of the pool's threads: handing every parallel loop over to the pool, and waking up
-            // afterwards, would take longer than many of the loops.
-            Threads::Pool => rayon::scope(|_| run()),
-            Threads::One => pool_of_one()?.install(run),
-        }?;
+        let outcome = on_threads(self.threads, || pipeline::encode(&jobs, &mut observer))??;
         Ok(Encoded {
             bytes: outcome.file,
             report: Report {
@@ -315,10 +309,20 @@ impl Encoder {
     }
 }
 
-/// A pool of one thread, for [`Threads::One`]: the encoder always runs in a pool.
-fn pool_of_one() -> Result<rayon::ThreadPool, OptionError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    pool.map_err(|error| OptionError::Threads(error.to_string()))
+/// Runs work on some threads: always in a pool.
+pub(super) fn on_threads<T: Send>(
+    threads: Threads,
+    work: impl FnOnce() -> T + Send,
+) -> Result<T, OptionError> {
+    Ok(match threads {
+        // On one of the pool's threads: handing every parallel loop over to the pool, and waking up
+        // afterwards, would take longer than many of the loops.
+        Threads::Pool => rayon::scope(|_| work()),
+        Threads::One => {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+            pool.map_err(|error| OptionError::Threads(error.to_string()))?.install(work)
+        }
+    })
 }
 
 /// An encoded file and a report about it.

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use crate::color::ColorModel;
 use crate::container::{MAX_SIDE, MetadataError};
-use crate::error::LimitKind;
+use crate::error::{LimitKind, PictureError};
 
 /// What a stage of the encoder returns. Its error is [`EncodeError::Cancelled`], when the caller cancels;
 /// other ones come from `pipeline.rs` and `verify.rs` alone.
@@ -37,6 +37,24 @@ pub enum EncodeError {
     /// The progress callback cancelled the encoding.
     #[error("encoding was cancelled")]
     Cancelled,
+}
+
+/// Why Gaussians could not be written.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The header or a Gaussian is out of range.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// An option is out of range.
+    #[error("invalid option: {0}")]
+    Option(#[from] OptionError),
+    /// The quantizers are not such that a file can have them; the text is the rule that they break.
+    #[error("quantizers: {0}")]
+    Quantizers(&'static str),
+    /// The step of colour is out of range.
+    #[error("a step of colour of {0}; it must be 10^-6 to 1000")]
+    ColorStep(f32),
 }
 
 /// Why a source is not a picture that the format can hold.

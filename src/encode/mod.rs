@@ -38,9 +38,10 @@ mod texture;
 mod tiled_source;
 mod verify;
 mod workload;
+mod writer;
 
 pub use encoder::{Encoded, Encoder, Report, encode};
-pub use error::{EncodeError, OptionError, SourceError};
+pub use error::{EncodeError, OptionError, SourceError, WriteError};
 pub use fit::VectorQuantizer;
 pub(crate) use fit::training;
 pub use loss::ErrorNorm;
@@ -48,3 +49,4 @@ pub use options::{Precision, Target, Tune};
 pub use progress::Progress;
 pub use shortfall::Shortfall;
 pub use source::Source;
+pub use writer::Writer;

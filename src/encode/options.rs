@@ -36,9 +36,6 @@ pub enum Target {
     Lambda(f64),
 }
 
-/// Most Gaussians that the encoder writes: as many as a decoder accepts by default.
-pub(crate) const MAX_GAUSSIANS: u32 = 1 << 22;
-
 /// What the encoder minimizes for the size of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]

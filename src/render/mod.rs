@@ -25,5 +25,7 @@ pub(crate) mod view;
 
 pub use picture::Picture;
 #[cfg(feature = "encode")]
+pub(crate) use picture::check;
+#[cfg(feature = "encode")]
 pub(crate) use strips::BAND_HEIGHT;
 pub use view::RenderOptions;

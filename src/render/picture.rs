@@ -10,14 +10,25 @@ use super::strips::PreparedRender;
 use super::texture_view::TextureView;
 use super::view::{RenderOptions, View};
 use crate::container::Header;
-use crate::error::{DecodeError, LimitKind, RequestError};
+use crate::error::{DecodeError, LimitKind, PictureError, RequestError};
 use crate::gaussian::Gaussian;
 use crate::limits::Limits;
 #[cfg(feature = "encode")]
 use crate::region::Region;
 use crate::texture::Texture;
 
-/// A picture that can be rendered: a header and the Gaussians that have arrived.
+/// Refuses Gaussians that are not drawn, and more than so many.
+pub(crate) fn check(gaussians: &[Gaussian], allowed: u32) -> Result<(), PictureError> {
+    if gaussians.len() > allowed as usize {
+        return Err(PictureError::Count { found: gaussians.len(), allowed });
+    }
+    let flaw = |(index, gaussian): (usize, &Gaussian)| {
+        Some(PictureError::Gaussian { index, rule: gaussian.flaw()? })
+    };
+    gaussians.iter().enumerate().find_map(flaw).map_or(Ok(()), Err)
+}
+
+/// A picture that can be rendered: a header and the Gaussians that have arrived, or that come from elsewhere.
 ///
 /// Rendering evaluates the sum of the Gaussians at the centres of pixels: those of the output, at
 /// the stored size or a larger one, or those that a smaller output is averaged from, for the whole
@@ -42,6 +53,22 @@ impl<'a> Picture<'a> {
         decoder_memory: u64,
     ) -> Self {
         Self { header, gaussians, limits, decoder_memory, texture: None }
+    }
+
+    /// A picture of Gaussians that come from elsewhere. Of the header it is size, colour model, depth, kernel
+    /// and base colour that matter: see [`Header::new`].
+    ///
+    /// # Errors
+    /// When a field of the header is out of range, when there are more Gaussians than a limit allows, and for the first Gaussian that the format would not draw:
+    /// one whose covariance is not positive definite or that has a value that is not finite or too large.
+    pub fn from_gaussians(
+        header: &'a Header,
+        gaussians: &'a [Gaussian],
+        limits: &'a Limits,
+    ) -> Result<Self, PictureError> {
+        header.check()?;
+        check(gaussians, limits.max_gaussians)?;
+        Ok(Self::new(header, gaussians, limits, 0))
     }
 
     /// The picture with a texture.

@@ -38,6 +38,13 @@ pub struct UniformQuantizer {
 }
 
 impl UniformQuantizer {
+    /// A uniform quantizer of a bit depth, with the difference of the values of neighbouring codes, and the
+    /// value of code 0. What is out of range is refused where it is used.
+    #[must_use]
+    pub const fn new(bits: u8, scale: f32, offset: f32) -> Self {
+        Self { bits, scale, offset }
+    }
+
     /// The largest code, 2^bits - 1.
     #[must_use]
     pub const fn max_code(&self) -> u32 {
@@ -74,6 +81,31 @@ impl Quantizer {
             Self::Float => f32::from_bits(code),
             Self::Linear(steps) => steps.value(code),
             Self::Log(steps) => math::exp(steps.value(code)),
+        }
+    }
+
+    /// The code whose value is nearest to `value`, which is positive for a logarithm.
+    #[cfg(feature = "encode")]
+    pub(crate) fn code(&self, value: f32) -> u32 {
+        match self {
+            Self::Float => value.to_bits(),
+            Self::Linear(steps) => steps.code(value),
+            Self::Log(steps) => steps.code(value.ln()),
+        }
+    }
+
+    /// Whether a file can have it.
+    #[cfg(feature = "encode")]
+    pub(crate) fn is_valid(&self) -> bool {
+        match self {
+            Self::Float => true,
+            Self::Linear(UniformQuantizer { bits, scale, offset })
+            | Self::Log(UniformQuantizer { bits, scale, offset }) => {
+                (1..=16).contains(bits)
+                    && *scale > 0.0
+                    && *scale <= MAX_PARAMETER
+                    && offset.abs() <= MAX_PARAMETER
+            }
         }
     }
 

@@ -63,6 +63,11 @@ impl<'a> FileLayout<'a> {
                 SampleDepth::Sixteen => (value * 65535.0).round() as u16,
             }),
         };
+        Self::of(header, metadata)
+    }
+
+    /// That of pictures with this header.
+    pub(crate) fn of(header: Header, metadata: &'a Metadata) -> Self {
         Self { header, metadata, texture: None, first_layer: None }
     }
 

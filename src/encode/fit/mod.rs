@@ -22,4 +22,5 @@ mod training_tile;
 
 pub(crate) use components::MOST_COLOR;
 pub use paper::VectorQuantizer;
+pub(crate) use paper::quantizers_for;
 pub(crate) use trained::{Fit, Work};

@@ -13,11 +13,11 @@ use super::training::Training;
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::encode::error::Result;
 use crate::encode::loss::{RenderingError, SquaredError};
-use crate::encode::options::{MAX_GAUSSIANS, Precision};
+use crate::encode::options::Precision;
 use crate::encode::progress::Observer;
 use crate::encode::resolutions::Resolutions;
 use crate::encode::tiled_source::TiledSource;
-use crate::gaussian::{Gaussian, component_count};
+use crate::gaussian::{Gaussian, MAX_GAUSSIANS, component_count};
 use crate::render::splat::Splat;
 
 // Constants: docs/tuning.md, "Iterations".

@@ -15,5 +15,6 @@ mod step_search;
 mod target_search;
 mod window;
 
+pub(crate) use residuals::is_seen;
 pub(crate) use search_work::SearchWork;
 pub(crate) use target_search::TargetSearch;

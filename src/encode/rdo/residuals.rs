@@ -322,6 +322,11 @@ pub(super) fn window(gaussian: &Gaussian, size: [usize; 2]) -> Option<[Range<usi
     Some(window)
 }
 
+/// Whether a Gaussian, or one that is hardly larger, shows in a picture of a width and height.
+pub(crate) fn is_seen(gaussian: &Gaussian, size: [u32; 2]) -> bool {
+    window(gaussian, size.map(|side| side as usize)).is_some()
+}
+
 /// Whether threads share a window of so many pixels: nearly no other one is independent of it.
 pub(super) fn is_shared(pixels: usize) -> bool {
     pixels > MOST_OF_ONE_TASK

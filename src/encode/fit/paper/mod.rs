@@ -11,4 +11,5 @@ pub(super) mod vector_quantizer;
 
 pub(super) use lsq::{LsqQuantizers, QuantizerGradients, add, decoded};
 pub(super) use placement::{random_shape, top};
+pub(crate) use ranges::quantizers_for;
 pub use vector_quantizer::VectorQuantizer;

@@ -1,6 +1,8 @@
 //! The ranges with which LSQ+ starts.
 
-use crate::coding::packed::UniformQuantizer;
+use crate::coding::packed::{Quantizer, UniformQuantizer};
+use crate::container::Header;
+use crate::gaussian::{MAX_COMPONENTS, SHAPE};
 
 /// The least scale, for values that are all equal.
 pub(super) const MIN_SCALE: f32 = 1e-9;
@@ -10,6 +12,34 @@ const WIDENINGS: u8 = 16;
 /// What an error counts that clipping makes: training corrects it by other Gaussians, as it cannot with
 /// coarse steps.
 const CLIPPED: f64 = 0.2;
+
+/// Quantizers of some bit depths for position, shape and colour whose codes cover the values of the components of
+/// Gaussians, except for outliers of colour.
+pub(crate) fn quantizers_for(
+    values: &[[f32; MAX_COMPONENTS]],
+    header: &Header,
+    [position, shape, color]: [u8; 3],
+) -> Vec<Quantizer> {
+    let parameterization = header.parameterization;
+    let is_logarithmic = parameterization.is_logarithmic();
+    let weight = |values: &[f32; MAX_COMPONENTS]| {
+        let [l11, _, l22] = parameterization.to_cholesky([values[2], values[3], values[4]]);
+        f64::from(l11 * l22)
+    };
+    let quantizer = |component: usize| {
+        let values_of = values.iter().map(|values| values[component]);
+        if SHAPE.contains(&component) && is_logarithmic[component - SHAPE.start] {
+            return Quantizer::Log(covering(range(values_of.map(f32::ln)), shape));
+        }
+        if component >= SHAPE.end {
+            let weighted = values.iter().map(|values| (values[component], weight(values)));
+            return Quantizer::Linear(covering(least_error_range(&weighted, color), color));
+        }
+        let bits = if SHAPE.contains(&component) { shape } else { position };
+        Quantizer::Linear(covering(range(values_of), bits))
+    };
+    (0..header.components()).map(quantizer).collect()
+}
 
 /// The least and the largest value; (0, 0) if there is none.
 pub(super) fn range(values: impl Iterator<Item = f32>) -> (f32, f32) {
