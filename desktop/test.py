@@ -1,11 +1,16 @@
 """Tries the files of this folder with the tools that read them.
 
-`python3 desktop/test.py` runs it. What is not installed is reported as `skipped: ...`.
+`python3 desktop/test.py` runs it. What is not installed is reported as `skipped: ...`. The thumbnailer
+runs the tool that the variable GIP names, or else that of `cargo build --release --features cli`.
 """
 
+import configparser
+import json
 import os
 import plistlib
+import shlex
 import shutil
+import struct
 import subprocess
 import tempfile
 import unittest
@@ -13,6 +18,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
+GIP = Path(os.environ.get("GIP", FOLDER.parent / "target" / "release" / "gip"))
 VECTORS = FOLDER.parent / "spec" / "vectors"
 MEDIA_TYPE = "image/vnd.gip"
 SIGNATURE = b"\xc7GIP\r\n\x01\n"
@@ -145,6 +151,63 @@ class SharedMimeInfo(TestCase):
                 self.assertEqual(run("xdg-mime", "query", "filetype", path, **data), expected)
 
 
+class Thumbnailer(TestCase):
+    """`gip.thumbnailer`, as file managers run it."""
+
+    tools = (str(GIP),)
+
+    def setUp(self) -> None:
+        super().setUp()
+        parser = configparser.RawConfigParser()
+        parser.optionxform = str  # type: ignore[assignment, method-assign]
+        parser.read(FOLDER / "gip.thumbnailer")
+        self.entry = parser["Thumbnailer Entry"]
+
+    def thumbnail(self, source: Path, output: Path, size: int) -> tuple[int, int]:
+        """The size of a thumbnail, of which the file manager gives name and longest side."""
+        programs = self.folder / "bin"
+        programs.mkdir(exist_ok=True)
+        link = programs / self.entry["TryExec"]
+        if not link.exists():
+            link.symlink_to(GIP.resolve())
+        # Fields stand alone, and what stands for them is no text of a shell.
+        fields = {"%s": str(size), "%i": str(source), "%o": str(output), "%u": source.as_uri()}
+        words = [fields.get(word, word) for word in shlex.split(self.entry["Exec"])]
+        self.assertFalse(any("%" in word for word in words))
+        done = subprocess.run(words, env={"PATH": str(programs)}, capture_output=True, text=True)
+        # What of a picture is left out is told on standard error.
+        self.assertEqual((done.returncode, done.stdout), (0, ""), done.stderr)
+        content = output.read_bytes()
+        self.assertEqual(content[:8], b"\x89PNG\r\n\x1a\n")
+        width, height = struct.unpack(">II", content[16:24])
+        return width, height
+
+    def test_types(self) -> None:
+        self.assertEqual(self.entry["MimeType"], f"{MEDIA_TYPE};")
+        self.assertEqual(shlex.split(self.entry["Exec"])[0], self.entry["TryExec"])
+
+    def test_names_without_an_extension(self) -> None:
+        # The name of the picture says nothing, and the output is there, as from mkstemp.
+        source = self.written("a picture", (VECTORS / "rgb8.gip").read_bytes())
+        for name in (".thumbnail.Xy12Ab", "gnome-desktop-thumbnailer.png", "tumbler-Xy12Ab"):
+            output = self.written(name, b"")
+            output.chmod(0o600)
+            with self.subTest(name):
+                self.assertEqual(max(self.thumbnail(source, output, 16)), 16)
+                self.assertEqual(output.stat().st_mode & 0o777, 0o600)
+
+    def test_sizes(self) -> None:
+        paths = sorted(VECTORS.glob("[!x]*.gip"))
+        self.assertGreater(len(paths), 60)
+        for path in paths:
+            whole = json.loads(run(GIP, "info", "--json", path))
+            sides = [whole["upright_width"], whole["upright_height"]]
+            for size in (8, 1024):
+                with self.subTest(path.name, size=size):
+                    made = self.thumbnail(path, self.folder / "thumbnail", size)
+                    self.assertEqual(max(made), min(size, max(sides)))
+
+
 class Declarations(TestCase):
     """What is read by systems that are not at hand here."""
 
@@ -190,6 +253,7 @@ class Declarations(TestCase):
         self.assertEqual(declared.get("type"), MEDIA_TYPE)
         for name in (
             "desktop/README.md",
+            "desktop/gip.thumbnailer",
             "spec/gip.md",
             "bindings/python/python/image_gip/pillow.py",
             "bindings/wasm/README.md",

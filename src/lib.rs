@@ -4,6 +4,8 @@
     not(feature = "encode"),
     warn(clippy::alloc_instead_of_core, clippy::std_instead_of_alloc, clippy::std_instead_of_core)
 )]
+// The pages of docs.rs say which feature an item needs, beside the one that all need.
+#![cfg_attr(docsrs, feature(doc_cfg), doc(auto_cfg(hide(feature = "decode"))))]
 // The code in the README is compiled as well.
 #![cfg_attr(all(doctest, feature = "encode"), doc = include_str!("../README.md"))]
 

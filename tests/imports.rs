@@ -361,6 +361,7 @@ fn no_files_of_the_crate_import_each_other() {
     let mut found = [files(&library), files(&tool)].concat();
     // Those of tests alone, which are no part of the crate.
     found.extend(["src/testing.rs", "src/encode/testing.rs", "src/coding/entropy/tables_fit.rs"]);
+    found.push("src/bin/gip/args/packaged.rs");
     found.extend(sources.keys().map(String::as_str).filter(|name| name.ends_with("/tests.rs")));
     assert_belongs(found, &sources);
     for read in [library, tool] {

@@ -134,6 +134,39 @@ fn prints_for_humans() {
 }
 
 #[test]
+fn many_files_are_told_each_with_its_name() {
+    let room = Room::new();
+    room.gip("a.gip", ColorType::Rgb8);
+    room.gip("b.gip", ColorType::L8);
+    let alone = ["a.gip", "b.gip"].map(|name| room.ok(&["info", name]));
+    let told = room.ok(&["info", "a.gip", "b.gip"]);
+    assert_eq!(told, format!("a.gip:\n{}\nb.gip:\n{}", alone[0], alone[1]));
+
+    let lines = room.ok(&["info", "--json", "b.gip", "a.gip"]);
+    let lines: Vec<&str> = lines.lines().collect();
+    for (line, name) in lines.iter().zip(["b.gip", "a.gip"]) {
+        let told: Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!(told, room.json(&["info", name, "--json"]));
+        assert_eq!(told["file"], name);
+    }
+    assert_eq!(lines.len(), 2);
+
+    // What cannot be read does not keep the rest from being told.
+    room.write("text.gip", "no picture");
+    let output = room.run(&["info", "missing.gip", "a.gip", "text.gip"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert_eq!(text(&output.stdout), format!("a.gip:\n{}", alone[0]));
+    let errors = text(&output.stderr);
+    let errors: Vec<&str> = errors.lines().collect();
+    assert!(errors[0].starts_with("error: missing.gip: "), "{errors:?}");
+    assert!(errors[1].starts_with("error: text.gip: ") && errors.len() == 2, "{errors:?}");
+
+    let a = fs::read(room.path("a.gip")).expect("just written");
+    let output = room.pipe(&["info", "-", "b.gip"], &a);
+    assert!(text(&output.stdout).starts_with("standard input:\nsize "), "{output:?}");
+}
+
+#[test]
 fn the_texture_of_a_file_is_told() {
     let room = Room::new();
     let mut rng = fastrand::Rng::with_seed(3);
@@ -388,6 +421,12 @@ fn sizes_and_regions() {
     assert_eq!(size(&["--scale", "0.3"]), (14, 11));
     assert_eq!(size(&["--scale", "0.001"]), (1, 1));
     assert_eq!(size(&["--size", "33x7"]), (33, 7));
+    for (bounds, expected) in
+        [("24", (24, 18)), ("24x9", (12, 9)), ("1", (1, 1)), ("9000", (48, 36))]
+    {
+        assert_eq!(size(&["--fit", bounds]), expected, "{bounds}");
+    }
+    assert_eq!(size(&["--fit", "24", "--region", "20,0,4,18"]), (4, 18));
     assert_eq!(size(&["--region", "40,30,8,6"]), (8, 6));
     assert_eq!(size(&["--scale", "3", "--region", "100,50,44,58"]), (44, 58));
 
@@ -407,6 +446,34 @@ fn sizes_and_regions() {
     let output = room.run(&["decode", "a.gip", "c.png", "--region", "-1,0,5,5"]);
     let error = text(&output.stderr);
     assert!(error.contains("not four whole numbers") && !error.contains("tip:"), "{error}");
+}
+
+#[test]
+fn a_picture_that_fits_is_rendered_at_its_size() {
+    let room = Room::new();
+    fs::write(room.path("a.gip"), layered::damaged(&[])).expect("writable");
+    room.ok(&["decode", "a.gip", "fit.png", "--fit", "30"]);
+    room.ok(&["decode", "a.gip", "size.png", "--size", "30x20"]);
+    assert_eq!(room.read("fit.png"), room.read("size.png"));
+}
+
+#[test]
+fn a_format_can_be_named() {
+    let room = Room::new();
+    room.gip("a.gip", ColorType::Rgb8);
+    room.ok(&["decode", "a.gip", "a.png"]);
+    // Thumbnailers give names without an extension, of files that are there.
+    room.write("empty", "");
+    for output in ["new", "empty", ".hidden", "a.jpg", "a.tmp"] {
+        room.ok(&["decode", "a.gip", output, "--format", "png"]);
+        assert_eq!(room.read(output), room.read("a.png"), "{output}");
+    }
+    let output = room.run(&["decode", "a.gip", "-", "--format", "PPM"]);
+    assert!(output.stdout.starts_with(b"P6\n48 36\n"));
+    // A format takes what it has, whatever the name says.
+    room.gip("alpha.gip", ColorType::Rgba8);
+    let error = room.fails(&["decode", "alpha.gip", "alpha.png", "--format", "jpg"]);
+    assert!(error.contains("no alpha"), "{error}");
 }
 
 #[test]
@@ -607,6 +674,12 @@ fn wrong_usage_exits_with_2() {
         (&decode, &["--scale", "0"], "from 0.001 to 1000"),
         (&decode, &["--size", "640"], "640x480"),
         (&decode, &["--scale", "2", "--size", "6x4"], "cannot be used with"),
+        (&decode, &["--fit", "0"], "160x120"),
+        (&decode, &["--fit", "9", "--size", "6x4"], "cannot be used with"),
+        (&decode, &["--fit", "9", "--scale", "2"], "cannot be used with"),
+        (&decode, &["--format", "gip"], "png, tif"),
+        (&["decode", "a.gip", "b"], &[], "--format"),
+        (&["info"], &[], "FILE"),
         (&decode, &["--region", "1,2,3"], "X,Y,W,H"),
     ] {
         let args = [command, flags].concat();

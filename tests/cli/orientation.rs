@@ -100,6 +100,7 @@ fn sizes_and_regions_are_those_of_the_upright_picture() {
         assert_eq!(room.open("back/a.png"), whole, "{value}");
         room.batch(0, &["a.gip", "--thumbnail", "10x200", "--out", "thumbs"]);
         assert_eq!(room.open("thumbs/a.png").width(), 10, "{value}");
+        assert_eq!(decode(&["--fit", "10x200"]), room.open("thumbs/a.png"), "{value}");
 
         room.write("cut.gip", &file[..file.len() - 20]);
         let options = ["--allow-partial", "--region", "3,5,12,9", "--size", "40x41"];

@@ -21,7 +21,8 @@ mod threads;
 
 use pyo3::prelude::*;
 
-#[pymodule]
+// No lock of the interpreter guards what is shared: nothing is but `StreamDecoder`, which has a lock of its own.
+#[pymodule(gil_used = false)]
 mod _native {
     #[pymodule_export]
     use super::decode::{decode, gaussians, info, read_header};

@@ -46,15 +46,20 @@ pub(crate) enum Codec {
 }
 
 impl Codec {
-    /// The format that the extension of a path names; PNG for standard output.
-    pub(crate) fn of(path: &Path) -> Result<Self> {
+    /// The format with the extension `named`, or else with that of a path; PNG for standard output.
+    pub(crate) fn of(path: &Path, named: Option<&str>) -> Result<Self> {
+        if let Some(codec) = named.and_then(Self::named) {
+            return Ok(codec);
+        }
         if files::is_standard_stream(path) {
             return Ok(Self::Png);
         }
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::named(&extension).with_context(|| {
             let path = path.display();
-            WrongUsage(format!("{path}: the extension must name the format: {EXTENSIONS}"))
+            WrongUsage(format!(
+                "{path}: the extension or --format must name the format: {EXTENSIONS}"
+            ))
         })
     }
 

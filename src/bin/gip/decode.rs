@@ -5,8 +5,8 @@ use std::io::Read;
 use anyhow::{Context, Result, anyhow, bail};
 use image::{DynamicImage, ImageBuffer, Pixel};
 use image_gip::{
-    ColorModel, DecodeError, Decoder, Header, Limits, Metadata, MetadataPolicy, Picture,
-    RenderOptions, RequestError, SampleDepth, StreamDecoder,
+    ColorModel, DecodeError, Decoder, Header, Limits, Metadata, MetadataPolicy, Orientation,
+    Picture, RenderOptions, RequestError, SampleDepth, StreamDecoder,
 };
 
 use crate::args;
@@ -19,7 +19,7 @@ const MOST_SKIPPED: usize = 16;
 
 pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
-    let codec = Codec::of(&args.output)?;
+    let codec = Codec::of(&args.output, args.format.as_deref())?;
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let file = files::read(&args.input)?;
     let mut picture = args.threads.pool()?.install(|| match decode(args, codec, &file) {
@@ -201,7 +201,12 @@ fn render_options(
     // The cast of a side that is too long saturates, and the limits refuse it.
     let scaled = |side: u32, scale: f64| (f64::from(side) * scale).round().max(1.0) as u32;
     let scale = |scale| (scaled(whole.0, scale), scaled(whole.1, scale));
-    let (width, height) = args.size.or(args.scale.map(scale)).unwrap_or(whole);
+    let fit = |bounds| {
+        let (width, height) = fitted(header, orientation, bounds);
+        orientation.turned_size(width, height)
+    };
+    let size = args.size.or(args.scale.map(scale)).or(args.fit.map(fit));
+    let (width, height) = size.unwrap_or(whole);
     let (stored_width, stored_height) = orientation.turned_size(width, height);
     let mut options =
         RenderOptions::new().with_size(stored_width, stored_height).with_texture(!args.no_texture);
@@ -209,4 +214,13 @@ fn render_options(
         options = options.with_region(orientation.stored_region(region, width, height)?);
     }
     Ok(options)
+}
+
+/// The largest size, before it is turned upright, that fits into these sides and enlarges nothing.
+pub(crate) fn fitted(header: &Header, orientation: Orientation, bounds: (u32, u32)) -> (u32, u32) {
+    let (across, down) = orientation.turned_size(bounds.0, bounds.1);
+    let (width, height) = (f64::from(header.width), f64::from(header.height));
+    let scale = (f64::from(across) / width).min(f64::from(down) / height).min(1.0);
+    let side = |side: f64| (side * scale).round().max(1.0) as u32;
+    (side(width), side(height))
 }

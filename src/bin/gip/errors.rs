@@ -5,6 +5,9 @@ use thiserror::Error;
 
 use crate::limits;
 
+/// The exit status when some of several files failed.
+pub(crate) const SOME_FAILED: u8 = 3;
+
 /// The user asked for something that makes no sense.
 #[derive(Debug, Error)]
 #[error("{0}")]

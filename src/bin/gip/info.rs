@@ -1,6 +1,8 @@
 //! `gip info`.
 
 use core::fmt::{self, Display};
+use std::path::Path;
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, anyhow};
 use image_gip::{
@@ -13,26 +15,52 @@ use crate::args;
 use crate::cicp;
 use crate::decode::skipped;
 use crate::encode::bits_per_pixel;
+use crate::errors::{SOME_FAILED, one_line};
 use crate::files;
 
 /// How many prefixes the text shows.
 const SHOWN_PREFIXES: usize = 3;
 
-pub(crate) fn run(args: &args::Info) -> Result<()> {
-    let context = || files::input_name(&args.file);
-    let bytes = files::read(&args.file)?;
+pub(crate) fn run(args: &args::Info) -> Result<ExitCode> {
+    if let [path] = &args.files[..] {
+        files::print(&told(path, args)?, None)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let (mut shown, mut failed) = (0, false);
+    for path in &args.files {
+        match told(path, args) {
+            Ok(json) if args.json => files::print(&json, None)?,
+            Ok(text) => {
+                let space = if shown > 0 { "\n" } else { "" };
+                files::print(&format!("{space}{}:\n{text}", files::input_name(path)), None)?;
+                shown += 1;
+            }
+            Err(error) => {
+                eprintln!("error: {}", one_line(&error));
+                failed = true;
+            }
+        }
+    }
+    Ok(if failed { ExitCode::from(SOME_FAILED) } else { ExitCode::SUCCESS })
+}
+
+/// What is printed of a file.
+fn told(path: &Path, args: &args::Info) -> Result<String> {
+    let context = || files::input_name(path);
+    let bytes = files::read(path)?;
     let mut stream = StreamDecoder::new().with_limits(args.limits.limits()).with_statistics();
     stream.feed(&bytes).and_then(|_| stream.finish()).with_context(context)?;
     let header = stream.header().ok_or_else(|| anyhow!("the file has no header"))?;
     let prefixes = Prefixes::new(&bytes).with_context(context)?;
-    let info = FileInfo::new(header, &stream, &prefixes, bytes.len());
-    let text = if args.json { serde_json::to_string(&info)? } else { info.to_string() };
-    files::print(text.trim_end(), None)
+    let name = files::unique_text(path);
+    let info = FileInfo::new(name, header, &stream, &prefixes, bytes.len());
+    Ok(if args.json { serde_json::to_string(&info)? } else { info.to_string().trim_end().into() })
 }
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
 struct FileInfo {
+    file: String,
     bytes: usize,
     bpp: f64,
     version: u8,
@@ -212,7 +240,13 @@ struct TextSize {
 }
 
 impl FileInfo {
-    fn new(header: &Header, stream: &StreamDecoder, prefixes: &Prefixes<'_>, bytes: usize) -> Self {
+    fn new(
+        file: String,
+        header: &Header,
+        stream: &StreamDecoder,
+        prefixes: &Prefixes<'_>,
+        bytes: usize,
+    ) -> Self {
         let channels = header.color.channels();
         let components = components(header, stream.quantizers());
         let chunks = stream.chunks();
@@ -240,6 +274,7 @@ impl FileInfo {
         let (upright_width, upright_height) = orientation.turned_size(header.width, header.height);
         let size = |blob: &Option<Vec<u8>>| blob.as_ref().map(Vec::len);
         Self {
+            file,
             bytes,
             bpp: bits_per_pixel(bytes, header.width, header.height),
             version: header.version,

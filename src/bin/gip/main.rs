@@ -30,7 +30,7 @@ fn main() -> ExitCode {
         Command::Encode(args) => encode::run(&args).map(success),
         Command::Decode(args) => decode::run(&args).map(success),
         Command::Batch(args) => batch::run(&args),
-        Command::Info(args) => info::run(&args).map(success),
+        Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args).map(success),
         Command::Prefix(args) => prefix::run(&args).map(success),
     };

@@ -11,6 +11,7 @@ use super::prefix::Prefix;
 /// Encodes, decodes, inspects and compares .gip files: pictures made of 2D Gaussians.
 #[derive(Debug, Parser)]
 #[command(
+    name = "gip",
     version,
     arg_required_else_help = false,
     after_help = "\
@@ -18,14 +19,15 @@ Examples:
   gip encode photo.jpg photo.gip                     a good quality
   gip encode photo.png small.gip --bytes 20000       a file of 20,000 bytes
   gip decode photo.gip photo.png                     back to pixels
-  gip decode photo.gip thumb.png --size 160x120      a thumbnail, rendered at that size
+  gip decode photo.gip thumb.png --fit 160           a thumbnail, rendered at that size
   gip batch photos --out gips                        a folder, one picture per core
   gip info photo.gip                                 what the file contains
   gip prefix photo.gip 500 placeholder.gip           its first layers, in 500 bytes at most
   gip compare photo.png photo.gip                    how much they differ
 
 In place of any file, `-` is standard input or standard output, but not as an input of `gip batch`.
-Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` failed."
+Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` or some of
+several files of `gip info` failed."
 )]
 pub(crate) struct Args {
     #[command(subcommand)]

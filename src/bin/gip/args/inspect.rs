@@ -4,14 +4,23 @@ use std::path::PathBuf;
 
 use super::limits::LimitArgs;
 
-/// Shows what a .gip file contains.
+/// Shows what .gip files contain.
+///
+/// Of several files, what is told of each stands below its name. A file that cannot be read is reported, and
+/// the others are shown.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some of several files failed.")]
 pub(crate) struct Info {
-    /// The .gip file, or `-` for standard input.
-    pub(crate) file: PathBuf,
-    /// Print one JSON object: the size of the file, all fields of the header, number and bytes of
-    /// the chunks of each type, bits per Gaussian by attribute, and sizes of the metadata.
+    /// The .gip files; `-` is standard input.
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Print one JSON object for each file, on a line of its own: the name and the size of the file, all fields
+    /// of the header, number and bytes of the chunks of each type, bits per Gaussian by attribute, and sizes of
+    /// the metadata.
     ///
+    /// In `file`, the name, a byte that is not UTF-8 is U+FFFD and two hexadecimal digits, and so are the bytes of
+    /// a U+FFFD in a name.
     /// `prefixes` has, for each number of layers from the first on, the number of Gaussians, the place where they
     /// end in the file (`end`), and the size of the file that `gip prefix` makes of them (`bytes`).
     /// `width` and `height` are those of the picture as stored; `upright_width` and `upright_height` those after it

@@ -7,6 +7,8 @@ mod encode;
 mod inspect;
 mod keep;
 mod limits;
+#[cfg(test)]
+mod packaged;
 mod prefix;
 mod values;
 

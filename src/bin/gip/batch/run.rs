@@ -25,13 +25,11 @@ use super::stop::{self, Stop};
 use super::task::{Facts, Task};
 use super::workers;
 use crate::args;
-use crate::errors::one_line;
+use crate::errors::{SOME_FAILED, one_line};
 use crate::files::{self, Output};
 
 /// The budget of one job by default, in pixels.
 const PIXELS_PER_JOB: u64 = 16_000_000;
-/// The exit status when some files failed.
-const SOME_FAILED: u8 = 3;
 
 pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let start = Instant::now();

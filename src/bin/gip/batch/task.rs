@@ -8,8 +8,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image_gip::{
-    Decoder, EncodeError, Encoder, Header, MetadataPolicy, Orientation, RenderOptions,
-    StreamDecoder, Threads,
+    Decoder, EncodeError, Encoder, MetadataPolicy, RenderOptions, StreamDecoder, Threads,
 };
 use serde::Serialize;
 
@@ -190,13 +189,13 @@ fn decode(
     stop: &Stop,
 ) -> Result<(Vec<u8>, Facts)> {
     let context = || item.source.display().to_string();
-    let codec = Codec::of(&item.output)?;
+    let codec = Codec::of(&item.output, None)?;
     let file = BufReader::new(File::open(&item.source).with_context(context)?);
     let mut decoder =
         Decoder::new_with_limits(file, reading.limits.clone()).with_context(context)?;
     if let Some(bounds) = bounds {
         let orientation = decoder.metadata().orientation();
-        let (width, height) = fitted(decoder.header(), orientation, bounds);
+        let (width, height) = decode::fitted(decoder.header(), orientation, bounds);
         options = options.with_size(width, height);
     }
     let wanted = Wanted::new(options, codec, decoder.header()).with_context(context)?;
@@ -236,15 +235,6 @@ fn decode(
         ..Facts::default()
     };
     Ok((bytes, facts))
-}
-
-/// The size, before it is turned upright, of a thumbnail that fits into these sides.
-fn fitted(header: &Header, orientation: Orientation, bounds: (u32, u32)) -> (u32, u32) {
-    let (across, down) = orientation.turned_size(bounds.0, bounds.1);
-    let (width, height) = (f64::from(header.width), f64::from(header.height));
-    let scale = (f64::from(across) / width).min(f64::from(down) / height).min(1.0);
-    let side = |side: f64| (side * scale).round().max(1.0) as u32;
-    (side(width), side(height))
 }
 
 fn pixels(width: u32, height: u32) -> u64 {

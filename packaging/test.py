@@ -1,0 +1,156 @@
+"""Tests of what is published: `python3 packaging/test.py`.
+
+The archive is made of the tool that the variable GIP names, or else that of
+`cargo build --release --features cli`.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import tarfile
+import tempfile
+import tomllib
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+GIP = Path(os.environ.get("GIP", ROOT / "target" / "release" / "gip"))
+REPOSITORY = "https://code.example/somebody/image-gip"
+CONTACT = "Some Body <somebody@code.example>"
+# Where only addresses work as links, and where links are followed in the repository that is named.
+NO_REPOSITORY = ["bindings/python/README.md"]
+REPOSITORY_KNOWN = ["README.md", "gpu/README.md", "bindings/wasm/README.md"]
+
+
+def manifest(path: str, root: Path = ROOT) -> dict:
+    return tomllib.loads((root / path).read_text())
+
+
+class Owner(unittest.TestCase):
+    """`set-owner`, in a copy of what it changes."""
+
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name)
+        for name in (
+            "Cargo.toml",
+            "gpu/Cargo.toml",
+            "bindings/python/Cargo.toml",
+            "bindings/wasm/package.json",
+            "packaging/debian/changelog",
+            "packaging/set-owner",
+        ):
+            copy = self.root / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, copy)
+
+    def set_owner(self, repository: str, contact: str) -> int:
+        command = [self.root / "packaging/set-owner", repository, contact]
+        return subprocess.run(command, stderr=subprocess.DEVNULL).returncode
+
+    def test_all_that_is_published(self) -> None:
+        for repository in ("https://old.example/a", f"{REPOSITORY}/"):
+            self.assertEqual(self.set_owner(repository, CONTACT), 0)
+            # It can be run again, to the same effect.
+            once = {path: path.read_text() for path in self.root.rglob("*") if path.is_file()}
+            self.assertEqual(self.set_owner(repository, CONTACT), 0)
+            again = {path: path.read_text() for path in self.root.rglob("*") if path.is_file()}
+            self.assertEqual(once, again)
+        for path in ("Cargo.toml", "gpu/Cargo.toml", "bindings/python/Cargo.toml"):
+            before, after = manifest(path), manifest(path, self.root)
+            self.assertEqual(after["package"].pop("repository"), REPOSITORY, path)
+            before["package"].pop("repository", None)
+            if path == "Cargo.toml":
+                self.assertEqual(after["package"]["metadata"]["deb"].pop("maintainer"), CONTACT)
+                del before["package"]["metadata"]["deb"]["maintainer"]
+            self.assertEqual(before, after, path)
+        after = json.loads((self.root / "bindings/wasm/package.json").read_text())
+        expected = {
+            "type": "git",
+            "url": f"git+{REPOSITORY}.git",
+            "directory": "bindings/wasm",
+        }
+        self.assertEqual(after["repository"], expected)
+        news = (self.root / "packaging/debian/changelog").read_text()
+        self.assertIn(f"\n -- {CONTACT}  ", news)
+
+    def test_what_is_refused(self) -> None:
+        for repository, contact in [
+            ("code.example", CONTACT),
+            ('https://code.example/"', CONTACT),
+            (REPOSITORY, "Some Body"),
+            (REPOSITORY, "<somebody@code.example>"),
+        ]:
+            self.assertEqual(self.set_owner(repository, contact), 2)
+
+
+class Published(unittest.TestCase):
+    def test_one_version(self) -> None:
+        version = manifest("Cargo.toml")["package"]["version"]
+        for path in ("gpu", "bindings/c", "bindings/python", "bindings/wasm"):
+            self.assertEqual(manifest(f"{path}/Cargo.toml")["package"]["version"], version, path)
+        gpu = manifest("gpu/Cargo.toml")
+        for kind in ("dependencies", "dev-dependencies"):
+            self.assertEqual(gpu[kind]["image-gip"]["version"], version, kind)
+        package = json.loads((ROOT / "bindings/wasm/package.json").read_text())
+        self.assertEqual(package["version"], version)
+        news = (ROOT / "packaging/debian/changelog").read_text()
+        self.assertTrue(news.startswith(f"image-gip ({version}-"), news)
+
+    def test_links(self) -> None:
+        """crates.io and npm follow links in the repository that is named; PyPI does not."""
+        link = re.compile(r"\]\(([^)\s]+)\)")
+        for name in NO_REPOSITORY:
+            for target in link.findall((ROOT / name).read_text()):
+                self.assertRegex(target, "^(https://|#)", name)
+        for name in REPOSITORY_KNOWN:
+            for target in link.findall((ROOT / name).read_text()):
+                if re.match("https?://|#", target):
+                    continue
+                # They begin at the file, as sites differ in what they make of others.
+                self.assertFalse(target.startswith(("/", ".")), f"{name}: {target}")
+                path, _, _ = target.partition("#")
+                self.assertTrue(((ROOT / name).parent / path).exists(), f"{name}: {target}")
+
+    def test_archive(self) -> None:
+        if not GIP.exists():
+            reason = f"there is no {GIP} for the test of the archive"
+            print(f"skipped: {reason}")
+            self.skipTest(reason)
+        target = "x86_64-unknown-linux-gnu"
+        with tempfile.TemporaryDirectory() as folder:
+            command = [ROOT / "packaging/archive", target, GIP, folder]
+            made = Path(subprocess.check_output(command, text=True).strip())
+            package = manifest("Cargo.toml")["package"]
+            place = package["metadata"]["binstall"]
+            words = {
+                "repo": REPOSITORY,
+                "version": package["version"],
+                "target": target,
+                "archive-suffix": f".{place['pkg-fmt']}",
+                "bin": "gip",
+                "binary-ext": "",
+            }
+
+            def filled(pattern: str) -> str:
+                return re.sub(r"\{ ([a-z-]+) \}", lambda found: words[found[1]], pattern)
+
+            # Where `cargo binstall` looks for it, and in it.
+            self.assertEqual(filled(place["pkg-url"]).rpartition("/")[2], made.name)
+            with tarfile.open(made) as archive:
+                names = set(archive.getnames())
+                tool = archive.extractfile(filled(place["bin-dir"]))
+                self.assertIsNotNone(tool)
+                self.assertEqual(tool and tool.read(), GIP.read_bytes())
+            for name in ("LICENSE-MIT", "man/gip.1", "completions/gip.bash", "desktop/gip.xml"):
+                self.assertIn(f"{made.name.removesuffix('.tgz')}/{name}", names)
+            told = Path(f"{made}.sha256").read_text().split()
+            self.assertEqual(told, [hashlib.sha256(made.read_bytes()).hexdigest(), made.name])
+
+
+if __name__ == "__main__":
+    unittest.main()
