@@ -127,7 +127,7 @@ static int gip_save_build(VipsObject *object)
     options.effort = (guint32)gip->effort;
     options.threads = (guint32)vips_concurrency_get();
     options.progress = is_killed;
-    options.user = save->ready;
+    options.user = save->in;
     status = gip_encode(&source, &options, &file, NULL);
     g_free(pixels);
     g_free(exif);
