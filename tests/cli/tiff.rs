@@ -204,6 +204,41 @@ fn weights_and_range_of_luma_and_chroma() {
 }
 
 #[test]
+fn primaries_are_told_unless_they_are_those_of_srgb() {
+    let room = Room::new();
+    let white = &[3127, 3290][..];
+    let srgb = &[6400, 3300, 3000, 6000, 1500, 600][..];
+    let adobe = &[6400, 3300, 2100, 7100, 1500, 600][..];
+    for (white, primaries, has_transfer, is_told) in [
+        (white, srgb, false, false),
+        (&[3457, 3585], srgb, false, true),
+        (white, adobe, false, true),
+        (white, &[], false, true),
+        (&[], srgb, false, true),
+        (white, srgb, true, true),
+    ] {
+        let mut file = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut file).expect("in memory");
+        let mut page = encoder.new_image::<colortype::RGB8>(4, 1).expect("in memory");
+        let tags = page.encoder();
+        if has_transfer {
+            tags.write_tag(Tag::Unknown(301), &[7_u16; 256][..]).expect("in memory");
+        }
+        for (tag, list) in [(318, white), (319, primaries)] {
+            let list: Vec<_> = list.iter().map(|&n| Rational { n, d: 10_000 }).collect();
+            if !list.is_empty() {
+                tags.write_tag(Tag::Unknown(tag), &list[..]).expect("in memory");
+            }
+        }
+        page.write_data(&[90; 12]).expect("in memory");
+        room.write("a.tif", file.into_inner());
+        let output = room.run(&["encode", "a.tif", "a.gip", "--effort", "1"]);
+        let told = "its white point, primaries or transfer function cannot be kept";
+        assert_eq!(text(&output.stderr).contains(told), is_told, "{}", text(&output.stderr));
+    }
+}
+
+#[test]
 fn a_profile_or_xmp_outside_of_the_file_is_told() {
     let room = Room::new();
     let mut profile = [7; 200];

@@ -7,8 +7,12 @@ use tiff::decoder::Decoder;
 use tiff::decoder::ifd::Value;
 use tiff::tags::Tag;
 
+use crate::source::colors::is_srgb;
 use crate::source::square::Density;
 
+const TRANSFER_FUNCTION: Tag = Tag::Unknown(301);
+const WHITE_POINT: Tag = Tag::Unknown(318);
+const PRIMARIES: Tag = Tag::Unknown(319);
 const YCBCR_COEFFICIENTS: Tag = Tag::Unknown(529);
 const REFERENCE_BLACK_WHITE: Tag = Tag::Unknown(532);
 
@@ -126,9 +130,14 @@ impl Tags {
             [across, down] => (across, down),
             _ => (2, 2),
         };
-        let mut has = |tag| matches!(decoder.find_tag(Tag::Unknown(tag)), Ok(Some(_)));
-        // TransferFunction, WhitePoint and PrimaryChromaticities.
-        let has_colorimetry = [301, 318, 319].into_iter().any(&mut has);
+        let points = numbers(decoder, WHITE_POINT).zip(numbers(decoder, PRIMARIES));
+        let points = points.map(|([x, y], [red_x, red_y, green_x, green_y, blue_x, blue_y])| {
+            [(x, y), (red_x, red_y), (green_x, green_y), (blue_x, blue_y)]
+        });
+        let mut has = |tag| matches!(decoder.find_tag(tag), Ok(Some(_)));
+        let has_colorimetry = has(TRANSFER_FUNCTION)
+            || points.is_none_or(|points| !is_srgb(&points))
+                && (has(WHITE_POINT) || has(PRIMARIES));
         Ok(Some(Self {
             size,
             photometric,
