@@ -1046,3 +1046,21 @@ fn what_the_decoder_would_refuse_is_not_encoded() {
     let raised = Encoder::new().with_effort(1).with_limits(Limits::none()).encode(&source);
     assert!(raised.is_ok_and(|encoded| encoded.report.psnr > 99.0));
 }
+
+#[test]
+fn few_bytes_of_a_simple_picture_show_more_than_a_small_copy() {
+    // A dark window with a thin light frame, and some lines of equal length.
+    let (width, height) = (400, 300);
+    let is_light = |x: u32, y: u32| {
+        let is_frame = (40..360).contains(&x) && (30..32).contains(&y);
+        let is_line = (60..200).contains(&x) && y > 60 && y < 200 && y % 40 < 2;
+        is_frame || is_line
+    };
+    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let samples: Vec<u8> = places.map(|(x, y)| if is_light(x, y) { 230 } else { 40 }).collect();
+    let source = Source::new_u8(width, height, ColorModel::Gray, &samples).expect("it fits");
+    let encoder = Encoder::new().with_effort(2).with_target(Target::Bytes(500));
+    let encoded = encoder.encode(&source).expect("the options are valid");
+    assert!(encoded.bytes.len() <= 500);
+    assert!(encoded.report.quality > 60.0, "{:?}", encoded.report);
+}

@@ -7,7 +7,7 @@ use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
 use super::loss::{PerceptualWeights, RenderingError, SquaredError};
-use super::options::Precision;
+use super::options::{Precision, Tune};
 use super::outcome::{LEAST_GAIN, Outcome};
 use super::progress::Observer;
 use super::quality::{self, Judge};
@@ -30,6 +30,9 @@ const PIXELS_PER_GAUSSIAN_OF_MODEST: usize = 8;
 /// How often a file may get more Gaussians, and what they must bring each time, in dB.
 const MOST_EXTENSIONS: u32 = 4;
 const LEAST_GAIN_OF_MORE: f64 = 0.1;
+/// By how many points of quality a file of the picture itself must be better than a sketch, which is better where it is
+/// shown small.
+const LEAST_POINTS_OF_WHOLE: f64 = 2.0;
 /// Pixels per Gaussian and corrections of the number of Gaussians that the progress report assumes before
 /// they are known.
 const USUAL_PIXELS: usize = 100;
@@ -51,18 +54,37 @@ pub(crate) fn encode(jobs: &[Job<'_>], observer: &mut Observer<'_>) -> Result<Ou
     Ok(best)
 }
 
-/// The file of a job. If its target is a size, and it is no sketch, one of more Gaussians where the size has room
-/// for them, or of fewer where these show about as good a picture.
+/// The file of a job: a sketch, unless one of the picture itself shows more.
 fn encode_once(
     job: &Job<'_>,
     judge: &Judge<'_>,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
-    let outcome = encode_for_target(job, judge, None, work, observer)?;
-    if sketch::is_for(job) {
-        return Ok(outcome);
+    if !sketch::is_for(job) {
+        return encode_whole(job, judge, work, observer);
     }
+    let sketch = encode_for_target(job, judge, Form::Sketch, work, observer)?;
+    if !sketch::may_be_too_little(job) {
+        return Ok(sketch);
+    }
+    let whole = encode_whole(job, judge, sketch.work, observer)?;
+    let is_better = match job.tune {
+        Tune::Visual => whole.quality >= sketch.quality + LEAST_POINTS_OF_WHOLE,
+        Tune::Psnr => whole.psnr.rounded > sketch.psnr.rounded,
+    };
+    Ok(if is_better { whole } else { Outcome { work: whole.work, ..sketch } })
+}
+
+/// The file of a job that is no sketch. If its target is a size, one of more Gaussians where the size has room
+/// for them, or of fewer where these show about as good a picture.
+fn encode_whole(
+    job: &Job<'_>,
+    judge: &Judge<'_>,
+    work: Work,
+    observer: &mut Observer<'_>,
+) -> Result<Outcome> {
+    let outcome = encode_for_target(job, judge, Form::Whole(None), work, observer)?;
     let Aim::File(FileAim::Size(most_bytes)) = job.aim else { return Ok(outcome) };
     // Files are compared by PSNR with either tune: they are tuned alike, and with so many Gaussians the
     // estimate of quality is often near its highest, where it hardly tells them apart.
@@ -88,7 +110,8 @@ fn with_more(
         if job.precision != Precision::Entropy || count > job.pixels() {
             break;
         }
-        let larger = encode_for_target(job, judge, Some(count), outcome.work, observer)?;
+        let larger =
+            encode_for_target(job, judge, Form::Whole(Some(count)), outcome.work, observer)?;
         if larger.psnr.rounded < outcome.psnr.rounded + LEAST_GAIN_OF_MORE {
             return Ok(Outcome { work: larger.work, ..outcome });
         }
@@ -120,7 +143,8 @@ fn with_fewer(
         }
         let most = (pixels / PIXELS_PER_GAUSSIAN_OF_MODEST).min(gaussians / 2).max(1);
         let modest_job = Job { aim: Aim::Count(most as u32), ..*job };
-        let modest = encode_for_target(&modest_job, judge, None, outcome.work, observer)?;
+        let modest =
+            encode_for_target(&modest_job, judge, Form::Whole(None), outcome.work, observer)?;
         let least = if is_large { LEAST_GAIN * outcome.doublings(&modest) } else { 0.0 };
         if outcome.gain(&modest) >= least || modest.file.len() as u64 > most_bytes {
             return Ok(Outcome { work: modest.work, ..outcome });
@@ -131,19 +155,31 @@ fn with_fewer(
     }
 }
 
-/// Fits the source with `count` Gaussians, or as many as the target asks for, codes them for the target, and
-/// decodes the file to tell what it shows. `work` was done before.
+/// What is fitted.
+#[derive(Clone, Copy, Debug)]
+enum Form {
+    /// A small copy of the picture.
+    Sketch,
+    /// The picture, with so many Gaussians, or as many as the target asks for.
+    Whole(Option<usize>),
+}
+
+/// Fits the source, codes the Gaussians for the target, and decodes the file to tell what it shows. `work` was done
+/// before.
 fn encode_for_target(
     job: &Job<'_>,
     judge: &Judge<'_>,
-    count: Option<usize>,
+    form: Form,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
     let Job { source, precision, training, .. } = *job;
     let preparation = job.workload(0).of(PREPARATION);
     observer.expect(preparation + work_from_training(job, job.pixels() / USUAL_PIXELS));
-    let sketch = Sketch::of(job, observer)?;
+    let (sketch, count) = match form {
+        Form::Sketch => (Some(Sketch::of(job, observer)?), None),
+        Form::Whole(count) => (None, count),
+    };
     let tiled = match &sketch {
         Some(sketch) => sketch.tiled(source, observer)?,
         None => TiledSource::new(source, job.tune, observer)?,

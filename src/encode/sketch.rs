@@ -32,6 +32,9 @@ const MOST_BYTES: u64 = 1000;
 const LEAST_PIXELS: usize = 1 << 12;
 /// By how much the copy is smaller, at least: files of smaller pictures are no sketches.
 const LEAST_FACTOR: usize = 4;
+/// Most pixels for a byte of a file that is compared with one of the picture itself: fewer bytes show no more of any
+/// picture, and the comparison takes many times as long.
+const PIXELS_PER_BYTE: usize = 1024;
 /// Gaussians of a sketch take this many times the usual bits.
 const MORE_BITS: f64 = 1.3;
 /// Most fits that are coded.
@@ -53,10 +56,16 @@ pub(crate) fn is_small(aim: Aim) -> bool {
     matches!(aim, Aim::File(FileAim::Size(bytes)) if bytes <= MOST_BYTES)
 }
 
-/// Whether the file of a job is a sketch.
+/// Whether the file of a job may be a sketch.
 pub(crate) fn is_for(job: &Job<'_>) -> bool {
     let is_coded = job.precision == Precision::Entropy;
     is_coded && is_small(job.aim) && factor(job.pixels()) >= LEAST_FACTOR
+}
+
+/// Whether the picture of such a job may be so simple that its file has room for details that no sketch shows.
+pub(crate) fn may_be_too_little(job: &Job<'_>) -> bool {
+    let Aim::File(FileAim::Size(bytes)) = job.aim else { return false };
+    bytes as usize * PIXELS_PER_BYTE >= job.pixels()
 }
 
 /// By how much the copy of a picture is smaller: a power of two.
@@ -65,17 +74,14 @@ fn factor(pixels: usize) -> usize {
 }
 
 impl Sketch {
-    /// That of a job whose file is a sketch.
-    pub(crate) fn of(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Option<Self>> {
-        if !is_for(job) {
-            return Ok(None);
-        }
+    /// That of a job for which a sketch is.
+    pub(crate) fn of(job: &Job<'_>, observer: &mut Observer<'_>) -> Result<Self> {
         let factor = factor(job.pixels());
         let size = job.source.size().map(|side| side.div_ceil(factor));
         let samples = averages(job.source, factor, observer)?;
         let source = job.source.resized(size, SourceSamples::Sixteen(&samples));
         let tiled = TiledSource::new(&source, job.tune, observer)?;
-        Ok(Some(Self { factor, size, samples, tiled }))
+        Ok(Self { factor, size, samples, tiled })
     }
 
     /// The picture itself by tiles, where errors count as they do in the copy.
