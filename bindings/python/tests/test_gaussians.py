@@ -1,6 +1,8 @@
 """`render` and `pack`: Gaussians that come from elsewhere."""
 
 import io
+import subprocess
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -286,6 +288,46 @@ def test_what_like_gives_can_be_changed(textured: bytes) -> None:
     assert not [part for part in chunks(file) if part.kind == "tXTR"]
     again = image_gip.pack(gaussians, like=changed, cutoff=9)
     assert image_gip.info(again).cutoff == 9
+
+
+def test_arrays_of_the_tool(textured: bytes, tool: Path, tmp_path: Path) -> None:
+    def gip(*arguments: str) -> None:
+        subprocess.run([tool, *arguments], cwd=tmp_path, check=True, capture_output=True)
+
+    path = tmp_path / "a.gip"
+    path.write_bytes(textured)
+    gip("export", "a.gip", "a.npz")
+    info, expected = image_gip.info(path), image_gip.gaussians(path)
+    with np.load(tmp_path / "a.npz") as arrays:
+        for name in expected.dtype.names or ():
+            np.testing.assert_array_equal(arrays[name], expected[name])
+        header: Any = {name: arrays[name] for name in ("width", "height", "depth", "cutoff")}
+        header |= {"kernel": str(arrays["kernel"]), "base_color": arrays["base_color"]}
+        assert header["kernel"] == info.kernel
+        shown = image_gip.render(arrays, **header)
+        np.testing.assert_array_equal(shown, image_gip.decode(path, texture=False))
+        assert arrays["texture_center"].shape[1:] == (2,)
+        assert (arrays["texture_size"] > 1).all()
+        file = image_gip.pack(arrays, **header)
+        gip("import", "a.npz", "b.gip")
+        assert (tmp_path / "b.gip").read_bytes() == file
+        fields = {name: arrays[name] for name in ("center", "cholesky", "color", *header)}
+    # As others save them.
+    fields["center"] = np.asfortranarray(fields["center"].astype(">f8"))
+    fields["width"] = fields["width"].astype(np.uint64)
+    fields["kernel"] = np.array(b"quartic")
+    np.savez_compressed(tmp_path / "c.npz", **fields)
+    gip("import", "c.npz", "c.gip")
+    assert (tmp_path / "c.gip").read_bytes() == file
+    np.savez(tmp_path / "d.npz", **fields)
+    gip("import", "d.npz", "d.gip")
+    assert (tmp_path / "d.gip").read_bytes() == file
+    np.savez(tmp_path / "e.npz", spots=expected)
+    failed = subprocess.run(
+        [tool, "import", "e.npz", "e.gip"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert failed.returncode == 1
+    assert "save each of its fields" in failed.stderr
 
 
 @pytest.mark.parametrize("index", [0, 3])
