@@ -9,6 +9,7 @@ mod commands;
 mod common;
 mod damage;
 mod frames;
+mod gaussians;
 mod jpeg;
 mod jpeg_kinds;
 mod limits;

@@ -87,13 +87,7 @@ impl<'py> Picture<'py> {
 
 /// Refuses an array whose memory is not that of its samples alone, one after the other.
 pub(crate) fn check_memory(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<()> {
-    let py = array.py();
-    if !array.get_type().is(py.get_type::<PyUntypedArray>())
-        && array.is_instance(&py.import("numpy.ma")?.getattr("MaskedArray")?)?
-    {
-        let message = format!("{name} is masked; use its data, or what its method filled returns");
-        return Err(PyTypeError::new_err(message));
-    }
+    refuse_masked(name, array)?;
     let wrong = if !array.is_c_contiguous() {
         "C-contiguous: rows from the top, without gaps (see numpy.ascontiguousarray)"
     } else if !array.is_aligned() {
@@ -102,6 +96,18 @@ pub(crate) fn check_memory(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyR
         return Ok(());
     };
     Err(PyValueError::new_err(format!("{name} is not {wrong}")))
+}
+
+/// Refuses an array with a mask, which nothing keeps.
+pub(crate) fn refuse_masked(name: &str, array: &Bound<'_, PyUntypedArray>) -> PyResult<()> {
+    let py = array.py();
+    if !array.get_type().is(py.get_type::<PyUntypedArray>())
+        && array.is_instance(&py.import("numpy.ma")?.getattr("MaskedArray")?)?
+    {
+        let message = format!("{name} is masked; use its data, or what its method filled returns");
+        return Err(PyTypeError::new_err(message));
+    }
+    Ok(())
 }
 
 /// 16-bit samples from floats, of which 1.0 is a full one. Signals are attended to meanwhile.

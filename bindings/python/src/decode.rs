@@ -117,6 +117,8 @@ fn read_whole(
 ///
 /// Args:
 ///     src: The file, as for `decode`.
+///     cholesky: Whether the result has Cholesky factors in place of covariances. They are what the decoder computes
+///         with, so that `render` and `pack` give the same picture bit for bit; covariances are rounded once more.
 ///     limits: What the file may cost at most. Default: Limits().
 ///
 /// Returns:
@@ -124,7 +126,8 @@ fn read_whole(
 ///
 ///     - center, shape (2,): x to the right and y down, in pixels of the stored size; the centre of the
 ///       first pixel is (0.5, 0.5);
-///     - covariance, shape (2, 2), in square pixels;
+///     - covariance, shape (2, 2), in square pixels; or cholesky, shape (3,): the entries l11, l21, l22 of the lower
+///       triangular L, in pixels, where L L^T is the covariance;
 ///     - color, shape (channels,): the amplitude, where 1.0 is a full sample; it may be negative.
 ///
 ///     A Gaussian whose covariance is not positive definite is not drawn. `Info.kernel` names the
@@ -134,15 +137,16 @@ fn read_whole(
 ///     GipError: The file was refused.
 ///     OSError: The file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (src, *, limits=None))]
+#[pyo3(signature = (src, *, cholesky=false, limits=None))]
 pub(crate) fn gaussians<'py>(
     py: Python<'py>,
     src: &Bound<'py, PyAny>,
+    cholesky: bool,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let stream = read_whole(py, src, limits)?;
     let channels = stream.header().map_or(0, |header| header.color.channels());
-    objects::gaussians(py, stream.gaussians(), channels)
+    objects::gaussians(py, stream.gaussians(), channels, cholesky)
 }
 
 /// What a file says of its picture: header, metadata, chunks, Gaussians per layer.

@@ -202,7 +202,8 @@ fn target(
     Ok(target)
 }
 
-fn precision(name: &str) -> PyResult<Precision> {
+/// The precision of this name.
+pub(crate) fn precision(name: &str) -> PyResult<Precision> {
     match name {
         "entropy" => Ok(Precision::Entropy),
         "packed" => Ok(Precision::Packed),

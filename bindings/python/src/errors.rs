@@ -1,6 +1,8 @@
 //! The crate's errors as the exceptions of `image_gip._errors`.
 
-use image_gip::{ChunkType, DecodeError, EncodeError, LimitKind, OptionError, RequestError};
+use image_gip::{
+    ChunkType, DecodeError, EncodeError, LimitKind, OptionError, PictureError, RequestError,
+};
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -73,6 +75,16 @@ fn limit_error<'py>(
     exception.setattr("wanted", wanted)?;
     exception.setattr("allowed", allowed)?;
     Ok(exception)
+}
+
+/// The exception for Gaussians or a header of the caller that no picture can have.
+pub(crate) fn picture_error(py: Python<'_>, error: &PictureError) -> PyErr {
+    let message = error.to_string();
+    let PictureError::Count { found, allowed } = *error else {
+        return PyValueError::new_err(message);
+    };
+    let (wanted, allowed) = (found as u64, allowed.into());
+    raised(limit_error(py, &message, LimitKind::Gaussians, wanted, allowed))
 }
 
 /// The exception for an error of the encoder.

@@ -8,13 +8,16 @@ mod background;
 mod decode;
 mod encode;
 mod errors;
+mod given;
 mod input;
 mod light;
 mod metadata;
 mod numbers;
 mod objects;
 mod output;
+mod pack;
 mod prefix;
+mod render;
 mod request;
 mod stream;
 mod threads;
@@ -29,7 +32,11 @@ mod _native {
     #[pymodule_export]
     use super::encode::encode;
     #[pymodule_export]
+    use super::pack::pack;
+    #[pymodule_export]
     use super::prefix::{prefix, prefixes};
+    #[pymodule_export]
+    use super::render::render;
     #[pymodule_export]
     use super::stream::StreamDecoder;
 

@@ -114,21 +114,29 @@ fn parameterization(parameterization: Parameterization) -> &'static str {
     }
 }
 
-/// A structured array of Gaussians, with so many channels of colour.
+/// A structured array of Gaussians, with so many channels of colour, and Cholesky factors or covariances.
 pub(crate) fn gaussians<'py>(
     py: Python<'py>,
     gaussians: &[Gaussian],
     channels: usize,
+    cholesky: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let fields =
-        (("center", "f4", (2,)), ("covariance", "f4", (2, 2)), ("color", "f4", (channels,)));
-    let fields =
-        vec![fields.0.into_pyobject(py)?, fields.1.into_pyobject(py)?, fields.2.into_pyobject(py)?];
+    let shape = if cholesky {
+        ("cholesky", "f4", (3,)).into_pyobject(py)?
+    } else {
+        ("covariance", "f4", (2, 2)).into_pyobject(py)?
+    };
+    let center = ("center", "f4", (2,)).into_pyobject(py)?;
+    let fields = vec![center, shape, ("color", "f4", (channels,)).into_pyobject(py)?];
     let mut values = vec_for(gaussians.len() * (6 + channels))?;
     for gaussian in gaussians {
-        let [xx, xy, yy] = gaussian.covariance();
         values.extend(gaussian.center);
-        values.extend([xx, xy, xy, yy]);
+        if cholesky {
+            values.extend(gaussian.cholesky);
+        } else {
+            let [xx, xy, yy] = gaussian.covariance();
+            values.extend([xx, xy, xy, yy]);
+        }
         values.extend(&gaussian.color[..channels]);
     }
     PyArray1::from_vec(py, values).call_method1("view", (PyList::new(py, fields)?,))

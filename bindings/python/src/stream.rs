@@ -138,10 +138,11 @@ impl StreamDecoder {
     ///
     /// Raises:
     ///     ValueError: The header has not arrived yet.
-    fn gaussians<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    #[pyo3(signature = (*, cholesky=false))]
+    fn gaussians<'py>(&self, py: Python<'py>, cholesky: bool) -> PyResult<Bound<'py, PyAny>> {
         let stream = self.lock_attached(py);
         let header = stream.header().ok_or_else(no_header)?;
-        objects::gaussians(py, stream.gaussians(), header.color.channels())
+        objects::gaussians(py, stream.gaussians(), header.color.channels(), cholesky)
     }
 
     /// How many Gaussians are enough for a preview of this size in pixels: a sixth of all where that is

@@ -11,6 +11,7 @@ mod decode;
 mod encode;
 mod errors;
 mod files;
+mod gaussians;
 mod info;
 mod limits;
 mod picture;
@@ -33,6 +34,8 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args).map(success),
         Command::Prefix(args) => prefix::run(&args).map(success),
+        Command::Export(args) => gaussians::export(&args).map(success),
+        Command::Import(args) => gaussians::import(&args).map(success),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("error: {}", errors::one_line(&error));

@@ -1,8 +1,10 @@
 """Decodes and encodes ``.gip``: pictures stored as two-dimensional Gaussians.
 
 ``decode`` gives a NumPy array, at any size, of the whole picture or a part of it; ``encode`` makes
-a file of one; ``prefix`` cuts a placeholder off it. With ``image_gip.register()``, Pillow opens and
-saves ``.gip``; and ``image_gip.ray`` encodes and decodes data sets on a cluster.
+a file of one; ``prefix`` cuts a placeholder off it. ``gaussians`` gives the Gaussians of a file,
+``render`` renders those of your own, and ``pack`` makes a file of them. With
+``image_gip.register()``, Pillow opens and saves ``.gip``; and ``image_gip.ray`` encodes and decodes
+data sets on a cluster.
 """
 
 from image_gip._errors import (
@@ -23,8 +25,10 @@ from image_gip._native import (
     encode,
     gaussians,
     info,
+    pack,
     prefix,
     prefixes,
+    render,
 )
 from image_gip._types import (
     Chunk,
@@ -34,6 +38,7 @@ from image_gip._types import (
     MasteringDisplay,
     Prefix,
     Progress,
+    Quantizer,
 )
 
 __all__ = [
@@ -49,6 +54,7 @@ __all__ = [
     "MetadataWarning",
     "Prefix",
     "Progress",
+    "Quantizer",
     "ShortfallWarning",
     "SignatureError",
     "StreamDecoder",
@@ -59,9 +65,11 @@ __all__ = [
     "encode",
     "gaussians",
     "info",
+    "pack",
     "prefix",
     "prefixes",
     "register",
+    "render",
 ]
 
 

@@ -2,17 +2,20 @@ from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 from typing_extensions import Buffer
 
 from image_gip._types import (
     Info,
+    Kernel,
     Limits,
     MetadataPolicy,
     Mode,
+    Parameterization,
     Precision,
     Prefix,
     Progress,
+    Quantizer,
     Tune,
 )
 
@@ -28,6 +31,8 @@ _Buffer: TypeAlias = Buffer | NDArray[Any]
 class _Readable(Protocol):
     def read(self, size: int = ..., /) -> _Buffer: ...
 
+# A structured array, or arrays by name.
+_Gaussians: TypeAlias = NDArray[Any] | Mapping[str, ArrayLike]
 _Source: TypeAlias = _Buffer | str | PathLike[str] | _Readable
 
 __all__ = [
@@ -37,9 +42,11 @@ __all__ = [
     "encode",
     "gaussians",
     "info",
+    "pack",
     "prefix",
     "prefixes",
     "read_header",
+    "render",
 ]
 
 __version__: str
@@ -85,7 +92,55 @@ def encode(
     limits: Limits | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
-def gaussians(src: _Source, *, limits: Limits | None = None) -> NDArray[Any]: ...
+def gaussians(
+    src: _Source, *, cholesky: bool = False, limits: Limits | None = None
+) -> NDArray[Any]: ...
+def render(
+    gaussians: _Gaussians,
+    *,
+    like: Info | None = None,
+    width: SupportsIndex | None = None,
+    height: SupportsIndex | None = None,
+    depth: SupportsIndex | None = None,
+    kernel: Kernel | None = None,
+    cutoff: float | None = None,
+    base_color: SupportsIndex | Iterable[SupportsIndex] | None = None,
+    size: _Size | None = None,
+    scale: float | None = None,
+    region: _Region | None = None,
+    mode: Mode | None = None,
+    background: float | Iterable[float] | None = None,
+    dtype: DTypeLike | None = None,
+    out: NDArray[Any] | None = None,
+    threads: int = 1,
+    limits: Limits | None = None,
+) -> NDArray[Any]: ...
+def pack(
+    gaussians: _Gaussians,
+    *,
+    like: Info | None = None,
+    width: SupportsIndex | None = None,
+    height: SupportsIndex | None = None,
+    depth: SupportsIndex | None = None,
+    kernel: Kernel | None = None,
+    cutoff: float | None = None,
+    base_color: SupportsIndex | Iterable[SupportsIndex] | None = None,
+    precision: Precision = "f32",
+    parameterization: Parameterization | None = None,
+    bits: tuple[int, int, int] | None = None,
+    quantizers: Iterable[Quantizer | None] | None = None,
+    color_step: float | None = None,
+    first_layer: int | None = None,
+    threads: int = 1,
+    cicp: tuple[int, int] | None = None,
+    mastering_display: _Display | None = None,
+    content_light: _Light | None = None,
+    icc: _Buffer | None = None,
+    exif: _Buffer | None = None,
+    xmp: _Buffer | None = None,
+    texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
+    metadata: MetadataPolicy = "all",
+) -> bytes: ...
 def info(
     src: _Source, *, metadata: MetadataPolicy = "all", limits: Limits | None = None
 ) -> Info: ...
@@ -112,7 +167,7 @@ class StreamDecoder:
         texture: bool = True,
         threads: int = 1,
     ) -> NDArray[Any]: ...
-    def gaussians(self) -> NDArray[Any]: ...
+    def gaussians(self, *, cholesky: bool = False) -> NDArray[Any]: ...
     def gaussians_for(self, width: int, height: int) -> int: ...
     @property
     def arrived(self) -> int: ...

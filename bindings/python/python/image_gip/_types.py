@@ -10,6 +10,10 @@ Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
 Tune: TypeAlias = Literal["visual", "psnr"]
 #: How the Gaussians of a file are stored, as the tool names it.
 Precision: TypeAlias = Literal["entropy", "packed", "f32"]
+#: The weight of a Gaussian around its centre.
+Kernel: TypeAlias = Literal["quartic", "exponential"]
+#: What is stored of a Gaussian's shape.
+Parameterization: TypeAlias = Literal["cholesky", "covariance", "rotation-scale"]
 #: What of a picture's metadata is kept.
 MetadataPolicy: TypeAlias = Literal["all", "safe", "none"]
 
@@ -101,6 +105,21 @@ class ContentLight(NamedTuple):
     max_content: float
     #: The mean luminance of the picture, MaxFALL, in cd/m²: 0 (not known) to 429496.7295.
     max_frame_average: float
+
+
+class Quantizer(NamedTuple):
+    """How one component of all Gaussians is stored in a file with packed codes."""
+
+    #: ``"linear"``: the value of a code is code * scale + offset; or ``"log"``: it is the
+    #: exponential of that, for positive components of widely different sizes.
+    kind: Literal["linear", "log"]
+    #: Bit depth, 1 to 16: codes are 0 to 2**bits - 1.
+    bits: int
+    #: The difference of neighbouring codes, in units of the component or of its logarithm: over 0,
+    #: at most 2**32.
+    scale: float
+    #: That of code 0, within +-2**32.
+    offset: float
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

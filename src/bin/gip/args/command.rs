@@ -5,6 +5,7 @@ use clap::{Parser, Subcommand};
 use super::batch::Batch;
 use super::decode::Decode;
 use super::encode::Encode;
+use super::gaussians::{Export, Import};
 use super::inspect::{Compare, Info};
 use super::prefix::Prefix;
 
@@ -24,6 +25,7 @@ Examples:
   gip info photo.gip                                 what the file contains
   gip prefix photo.gip 500 placeholder.gip           its first layers, in 500 bytes at most
   gip compare photo.png photo.gip                    how much they differ
+  gip export photo.gip photo.npz                     its Gaussians, as arrays of NumPy
 
 In place of any file, `-` is standard input or standard output, but not as an input of `gip batch`.
 Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` or some of
@@ -42,6 +44,8 @@ pub(crate) enum Command {
     Info(Info),
     Compare(Compare),
     Prefix(Prefix),
+    Export(Export),
+    Import(Import),
 }
 
 #[cfg(test)]
@@ -59,7 +63,7 @@ mod tests {
         let mut tool = Args::command();
         tool.build();
         let mut commands: Vec<clap::Command> = tool.get_subcommands().cloned().collect();
-        assert_eq!(commands.len(), 6 + 1, "six and `help`");
+        assert_eq!(commands.len(), 8 + 1, "eight and `help`");
         commands.push(tool);
         for mut command in commands {
             let help = command.render_long_help().to_string();
