@@ -31,6 +31,8 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('info', 'info', [CompletionResultType]::ParameterValue, 'Shows what .gip files contain')
             [CompletionResult]::new('compare', 'compare', [CompletionResultType]::ParameterValue, 'Measures how much two pictures differ')
             [CompletionResult]::new('prefix', 'prefix', [CompletionResultType]::ParameterValue, 'Cuts a small .gip file from the beginning of a large one')
+            [CompletionResult]::new('export', 'export', [CompletionResultType]::ParameterValue, 'Writes the Gaussians of a .gip file for other programs')
+            [CompletionResult]::new('import', 'import', [CompletionResultType]::ParameterValue, 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -129,6 +131,31 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             break
         }
+        'gip;export' {
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'The format, in place of the one that the extension of OUTPUT names')
+            [CompletionResult]::new('--limit', '--limit', [CompletionResultType]::ParameterName, 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            break
+        }
+        'gip;import' {
+            [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'The format, in place of the one that the extension of INPUT names')
+            [CompletionResult]::new('--precision', '--precision', [CompletionResultType]::ParameterName, 'How the Gaussians are stored')
+            [CompletionResult]::new('--bits', '--bits', [CompletionResultType]::ParameterName, 'Bit depths of position, shape and colour with --precision packed, each from 1 to 16 [default: 12,10,6]')
+            [CompletionResult]::new('--color-step', '--color-step', [CompletionResultType]::ParameterName, 'Step of colour with --precision entropy, from 0.000001 to 1000: the difference of the amplitudes of neighbouring codes, where 1 is a full sample, times the Gaussian''s size in pixels. Stronger ones are finer in position and shape as well [default: 0.02]')
+            [CompletionResult]::new('--parameterization', '--parameterization', [CompletionResultType]::ParameterName, 'What is stored of a shape, unless with --precision entropy')
+            [CompletionResult]::new('--size', '--size', [CompletionResultType]::ParameterName, 'Size of the picture in pixels, in which centres and covariances are')
+            [CompletionResult]::new('--depth', '--depth', [CompletionResultType]::ParameterName, 'Bits per sample, 8 or 16')
+            [CompletionResult]::new('--kernel', '--kernel', [CompletionResultType]::ParameterName, 'The weight of a Gaussian around its centre')
+            [CompletionResult]::new('--cutoff', '--cutoff', [CompletionResultType]::ParameterName, 'The largest squared Mahalanobis distance with a weight over 0, of the exponential kernel: over 0, at most 64 [default: 11.082527, where the weight is 1/255]')
+            [CompletionResult]::new('--base-color', '--base-color', [CompletionResultType]::ParameterName, 'The colour that the Gaussians are added to: a sample for all channels, or one for each, from 0 to 255, or to 65535 with 16 bits')
+            [CompletionResult]::new('--limit', '--limit', [CompletionResultType]::ParameterName, 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits')
+            [CompletionResult]::new('--threads', '--threads', [CompletionResultType]::ParameterName, 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Write OUTPUT even if its name does not end in .gip')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            break
+        }
         'gip;help' {
             [CompletionResult]::new('encode', 'encode', [CompletionResultType]::ParameterValue, 'Encodes a picture as a .gip file')
             [CompletionResult]::new('decode', 'decode', [CompletionResultType]::ParameterValue, 'Decodes a .gip file to a picture')
@@ -136,6 +163,8 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('info', 'info', [CompletionResultType]::ParameterValue, 'Shows what .gip files contain')
             [CompletionResult]::new('compare', 'compare', [CompletionResultType]::ParameterValue, 'Measures how much two pictures differ')
             [CompletionResult]::new('prefix', 'prefix', [CompletionResultType]::ParameterValue, 'Cuts a small .gip file from the beginning of a large one')
+            [CompletionResult]::new('export', 'export', [CompletionResultType]::ParameterValue, 'Writes the Gaussians of a .gip file for other programs')
+            [CompletionResult]::new('import', 'import', [CompletionResultType]::ParameterValue, 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
             break
         }
@@ -155,6 +184,12 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             break
         }
         'gip;help;prefix' {
+            break
+        }
+        'gip;help;export' {
+            break
+        }
+        'gip;help;import' {
             break
         }
         'gip;help;help' {

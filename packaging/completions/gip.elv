@@ -28,6 +28,8 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand info 'Shows what .gip files contain'
             cand compare 'Measures how much two pictures differ'
             cand prefix 'Cuts a small .gip file from the beginning of a large one'
+            cand export 'Writes the Gaussians of a .gip file for other programs'
+            cand import 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
             cand help 'Print this message or the help of the given subcommand(s)'
         }
         &'gip;encode'= {
@@ -119,6 +121,29 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand -h 'Print help (see more with ''--help'')'
             cand --help 'Print help (see more with ''--help'')'
         }
+        &'gip;export'= {
+            cand --format 'The format, in place of the one that the extension of OUTPUT names'
+            cand --limit 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits'
+            cand -h 'Print help (see more with ''--help'')'
+            cand --help 'Print help (see more with ''--help'')'
+        }
+        &'gip;import'= {
+            cand --format 'The format, in place of the one that the extension of INPUT names'
+            cand --precision 'How the Gaussians are stored'
+            cand --bits 'Bit depths of position, shape and colour with --precision packed, each from 1 to 16 [default: 12,10,6]'
+            cand --color-step 'Step of colour with --precision entropy, from 0.000001 to 1000: the difference of the amplitudes of neighbouring codes, where 1 is a full sample, times the Gaussian''s size in pixels. Stronger ones are finer in position and shape as well [default: 0.02]'
+            cand --parameterization 'What is stored of a shape, unless with --precision entropy'
+            cand --size 'Size of the picture in pixels, in which centres and covariances are'
+            cand --depth 'Bits per sample, 8 or 16'
+            cand --kernel 'The weight of a Gaussian around its centre'
+            cand --cutoff 'The largest squared Mahalanobis distance with a weight over 0, of the exponential kernel: over 0, at most 64 [default: 11.082527, where the weight is 1/255]'
+            cand --base-color 'The colour that the Gaussians are added to: a sample for all channels, or one for each, from 0 to 255, or to 65535 with 16 bits'
+            cand --limit 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits'
+            cand --threads 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]'
+            cand --force 'Write OUTPUT even if its name does not end in .gip'
+            cand -h 'Print help (see more with ''--help'')'
+            cand --help 'Print help (see more with ''--help'')'
+        }
         &'gip;help'= {
             cand encode 'Encodes a picture as a .gip file'
             cand decode 'Decodes a .gip file to a picture'
@@ -126,6 +151,8 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand info 'Shows what .gip files contain'
             cand compare 'Measures how much two pictures differ'
             cand prefix 'Cuts a small .gip file from the beginning of a large one'
+            cand export 'Writes the Gaussians of a .gip file for other programs'
+            cand import 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
             cand help 'Print this message or the help of the given subcommand(s)'
         }
         &'gip;help;encode'= {
@@ -139,6 +166,10 @@ set edit:completion:arg-completer[gip] = {|@words|
         &'gip;help;compare'= {
         }
         &'gip;help;prefix'= {
+        }
+        &'gip;help;export'= {
+        }
+        &'gip;help;import'= {
         }
         &'gip;help;help'= {
         }

@@ -32,6 +32,8 @@ complete -c gip -n "__fish_gip_needs_command" -f -a "batch" -d 'Encodes or decod
 complete -c gip -n "__fish_gip_needs_command" -f -a "info" -d 'Shows what .gip files contain'
 complete -c gip -n "__fish_gip_needs_command" -f -a "compare" -d 'Measures how much two pictures differ'
 complete -c gip -n "__fish_gip_needs_command" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
+complete -c gip -n "__fish_gip_needs_command" -f -a "export" -d 'Writes the Gaussians of a .gip file for other programs'
+complete -c gip -n "__fish_gip_needs_command" -f -a "import" -d 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
 complete -c gip -n "__fish_gip_needs_command" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
 complete -c gip -n "__fish_gip_using_subcommand encode" -l gaussians -d 'At most N Gaussians, from 1 to 4194304' -r
 complete -c gip -n "__fish_gip_using_subcommand encode" -l bpp -d 'A file of at most B bits per pixel, from 0.000001 to 1000000' -r
@@ -116,10 +118,42 @@ complete -c gip -n "__fish_gip_using_subcommand compare" -l json -d 'Print one J
 complete -c gip -n "__fish_gip_using_subcommand compare" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c gip -n "__fish_gip_using_subcommand prefix" -l force -d 'Write OUTPUT even if its name does not end in .gip'
 complete -c gip -n "__fish_gip_using_subcommand prefix" -s h -l help -d 'Print help (see more with \'--help\')'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "encode" -d 'Encodes a picture as a .gip file'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "decode" -d 'Decodes a .gip file to a picture'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "batch" -d 'Encodes or decodes many files and whole folders, one picture per core'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "info" -d 'Shows what .gip files contain'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "compare" -d 'Measures how much two pictures differ'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c gip -n "__fish_gip_using_subcommand export" -l format -d 'The format, in place of the one that the extension of OUTPUT names' -r -f -a "npz\t'Arrays of NumPy, as numpy.load reads them'
+json\t'One JSON object'
+jsonl\t'A JSON object of the header on the first line, and one of a Gaussian on each further line'
+ply\t'The PLY of viewers of 3D Gaussians'
+svg\t'Radial gradients; it cannot be imported'"
+complete -c gip -n "__fish_gip_using_subcommand export" -l limit -d 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits' -r
+complete -c gip -n "__fish_gip_using_subcommand export" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c gip -n "__fish_gip_using_subcommand import" -l format -d 'The format, in place of the one that the extension of INPUT names' -r -f -a "npz\t'Arrays of NumPy, as numpy.load reads them'
+json\t'One JSON object'
+jsonl\t'A JSON object of the header on the first line, and one of a Gaussian on each further line'
+ply\t'The PLY of viewers of 3D Gaussians'
+svg\t'Radial gradients; it cannot be imported'"
+complete -c gip -n "__fish_gip_using_subcommand import" -l precision -d 'How the Gaussians are stored' -r -f -a "f32\t'Packed coding with 32-bit floats, which lose nothing'
+packed\t'Packed coding with codes of fixed bit depths, whose ranges are those of the values'
+entropy\t'Entropy coding, rounded to its grid, for the smallest files; with the quartic kernel only'"
+complete -c gip -n "__fish_gip_using_subcommand import" -l bits -d 'Bit depths of position, shape and colour with --precision packed, each from 1 to 16 [default: 12,10,6]' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l color-step -d 'Step of colour with --precision entropy, from 0.000001 to 1000: the difference of the amplitudes of neighbouring codes, where 1 is a full sample, times the Gaussian\'s size in pixels. Stronger ones are finer in position and shape as well [default: 0.02]' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l parameterization -d 'What is stored of a shape, unless with --precision entropy' -r -f -a "cholesky\t'The Cholesky factor of the covariance, in pixels'
+covariance\t'The covariance, in square pixels'
+rotation-scale\t'Two standard deviations in pixels and an angle'"
+complete -c gip -n "__fish_gip_using_subcommand import" -l size -d 'Size of the picture in pixels, in which centres and covariances are' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l depth -d 'Bits per sample, 8 or 16' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l kernel -d 'The weight of a Gaussian around its centre' -r -f -a "quartic\t'(1 - q / 4)^2 for q below 4'
+exponential\t'exp(-q / 2) up to the cut-off'"
+complete -c gip -n "__fish_gip_using_subcommand import" -l cutoff -d 'The largest squared Mahalanobis distance with a weight over 0, of the exponential kernel: over 0, at most 64 [default: 11.082527, where the weight is 1/255]' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l base-color -d 'The colour that the Gaussians are added to: a sample for all channels, or one for each, from 0 to 255, or to 65535 with 16 bits' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l limit -d 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l threads -d 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]' -r
+complete -c gip -n "__fish_gip_using_subcommand import" -l force -d 'Write OUTPUT even if its name does not end in .gip'
+complete -c gip -n "__fish_gip_using_subcommand import" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "encode" -d 'Encodes a picture as a .gip file'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "decode" -d 'Decodes a .gip file to a picture'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "batch" -d 'Encodes or decodes many files and whole folders, one picture per core'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "info" -d 'Shows what .gip files contain'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "compare" -d 'Measures how much two pictures differ'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "export" -d 'Writes the Gaussians of a .gip file for other programs'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "import" -d 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
