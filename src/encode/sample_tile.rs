@@ -54,6 +54,13 @@ impl SampleLine<'_> {
     }
 }
 
+/// 1 in so many of the sixteen columns, which are inside the picture, and 0 in the others.
+#[inline(always)]
+pub(crate) fn inside<S: Simd>(simd: S, columns: usize) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    centers(simd, 0).simd_lt(columns as f32).select(one, zero)
+}
+
 /// The pixel centres of the sixteen columns from `x` on.
 #[inline(always)]
 pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {

@@ -57,6 +57,15 @@ fn told(path: &Path, args: &args::Info) -> Result<String> {
     Ok(if args.json { serde_json::to_string(&info)? } else { info.to_string().trim_end().into() })
 }
 
+/// The name of a kernel, wherever the tool writes it.
+pub(crate) fn kernel_name(kernel: Kernel) -> &'static str {
+    match kernel {
+        Kernel::Exponential { .. } => "exponential",
+        Kernel::Quartic => "quartic",
+        _ => "unknown",
+    }
+}
+
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
 struct FileInfo {
@@ -299,11 +308,7 @@ impl FileInfo {
             depth: header.depth.bits(),
             gaussians: header.gaussians,
             layers: header.layers,
-            kernel: match header.kernel {
-                Kernel::Exponential { .. } => "exponential",
-                Kernel::Quartic => "quartic",
-                _ => "unknown",
-            },
+            kernel: kernel_name(header.kernel),
             cutoff: header.kernel.cutoff(),
             parameterization: match header.parameterization {
                 Parameterization::Covariance => "covariance",

@@ -1,7 +1,7 @@
 //! The chunks of a file, around its layers (spec, sections 4 and 5).
 
 use super::layers;
-use crate::chunk::{ChunkType, VERSION};
+use crate::chunk::ChunkType;
 use crate::coding::entropy::{Code, EncodedLayer, Quantization, QuantizedCodes, steps};
 use crate::coding::layer_count::LayerCount;
 use crate::coding::packed::{PackedCodes, Quantizer};
@@ -48,20 +48,14 @@ impl<'a> FileLayout<'a> {
         metadata: &'a Metadata,
     ) -> Self {
         let header = Header {
-            version: VERSION,
-            coding: Coding::Packed,
-            width: source.width(),
-            height: source.height(),
-            color: source.color(),
             depth: source.depth(),
-            gaussians: 0,
-            layers: 0,
             kernel,
             parameterization,
             base_color: mean.map(|value| match source.depth() {
                 SampleDepth::Eight => (value * 255.0).round() as u16 * 257,
                 SampleDepth::Sixteen => (value * 65535.0).round() as u16,
             }),
+            ..Header::new(source.width(), source.height(), source.color())
         };
         Self::of(header, metadata)
     }

@@ -12,7 +12,7 @@ use super::activity::BLOCK;
 use super::error::Distortion;
 use super::perceptual_weights::{BlockWeights, COLOR, PerceptualWeights};
 use crate::encode::pairs::{doubled, doubled_half, doubled_quarter, folded, folded_half};
-use crate::encode::sample_tile::{TilePlane, centers};
+use crate::encode::sample_tile::{TilePlane, inside};
 
 /// Replaces the residuals of a tile, of which the first pixel is (x, y), by half the gradient of its
 /// distortion by them, and returns the distortion. `size` is the number of columns and rows inside
@@ -29,8 +29,7 @@ pub(super) fn differentiate<S: Simd, const CHANNELS: usize>(
 ) -> Distortion {
     let (luma, colors) = (weights.luma, weights.colors);
     let zero = f32x16::splat(simd, 0.0);
-    let one = f32x16::splat(simd, 1.0);
-    let inside = centers(simd, 0).simd_lt(columns as f32).select(one, zero);
+    let inside = inside(simd, columns);
     let mut total = zero;
     for first in (0..rows).step_by(BLOCK) {
         let blocks = &weights.row((y + first) / BLOCK)[x / BLOCK..];

@@ -11,7 +11,7 @@ use crate::encode::error::Result;
 use crate::encode::mul_add::MulAdd;
 use crate::encode::options::Tune;
 use crate::encode::progress::Observer;
-use crate::encode::sample_tile::{FULL_SCALE, SampleTile, TilePlane, centers};
+use crate::encode::sample_tile::{FULL_SCALE, SampleTile, TilePlane, inside};
 use crate::encode::source::Source;
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -152,7 +152,7 @@ impl PictureLoss {
     ) -> RenderingError {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
-        let inside = centers(simd, 0).simd_lt(size[0] as f32).select(one, zero);
+        let inside = inside(simd, size[0]);
         let mut total = zero;
         for channel in 0..CHANNELS {
             for row in 0..TILE_HEIGHT {

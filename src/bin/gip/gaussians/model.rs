@@ -4,6 +4,8 @@ use anyhow::{Result, bail};
 use image_gip::{ColorModel, Gaussian, Header, Kernel, SampleDepth};
 use serde::{Deserialize, Serialize};
 
+use crate::info::kernel_name;
+
 /// How far apart two descriptions of a covariance may be, in parts of its trace: more than floats are rounded.
 const TOLERANCE: f64 = 1e-5;
 
@@ -86,13 +88,6 @@ impl Fields {
             header.base_color[..channels].copy_from_slice(base);
         }
         Ok(header)
-    }
-}
-
-fn kernel_name(kernel: Kernel) -> &'static str {
-    match kernel {
-        Kernel::Exponential { .. } => "exponential",
-        _ => "quartic",
     }
 }
 
