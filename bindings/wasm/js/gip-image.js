@@ -20,6 +20,16 @@ const encodingError = (message, cause) =>
 /** The attributes that change how a file is fetched, so that it is loaded anew. */
 const reloads = ['crossorigin', 'referrerpolicy'];
 
+/** The bytes of a placeholder, of base64 or a `data:` URL of it; `null` if it is neither, or there is none. */
+function bytesOf(placeholder) {
+  try {
+    const text = atob(placeholder.slice(placeholder.indexOf(',') + 1));
+    return text ? Uint8Array.from(text, (character) => character.charCodeAt(0)) : null;
+  } catch {
+    return null;
+  }
+}
+
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class GipImageElement extends ImageAttributes {
@@ -85,6 +95,11 @@ export class GipImageElement extends ImageAttributes {
   /** Whether nothing more is to come: the picture is shown, is broken, or there is none. */
   get complete() {
     return this.#state === 'complete' || this.#state === 'broken' || !this.hasAttribute('src');
+  }
+
+  /** Whether the picture is complete, but the file is not: a part of it is missing or damaged. */
+  get incomplete() {
+    return this.#state === 'complete' && this.#loader.error !== null;
   }
 
   /** Waits for the picture. It is loaded for that even if it is not in the page, or lazy. */
@@ -210,6 +225,7 @@ export class GipImageElement extends ImageAttributes {
   /** Does what is to be done: begins, goes on, places what is there, and renders it anew. */
   #refresh() {
     if (this.#state === 'waiting') this.#begin();
+    if (this.#loader?.held && this.#due) this.#loader.release();
     if (!this.#header || !this.#loader) return;
     this.#orient();
     this.#place();
@@ -217,10 +233,15 @@ export class GipImageElement extends ImageAttributes {
     void this.#paint();
   }
 
+  /** Whether the file is to be fetched. */
+  get #due() {
+    return (this.isConnected && (this.loading === 'eager' || this.#near)) || this.#waiting.length > 0;
+  }
+
   #begin() {
     if (!this.hasAttribute('src')) return;
-    const due = this.isConnected && (this.loading === 'eager' || this.#near);
-    if (!due && this.#waiting.length === 0) return;
+    const placeholder = bytesOf(this.placeholder);
+    if (!this.#due && !(placeholder && this.isConnected)) return;
     this.#state = 'loading';
     let loader;
     try {
@@ -230,10 +251,14 @@ export class GipImageElement extends ImageAttributes {
         referrerPolicy: this.referrerPolicy,
         priority: this.fetchPriority,
       };
-      const failed = (error) => {
-        if (this.#loader === loader) this.#fail(error);
+      const failed = () => {
+        if (this.#loader !== loader) return;
+        // Like `<img>`, it shows the part that has arrived.
+        if (loader.showable) void this.#arrived(loader);
+        else this.#fail(loader.error);
       };
-      loader = new Loader(this.src, init, this.limits, () => this.#arrived(loader), failed);
+      const options = { init, limits: this.limits, placeholder };
+      loader = new Loader(this.src, options, () => this.#arrived(loader), failed);
     } catch (error) {
       // Listeners that are added after the attribute are to hear of it.
       queueMicrotask(() => {
@@ -242,7 +267,8 @@ export class GipImageElement extends ImageAttributes {
       return;
     }
     this.#loader = loader;
-    loader.start();
+    if (this.#due) loader.release();
+    else loader.start();
   }
 
   /** Something has arrived. */
@@ -279,16 +305,26 @@ export class GipImageElement extends ImageAttributes {
     return this.#answer;
   }
 
+  #tell(type, error) {
+    this.dispatchEvent(new ErrorEvent(type, { error, message: error.message }));
+  }
+
+  /** What is shown in place of a broken picture: what is inside the element, or the alternative text. */
+  get #fallback() {
+    const isThere = this.querySelector(':scope > :not(noscript)');
+    return isThere ? document.createElement('slot') : this.#alternative;
+  }
+
   #fail(error) {
     this.#loader?.close();
     this.#loader = null;
     this.#header = this.#natural = null;
     this.#state = 'broken';
     this.#painting.clear();
-    this.shadowRoot.replaceChildren(this.#alternative);
+    this.shadowRoot.replaceChildren(this.#fallback);
     this.#layOut();
     this.#answerAll(encodingError(error.message, error));
-    this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
+    this.#tell('error', error);
   }
 
   // Painting.
@@ -344,9 +380,11 @@ export class GipImageElement extends ImageAttributes {
       this.#busy = false;
     }
     const placed = this.#near !== undefined || !this.isConnected;
-    if (this.#state === 'loading' && this.#header && placed && !this.#loader.lacking) {
+    if (this.#state === 'loading' && this.#header && placed && !this.#loader.held && !this.#loader.lacking) {
       this.#state = 'complete';
       this.#answerAll();
+      const { error } = this.#loader;
+      if (error) this.#tell('incomplete', error);
       this.dispatchEvent(new Event('load'));
     }
   }
