@@ -42,6 +42,14 @@ const projects = {
   'vite-6': vite('6.4.6'),
   'vite-7': vite('7.3.8'),
   'vite-8': vite('8.3.8'),
+  // Ten pictures that the plug-in for Vite encodes.
+  site: {
+    ...vite('7.3.8'),
+    files: 'site',
+    needs: { vite: '7.3.8', sharp: '0.35.5' },
+    prepare: ['pictures.mjs'],
+    expects: 'shown 11 pictures, layout shift 0',
+  },
   'webpack-5': {
     files: 'webpack',
     needs: { webpack: '5.113.0', 'webpack-cli': '7.3.1' },
@@ -108,7 +116,7 @@ async function develop(folder, [program, ...args]) {
 }
 
 /** Loads a page, and waits for its title. Throws if it does not show the picture, or logs an error. */
-async function load(browser, url) {
+async function load(browser, url, expects) {
   const page = await browser.newPage();
   const errors = [];
   page.on('pageerror', (error) => errors.push(error.message));
@@ -117,7 +125,7 @@ async function load(browser, url) {
     await page.goto(url);
     await page.waitForFunction(() => /^(shown|failed)/.test(document.title), null, { timeout: 60_000 });
     const [title, workers] = [await page.title(), page.workers().length];
-    if (!title.startsWith('shown 64 x 48')) errors.push(title);
+    if (!title.startsWith(expects)) errors.push(title);
     if (workers === 0) errors.push('there is no worker');
     if (errors.length > 0) throw new Error(errors.join('; '));
     return `${title}, with ${workers} workers`;
@@ -134,7 +142,8 @@ function install(folder, needs, packed) {
 }
 
 async function test(browser, name, packed, scratch) {
-  const { files, needs, build, output, copies, page, base = '/some/where/', server = false, develop: start } = projects[name];
+  const { files, needs, prepare, build, output, copies, page, base = '/some/where/', server = false } = projects[name];
+  const { develop: start, expects = 'shown 64 x 48' } = projects[name];
   const folder = join(scratch, name);
   cpSync(join(here, 'projects', files), folder, { recursive: true });
   try {
@@ -143,6 +152,7 @@ async function test(browser, name, packed, scratch) {
     console.log(`skipped: ${name} cannot be installed: ${String(error.stderr).trim().split('\n')[0]}`);
     return;
   }
+  if (prepare) execFileSync('node', prepare, { cwd: folder, stdio: 'pipe' });
   if (build) {
     const [program, ...args] = build;
     const env = { ...process.env, NEXT_TELEMETRY_DISABLED: '1', ASTRO_TELEMETRY_DISABLED: '1' };
@@ -156,12 +166,12 @@ async function test(browser, name, packed, scratch) {
     throw new Error('the element is not in what the server renders');
   }
   const built = await serve(place, base);
-  console.log(`${name}: ${await load(browser, built.url)}`);
+  console.log(`${name}: ${await load(browser, built.url, expects)}`);
   built.close();
   if (start) {
     const served = await develop(folder, start);
     try {
-      console.log(`${name}, development: ${await load(browser, served.url)}`);
+      console.log(`${name}, development: ${await load(browser, served.url, expects)}`);
     } finally {
       served.close();
     }
