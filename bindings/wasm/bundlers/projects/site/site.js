@@ -1,7 +1,7 @@
 // A page of ten pictures that the plug-in encodes, which measures itself.
 
 import 'image-gip/element';
-import large from './picture0.jpg?gip&quality=70';
+import large from './picture0.jpg?gip&bpp=0.7';
 
 const pictures = Object.values(import.meta.glob('./picture*.{jpg,png}', { query: '?gip', import: 'default', eager: true }));
 
