@@ -6,6 +6,9 @@ import { allLimits } from './limits.js';
 import { turnedSize, turnGaussians, Upright } from './orientation.js';
 import { source as here } from './place.js';
 
+// Decoders for other threads, for this package alone. With a file of its own, a page would load more.
+export { Host } from './host.js';
+
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
 /** What is asked for before the header has arrived is refused, whatever it is. */

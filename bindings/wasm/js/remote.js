@@ -1,7 +1,6 @@
 // Decoders in workers, or on this thread where there can be none.
 
 import { GipError, unpack } from './errors.js';
-import { Host } from './host.js';
 import { source, starts } from './place.js';
 import { firstOf } from './start.js';
 
@@ -48,7 +47,7 @@ class WorkerThread {
 /** This thread. Each call is a task of its own, so that the page can do other things in between. */
 class OwnThread {
   decoders = 0;
-  #host = import('./core.js').then(async ({ Decoder, load }) => {
+  #host = import('./core.js').then(async ({ Decoder, Host, load }) => {
     await load();
     return new Host(Decoder);
   });

@@ -1,11 +1,12 @@
 // How a worker starts: it is given its WebAssembly, and says whether it could load it.
 
-/** Waits until a worker has loaded a module; rejects if it cannot, or there can be none. */
-function ready(worker, module) {
+/** Waits until a worker has loaded its module; rejects if it cannot, or there can be none. */
+function ready(worker, source) {
   return new Promise((resolve, reject) => {
     worker.onmessage = ({ data }) => (data === 'ready' ? resolve(worker) : reject());
     worker.onerror = (event) => (event.preventDefault(), reject());
-    worker.postMessage({ module });
+    // It may end while the module is being compiled.
+    Promise.resolve(source()).then((module) => worker.postMessage({ module }), reject);
   });
 }
 
@@ -15,7 +16,7 @@ export async function firstOf(starts, source) {
     let worker;
     try {
       worker = start();
-      return await ready(worker, await source());
+      return await ready(worker, source);
     } catch {
       worker?.terminate();
     }

@@ -1,8 +1,7 @@
 // The worker: loads the decoder that it is given, takes calls, and answers them in their order.
 
-import { Decoder, load } from './core.js';
+import { Decoder, Host, load } from './core.js';
 import { pack } from './errors.js';
-import { Host } from './host.js';
 
 const host = new Host(Decoder);
 

@@ -82,16 +82,22 @@ test('memory after 200 loads', async () => {
   }, { headers });
 });
 
-test('a strict content security policy', async () => {
+test('a strict content security policy, for files and for what bundlers take', async () => {
   harness.routes['/csp.gip'] = file(picture);
   const policy = (worker) =>
     `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; worker-src ${worker}`;
-  for (const worker of ["'self'", "'none'"]) {
+  const embedded = script.replace('/dist/', '/dist/embedded/');
+  for (const [html, worker, workers] of [
+    [script, "'self'", 1],
+    [script, "'none'", 0],
+    [embedded, 'blob:', 1],
+    [embedded, "'self'", 0],
+  ]) {
     const headers = { 'Content-Security-Policy': policy(worker) };
-    await withPage(`${script}<gip-image src="/csp.gip"></gip-image>`, async (page) => {
+    await withPage(`${html}<gip-image src="/csp.gip"></gip-image>`, async (page) => {
       await settled(page);
       await until(() => page.locator('gip-image canvas').count(), `a picture with worker-src ${worker}`);
-      assert.equal(page.workers().length, worker === "'self'" ? 1 : 0);
+      assert.equal(page.workers().length, workers, worker);
     }, { headers, quiet: true });
   }
 });
