@@ -10,6 +10,8 @@ import { contentSize, layoutOf, newSheet } from './styles.js';
 
 export * from './index.js';
 
+/** The longer side in pixels of what is kept of a picture far from the screen, for printing. */
+const farSide = 64;
 /** While a picture arrives it is rendered anew with so many times the Gaussians. */
 const growth = 1.25;
 
@@ -133,7 +135,6 @@ export class GipImageElement extends ImageAttributes {
       },
       onnear: (near) => {
         this.#near = near;
-        if (!near) this.#painting.clear();
         this.#refresh();
       },
     });
@@ -329,9 +330,11 @@ export class GipImageElement extends ImageAttributes {
 
   // Painting.
 
-  #plan() {
+  /** What to render for the box: with all of its pixels, or, `far` from the screen, with a few. */
+  #plan(far = false) {
     const { objectFit, objectPosition } = getComputedStyle(this);
-    const scale = pinch();
+    const most = Math.max(this.#device.width, this.#device.height);
+    const scale = far ? Math.min(1, farSide / most) : pinch();
     const device = {
       width: Math.round(this.#device.width * scale),
       height: Math.round(this.#device.height * scale),
@@ -350,8 +353,8 @@ export class GipImageElement extends ImageAttributes {
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
   #next() {
     const { arrived, colorSpace, texture, lacking } = this.#loader;
-    if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
-    const plan = this.#plan();
+    if (this.#near === undefined || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
+    const plan = this.#plan(!this.#near);
     if (!plan) return null;
     const [old, header] = [this.#painting.drawn, this.#header];
     const next = { plan, arrived, colorSpace, texture, header };
@@ -371,7 +374,7 @@ export class GipImageElement extends ImageAttributes {
         const loader = this.#loader;
         try {
           const image = await this.#render(loader, next);
-          if (this.#loader === loader && this.#near) this.#show(image, next);
+          if (this.#loader === loader && this.#near !== undefined) this.#show(image, next);
         } catch (error) {
           if (this.#loader === loader) this.#fail(error);
         }

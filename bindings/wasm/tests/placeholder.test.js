@@ -119,7 +119,7 @@ for (const text of ['***', btoa('no picture at all'), btoa('x'), early.slice(0, 
   });
 }
 
-test('that of a lazy picture far below has its place, and no request before it comes close', async () => {
+test('that of a lazy picture far below has its place and a few pixels, and no request before it comes close', async () => {
   const attributes = 'loading="lazy"';
   const before = '<div style="height: 5000px"></div>';
   await gatedPage({ attributes, before }, async (page, { log, open }) => {
@@ -127,6 +127,9 @@ test('that of a lazy picture far below has its place, and no request before it c
     const width = () => page.evaluate(() => document.querySelector('gip-image').getBoundingClientRect().width);
     await until(async () => (await width()) === 96, 'the size');
     assert.equal(await page.evaluate(() => document.querySelector('gip-image').complete), false);
+    // It is printed as this.
+    await until(async () => (await canvasOf(page))?.length === 4 * 64 * 43, 'a few pixels');
+    assert.ok(new Set(await canvasOf(page)).size > 20);
     assert.equal(log.requests.length, 0);
     await page.evaluate(() => document.querySelector('p').scrollIntoView());
     await settled(page);
