@@ -139,7 +139,6 @@ await bundle(['index', 'core', 'gip-image', 'encoder', 'encoder-core'], {
 await bundle(['encoder', 'vite'], {
   outdir: join(dist, 'node'),
   platform: 'node',
-  external: ['sharp'],
   define: { ...noFiles, PACKAGE_VERSION: JSON.stringify(version) },
   plugins: [
     instead('node'),

@@ -48,19 +48,29 @@ async function smallCopy(original, format, bytes) {
   return best;
 }
 
+/** What the tool encodes with some options. */
+function encoded(original, ...options) {
+  const file = join(scratch, 'picture.gip');
+  execFileSync(gip, ['encode', original, file, ...options]);
+  return new Uint8Array(readFileSync(file));
+}
+
+/** The bytes of a placeholder, and the picture at a size. */
+function shown(bytes, size) {
+  const decoder = new Decoder();
+  decoder.feed(bytes);
+  const image = decoder.render(size);
+  decoder.close();
+  return { bytes: bytes.length, png: scaled(image.data, { ...image, channels: 4 }, size) };
+}
+
 /** By kind: the bytes that stand in the page, and the picture at a size, of an original. */
 const kinds = {
-  async gip(original, size) {
-    const file = join(scratch, 'picture.gip');
-    const options = ['--bpp', '0.5', '--effort', '2', '--first-layer', '300'];
-    execFileSync(gip, ['encode', original, file, ...options]);
-    const bytes = Buffer.from(placeholder(new Uint8Array(readFileSync(file)), most), 'base64');
-    const decoder = new Decoder();
-    decoder.feed(new Uint8Array(bytes));
-    const image = decoder.render(size);
-    decoder.close();
-    return { bytes: bytes.length, png: scaled(image.data, { ...image, channels: 4 }, size) };
+  'gip, beginning': async (original, size) => {
+    const file = encoded(original, '--bpp', '0.5', '--effort', '2', '--first-layer', '300');
+    return shown(new Uint8Array(Buffer.from(placeholder(file, most), 'base64')), size);
   },
+  'gip, own file': async (original, size, bytes) => shown(encoded(original, '--bytes', String(bytes)), size),
   async ThumbHash(original, size) {
     const { data, info } = await sharp(original).resize(100, 100, { fit: 'inside' }).ensureAlpha().raw().toBuffer({ resolveWithObject: true });
     const hash = thumbhash.rgbaToThumbHash(info.width, info.height, data);
@@ -105,31 +115,31 @@ for (const name of readdirSync(folder).filter((name) => name.endsWith('.png')).s
   let allowed = 0;
   for (const [kind, make] of Object.entries(kinds)) {
     const made = await make(original, size, allowed);
-    if (kind === 'gip') allowed = made.bytes;
+    if (kind === 'gip, beginning') allowed = made.bytes;
     if (!made) {
       scores[kind].missing += 1;
       row.push(null);
       continue;
     }
-    const shown = await made.png.toBuffer();
-    writeFileSync(found, await sharp(shown).raw().toBuffer());
+    const png = await made.png.toBuffer();
+    writeFileSync(found, await sharp(png).raw().toBuffer());
     scores[kind].bytes.push(made.bytes);
     scores[kind].quality.push(Number(execFileSync(judge, [size.width, size.height, wanted, found])));
-    row.push(shown);
+    row.push(png);
   }
   rows.push(row);
 }
 
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
-console.log('placeholder     bytes  in base64  script  SSIMULACRA2  pictures');
+console.log('placeholder        bytes  in base64  script  SSIMULACRA2  pictures');
 for (const [kind, { bytes, quality, missing }] of Object.entries(scores)) {
   const cells = bytes.length === 0 ? ['-', '-', '-', '-'] : [
     mean(bytes).toFixed(0).padStart(9),
     mean(bytes.map((size) => 4 * Math.ceil(size / 3))).toFixed(0).padStart(10),
-    String(kind === 'gip' ? 'decoder' : await scriptOf(kind)).padStart(7),
+    String(kind.startsWith('gip') ? 'decoder' : await scriptOf(kind)).padStart(7),
     mean(quality).toFixed(1).padStart(12),
   ];
-  console.log(`${kind.padEnd(12)}${cells.join(' ')} ${String(rows.length - missing).padStart(9)}`);
+  console.log(`${kind.padEnd(15)}${cells.join(' ')} ${String(rows.length - missing).padStart(9)}`);
 }
 
 // The originals and all kinds, a row for each picture.

@@ -9,7 +9,7 @@ export interface GipImageAttributes {
   crossorigin?: '' | 'anonymous' | 'use-credentials';
   referrerpolicy?: string;
   fetchpriority?: 'auto' | 'high' | 'low';
-  /** The first bytes of the file in base64, or a `data:` URL of them. */
+  /** A small `.gip`, or the first bytes of the file, in base64 or as a `data:` URL. */
   placeholder?: string;
   texture?: 'on' | 'off';
 }

@@ -14,6 +14,8 @@ export * from './index.js';
 const farSide = 64;
 /** While a picture arrives it is rendered anew with so many times the Gaussians. */
 const growth = 1.25;
+/** So many times those of a placeholder with a file of its own, whose few Gaussians are fitted to the whole picture. */
+const growthOfPlaceholder = 16;
 
 /** What `decode` rejects with, as that of `<img>` does. */
 const encodingError = (message, cause) =>
@@ -352,15 +354,16 @@ export class GipImageElement extends ImageAttributes {
 
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
   #next() {
-    const { arrived, colorSpace, texture, lacking } = this.#loader;
+    const { arrived, colorSpace, texture, lacking, preliminary } = this.#loader;
     if (this.#near === undefined || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
     const plan = this.#plan(!this.#near);
     if (!plan) return null;
     const [old, header] = [this.#painting.drawn, this.#header];
-    const next = { plan, arrived, colorSpace, texture, header };
+    const next = { plan, arrived, colorSpace, texture, header, preliminary };
     if (old && equal(old.plan, plan)) {
       // A file that begins again, since it was replaced, is not shown before it is better.
-      const isBetter = arrived >= old.arrived * growth || arrived === header.gaussians;
+      const least = old.arrived * (old.preliminary ? growthOfPlaceholder : growth);
+      const isBetter = arrived >= least || arrived === header.gaussians;
       if ((lacking && !isBetter) || (header === old.header && equal(next, old))) return null;
     }
     return next;

@@ -18,7 +18,9 @@ export class Loader {
   held = true;
   #download;
   #limits;
-  /** Bytes with which the file begins, which are here without a request; `null` when they have been taken. */
+  /** Whether what has arrived is a small file in place of this one, which has not begun yet. */
+  preliminary = false;
+  /** What is here without a request: what the file begins with, or a small file; `null` when it has been taken. */
   #placeholder;
   #decoder;
   #abort = new AbortController();
@@ -31,7 +33,7 @@ export class Loader {
   #onerror;
 
   /**
-   * `init` is that of `fetch`, `limits` those of the decoder, `placeholder` is what the file begins with, or
+   * `init` is that of `fetch`, `limits` those of the decoder, `placeholder` is what to show at once, or
    * `null`. `onprogress` is called after every piece, and waited for: in it, `want` can say how far to go on.
    * `onerror` is called when an `error` ends it.
    */
@@ -57,7 +59,7 @@ export class Loader {
   /** Whether more is to arrive. */
   get lacking() {
     if (this.complete || this.error) return false;
-    if (this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted) return true;
+    if (this.preliminary || this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted) return true;
     // What comes after all Gaussians, such as texture, is wanted with all of them.
     return this.#wanted === this.header.gaussians;
   }
@@ -132,11 +134,16 @@ export class Loader {
     await this.#decoder.finish();
   }
 
-  async #feed(bytes) {
+  async #feed(bytes, isPlaceholder = false) {
     this.#fed = true;
     const progress = await this.#decoder.feed(bytes);
     if (this.#abort.signal.aborted) return;
     this.#take(progress);
+    if (isPlaceholder && this.complete) {
+      this.preliminary = true;
+      this.complete = false;
+      this.#download.restart();
+    }
     await this.#onprogress();
   }
 
@@ -145,13 +152,13 @@ export class Loader {
     Object.assign(this, progress, { arrived: gaussians });
   }
 
-  /** Decodes what the file is said to begin with. If that is no beginning of a picture, the file tells all. */
+  /** Decodes what is to be shown at once. If it is no beginning of a picture, the file tells all. */
   async #showPlaceholder() {
     const bytes = this.#placeholder;
     this.#placeholder = null;
     this.#download.beginWith(bytes);
     try {
-      await this.#feed(bytes);
+      await this.#feed(bytes, true);
     } catch {
       this.#download.restart();
     }
@@ -161,7 +168,7 @@ export class Loader {
   #begin() {
     this.#decoder.close();
     this.#decoder = new StreamDecoder({ limits: this.#limits });
-    const nothing = { colorSpace: false, texture: false, complete: false };
+    const nothing = { preliminary: false, colorSpace: false, texture: false, complete: false };
     Object.assign(this, { header: null, orientation: null, arrived: 0, ...nothing });
   }
 }

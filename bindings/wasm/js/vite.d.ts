@@ -7,7 +7,7 @@ export interface ImportedPicture {
   /** Its size in pixels. */
   width: number;
   height: number;
-  /** The attribute `placeholder` of `<gip-image>`. */
+  /** The attribute `placeholder` of `<gip-image>`: a file of its own, of at most 300 bytes. */
   placeholder: string;
   /** The address of the original, if it is JPEG, PNG, WebP or GIF, which all browsers know; else `null`. */
   fallback: string | null;
@@ -34,7 +34,6 @@ export interface Options {
   gaussians?: number;
   effort?: number;
   texture?: number;
-  /** Default 300. */
   firstLayer?: number;
 }
 

@@ -3,12 +3,12 @@
 import { execFile } from 'node:child_process';
 import { createHash, randomUUID } from 'node:crypto';
 import { mkdir, readFile, rename, rm, writeFile } from 'node:fs/promises';
+import { createRequire } from 'node:module';
 import { basename, extname, join } from 'node:path';
 import { promisify } from 'node:util';
 
 import { Cursor, chunksOf } from './chunks.js';
 import { markup } from './markup.js';
-import { placeholder } from './prefix.js';
 
 const run = promisify(execFile);
 
@@ -19,9 +19,8 @@ const known = { '.jpg': 'image/jpeg', '.jpeg': 'image/jpeg', '.png': 'image/png'
 const targets = ['quality', 'bytes', 'bpp', 'psnr', 'gaussians'];
 /** What an import may set, as in `?gip&quality=60`. */
 const numbers = [...targets, 'effort', 'texture', 'firstLayer'];
-/** The bytes of a file of the first layer, and most of the placeholder, which has the larger header. */
-const firstLayer = 300;
-const mostPlaceholder = 400;
+/** The placeholder is a file of its own, whose Gaussians are fitted for it: it shows more than the beginning of the other. */
+const placeholderOptions = { bytes: 300, effort: 4 };
 
 /** The options of an import; a target of its own takes the place of another one. */
 function optionsOf(query, common) {
@@ -32,7 +31,7 @@ function optionsOf(query, common) {
   }
   const hasTarget = targets.some((name) => name in own);
   const kept = Object.entries(common).filter(([name]) => !(hasTarget && targets.includes(name)));
-  return { firstLayer, ...Object.fromEntries(kept), ...own };
+  return { ...Object.fromEntries(kept), ...own };
 }
 
 /** Encodes with the tool that is installed. */
@@ -43,8 +42,9 @@ async function encodeByTool(source, options, folder) {
     return [`--${flag}`, String(options[name])];
   });
   try {
-    // A page need not tell where a picture was taken.
-    await run('gip', ['encode', source, output, '--metadata', 'safe', ...flags]);
+    // A page need not tell where a picture was taken, and a placeholder has no room for a profile.
+    const metadata = options === placeholderOptions ? 'none' : 'safe';
+    await run('gip', ['encode', source, output, '--metadata', metadata, ...flags]);
     return await readFile(output);
   } finally {
     await rm(output, { force: true });
@@ -52,10 +52,11 @@ async function encodeByTool(source, options, folder) {
 }
 
 /** Encodes with WebAssembly, from what the package `sharp` reads: upright, in sRGB, with 8 bits. */
-async function encodeByModule(source, options) {
+async function encodeByModule(source, options, root) {
   let sharp;
   try {
-    ({ default: sharp } = await import('sharp'));
+    // That of the site: nothing else of this package needs it.
+    sharp = createRequire(join(root, 'package.json'))('sharp');
   } catch (cause) {
     throw new Error(`to read ${source}, install the npm package sharp, or the tool gip`, { cause });
   }
@@ -98,7 +99,7 @@ export default function gip({ encoder = 'auto', cache: place, ...common } = {}) 
       } catch {
         await mkdir(cache, { recursive: true });
       }
-      const file = await (kind === 'gip' ? encodeByTool(path, options, cache) : encodeByModule(path, options));
+      const file = await (kind === 'gip' ? encodeByTool(path, options, cache) : encodeByModule(path, options, config.root));
       // Whole or not at all, whatever happens meanwhile.
       const partial = `${stored}.${randomUUID()}`;
       await writeFile(partial, file);
@@ -145,10 +146,11 @@ export default function gip({ encoder = 'auto', cache: place, ...common } = {}) 
       if (!/(^|&)gip(&|=|$)/.test(query ?? '')) return null;
       this.addWatchFile(path);
       const original = await readFile(path);
-      const file = await encoded(path, original, optionsOf(query, common));
+      const all = [optionsOf(query, common), placeholderOptions];
+      const [file, small] = await Promise.all(all.map((options) => encoded(path, original, options)));
       const [name, extension] = [basename(path), extname(path)];
       const type = known[extension.toLowerCase()];
-      const facts = { ...sizeOf(file), placeholder: placeholder(file, mostPlaceholder) };
+      const facts = { ...sizeOf(file), placeholder: Buffer.from(small).toString('base64') };
       return [
         `const src = ${addressOf(this, `${basename(path, extension)}.gip`, file, 'image/vnd.gip')};`,
         `const fallback = ${type ? addressOf(this, name, original, type) : 'null'};`,

@@ -161,3 +161,39 @@ test('it may be replaced by one of another picture, with its source', async () =
     assert.equal(await page.evaluate(() => document.querySelector('gip-image').naturalWidth), 48);
   });
 });
+
+test('a small file of its own is shown until the other one shows more', async () => {
+  const own = makePicture({ width: 96, height: 64, layers: [30], seed: 3 });
+  let allowed = 0;
+  const { route, log } = slow(picture, { piece: 500, gate: (sent) => until(() => sent < allowed, 'the next piece') });
+  harness.routes['/whole.gip'] = route;
+  const watch = `<script>
+    globalThis.loads = 0;
+    document.addEventListener('load', ({ target }) => { globalThis.loads += target.localName === 'gip-image'; }, true);
+  </script>`;
+  const html = `${watch}${script}<gip-image src="/whole.gip" placeholder="${own.toString('base64')}"></gip-image>`;
+  await withPage(html, async (page) => {
+    await shows(page, own);
+    // The first layer of the file has less than that.
+    allowed = prefixes(picture)[1].end - 1000;
+    await until(() => log.sent >= allowed, 'the first layer');
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    await shows(page, own);
+    assert.equal(await page.evaluate(() => document.querySelector('gip-image').complete), false);
+    allowed = Infinity;
+    await shows(page, picture);
+    await settled(page);
+    assert.deepEqual(log.requests, [null]);
+    assert.equal(await page.evaluate(() => globalThis.loads), 1);
+  });
+});
+
+test('with a small file of its own a picture whose file is missing is that', async () => {
+  const own = makePicture({ width: 96, height: 64, layers: [30], seed: 3 });
+  const html = `${script}<gip-image src="/nowhere.gip" placeholder="${own.toString('base64')}"></gip-image>`;
+  await withPage(html, async (page) => {
+    await settled(page);
+    assert.equal(await page.evaluate(() => document.querySelector('gip-image').incomplete), true);
+    await shows(page, own);
+  }, { quiet: true });
+});

@@ -14,7 +14,7 @@ new PerformanceObserver((list) => {
 function problems() {
   const wrong = pictures.filter(({ src, fallback, width, height, placeholder }) => {
     const bytes = atob(placeholder).length;
-    return !src.includes('.gip') || !fallback || width !== 480 || height !== 320 || bytes < 80 || bytes > 400;
+    return !src.includes('.gip') || !fallback || width !== 480 || height !== 320 || bytes < 80 || bytes > 300;
   });
   return wrong.length === 0 && pictures.length === 10 ? [] : [JSON.stringify(wrong), `${pictures.length} pictures`];
 }
