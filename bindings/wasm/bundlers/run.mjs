@@ -23,6 +23,15 @@ const vite = (version) => ({
   develop: ['vite', '--host', '127.0.0.1', '--port', '0', '--strictPort'],
 });
 
+/** Ten pictures that the plug-in for Vite encodes. */
+const site = (version) => ({
+  ...vite(version),
+  files: 'site',
+  needs: { vite: version, sharp: '0.35.5' },
+  prepare: ['pictures.mjs'],
+  expects: 'shown 11 pictures, layout shift 0',
+});
+
 const projects = {
   // Without a bundler: the files of the package, in any folder.
   'script-tags': { files: 'files', needs: {}, output: '.', copies: 'lib' },
@@ -42,14 +51,8 @@ const projects = {
   'vite-6': vite('6.4.6'),
   'vite-7': vite('7.3.8'),
   'vite-8': vite('8.3.8'),
-  // Ten pictures that the plug-in for Vite encodes.
-  site: {
-    ...vite('7.3.8'),
-    files: 'site',
-    needs: { vite: '7.3.8', sharp: '0.35.5' },
-    prepare: ['pictures.mjs'],
-    expects: 'shown 11 pictures, layout shift 0',
-  },
+  site: site('7.3.8'),
+  'site-8': site('8.3.8'),
   'webpack-5': {
     files: 'webpack',
     needs: { webpack: '5.113.0', 'webpack-cli': '7.3.1' },
