@@ -91,7 +91,7 @@ class Owner(unittest.TestCase):
 class Published(unittest.TestCase):
     def test_one_version(self) -> None:
         version = manifest("Cargo.toml")["package"]["version"]
-        for path in ("gpu", "bindings/c", "bindings/python", "bindings/wasm"):
+        for path in ("gpu", "bindings/c", "bindings/python", "bindings/wasm", "bindings/wasm/encoder"):
             self.assertEqual(manifest(f"{path}/Cargo.toml")["package"]["version"], version, path)
         gpu = manifest("gpu/Cargo.toml")
         for kind in ("dependencies", "dev-dependencies"):

@@ -1,7 +1,6 @@
 //! The public interface of the encoder: its options, and the file and report that it returns.
 
 use core::ops::ControlFlow;
-use std::time::Instant;
 
 use super::aim::Aim;
 use super::appearance::Curve;
@@ -13,6 +12,7 @@ use super::pipeline;
 use super::progress::{Observer, Progress};
 use super::shortfall::Shortfall;
 use super::source::Source;
+use super::stopwatch::Stopwatch;
 use super::texture::USUAL_STRENGTH;
 use crate::color::ColorModel;
 use crate::container::Metadata;
@@ -223,7 +223,8 @@ impl Encoder {
     }
 
     /// As [`Encoder::encode`], with a callback: `progress` is called at every iteration of
-    /// training, and every few milliseconds during everything that takes longer, always on one thread.
+    /// training, and every few milliseconds during everything that takes longer, always on one thread. (Where
+    /// the platform has no clock, it is called as often as the stages of the work begin.)
     /// It cancels the encoding by returning [`ControlFlow::Break`].
     ///
     /// # Errors
@@ -233,7 +234,7 @@ impl Encoder {
         source: &Source<'_>,
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let (aim, runs) = self.check(source.pixels())?;
         let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
         let mut observer = Observer::new(progress, iterations);
@@ -364,7 +365,7 @@ pub struct Report {
     /// Evaluations of the kernel and its gradient during training, one for each pair of a Gaussian
     /// and a pixel.
     pub evaluations: u64,
-    /// Wall-clock time in seconds.
+    /// Wall-clock time in seconds; 0 where the platform has no clock (`wasm32-unknown-unknown`).
     pub seconds: f64,
     /// Largest amount of memory in bytes that the encoder's buffers took at one time, not counting
     /// the source and the file.

@@ -31,6 +31,7 @@ mod sample_tile;
 mod shortfall;
 mod sketch;
 mod source;
+mod stopwatch;
 mod strips;
 #[cfg(test)]
 mod testing;

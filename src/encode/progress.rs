@@ -4,9 +4,10 @@ use core::fmt;
 use core::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::error::{EncodeError, Result};
+use super::stopwatch::Stopwatch;
 use crate::threads;
 
 /// The progress of an encoding.
@@ -109,7 +110,7 @@ impl<'a> Observer<'a> {
     }
 
     /// What `task` makes of every item, in their order. All threads share the tasks, and every few
-    /// milliseconds there is a poll on this one.
+    /// milliseconds there is a poll on this one; without a clock, one at the beginning.
     pub(crate) fn map<T: Send, R: Send>(
         &mut self,
         items: impl ExactSizeIterator<Item = T> + Send,
@@ -154,7 +155,7 @@ impl<'a> Observer<'a> {
                     since_poll = Duration::ZERO;
                     poll().inspect_err(|_| is_cancelled.store(true, Ordering::Relaxed))?;
                 }
-                let start = Instant::now();
+                let start = Stopwatch::start();
                 let found: Vec<R> = portion.drain(..).map(|item| task(&mut memory, item)).collect();
                 let time = start.elapsed();
                 results.lock().expect("no task runs meanwhile").push((first, found));

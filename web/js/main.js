@@ -8,6 +8,7 @@ import { integer, zoom } from './format.js';
 import { GpuPainter } from './gpu-painter.js';
 import { PointerInput } from './input.js';
 import { KEYS, listenToKeys } from './keyboard.js';
+import { Maker } from './maker.js';
 import { showPanel } from './panel.js';
 import { Pool } from './pool.js';
 import { Scrubber } from './scrubber.js';
@@ -26,6 +27,7 @@ const scrubber = new Scrubber(pool, (gaussians) => stage.showGaussians(gaussians
 const parameters = new URLSearchParams(location.search);
 let gpu = startGpu(parameters.get('renderer'));
 let opening = new AbortController();
+const maker = new Maker(find('#maker'), { onFile: openMade, onRival: setRival, onError: fail });
 
 /** Shows a message until it is dismissed or another file is opened. */
 function tell(text) {
@@ -49,8 +51,22 @@ function announce(text) {
   find('#status').textContent = text;
 }
 
-/** Opens the .gip file that a function finds: { name, stream }. */
-async function open(locate) {
+/** Opens the .gip file that a function finds: { name, stream }. What was made here is forgotten. */
+function open(locate) {
+  maker.close();
+  return openFile(locate);
+}
+
+/** Opens a file that was made here. The window goes on showing the same part of the picture. */
+async function openMade(file) {
+  const { x, y, scale } = stage.view;
+  const goesOn = stage.hasPicture && !stage.view.isFitted;
+  await openFile(() => file);
+  if (goesOn) stage.jump((view) => view.moveTo({ x, y, scale }));
+  if (file.isLast) announce(`${file.name} is made.`);
+}
+
+async function openFile(locate) {
   opening.abort();
   opening = new AbortController();
   const { signal } = opening;
@@ -131,22 +147,41 @@ async function useGpu(picture, signal) {
   stage.setGpu(painter.setPicture(picture, numbers, map) ? painter : null);
 }
 
-/** Files that a person gave: a .gip to open, and a picture of another kind to compare with. */
+/** Files that a person gave: a .gip to open, and a picture of another kind, to compare with, or to make one of. */
 async function openFiles(files) {
   const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, 8).arrayBuffer())));
   const gip = files.find((_, index) => isGip(heads[index]));
   const other = files.find((_, index) => !isGip(heads[index]));
   if (gip) await open(() => fromFile(gip));
-  if (other) await openOriginal(other);
+  if (!other) return;
+  if (stage.hasPicture && !maker.isOn) await openOriginal(other);
+  else await make(other);
+}
+
+/** Makes a .gip of a picture. */
+async function make(file) {
+  message.hidden = true;
+  opening.abort();
+  close();
+  if (!(await maker.take(file))) {
+    tell(`${file.name} is neither a .gip file nor a picture that this browser can show.`);
+  }
+}
+
+/** Puts a picture of another format, or the original, beside the one that was made of it. */
+function setRival(bitmap, name, text) {
+  comparison.setOriginal(bitmap);
+  find('#beside').textContent = name;
+  setComparing(bitmap !== null);
+  announce(text);
+  if (bitmap) find('#maker [name="size"]').textContent = text;
+  else tell(text);
 }
 
 async function openOriginal(file) {
   const bitmap = await createImageBitmap(file).catch(() => null);
   if (!bitmap) {
     tell(`${file.name} is neither a .gip file nor a picture that this browser can show.`);
-  } else if (!stage.hasPicture) {
-    bitmap.close();
-    tell(`${file.name} is not a .gip file. Open a .gip first; its original can then be dropped to compare both.`);
   } else {
     message.hidden = true;
     const { width, height } = stage.view.picture;
@@ -155,6 +190,7 @@ async function openOriginal(file) {
       tell(`${file.name} has other proportions than this picture, and is shown stretched.`);
     }
     comparison.setOriginal(bitmap);
+    find('#beside').textContent = 'original';
     setComparing(true);
   }
 }

@@ -330,8 +330,6 @@ onPage('damaged and other files give a message', { path: '/' }, async (page) => 
     await page.waitForFunction(isSaid, pattern.source);
     assert.ok(await message.isVisible());
   };
-  await drop(page, await flat(page, '#00ff00'));
-  await says(/Open a \.gip first/);
   await drop(page, { name: 'notes.txt', bytes: Buffer.from('not a picture') });
   await says(/neither a \.gip/);
   await drop(page, { name: 'header.gip', bytes: await vectorBytes('xcrc-header.gip') });

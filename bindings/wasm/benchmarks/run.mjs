@@ -32,7 +32,9 @@ function printSizes() {
     console.log(name.padEnd(20) + numbers.map((number) => String(number).padStart(9)).join(''));
     return numbers;
   };
-  const files = readdirSync(join(root, 'dist')).filter((file) => /\.(js|wasm)$/.test(file));
+  // What a page loads that shows pictures.
+  const isLoaded = (file) => /\.(js|wasm)$/.test(file) && !/encoder|service-worker|transparent/.test(file);
+  const files = readdirSync(join(root, 'dist')).filter(isLoaded);
   const all = files.map((file) => row(file, readFileSync(join(root, 'dist', file))));
   const sums = all.reduce((a, b) => a.map((value, at) => value + b[at]));
   console.log('all'.padEnd(20) + sums.map((number) => String(number).padStart(9)).join(''));

@@ -4,6 +4,10 @@ import init, { Decoder as Native } from './image_gip.js';
 import { GipError } from './errors.js';
 import { allLimits } from './limits.js';
 import { turnedSize, turnGaussians, Upright } from './orientation.js';
+import { source as here } from './place.js';
+
+// Decoders for other threads, for this package alone. With a file of its own, a page would load more.
+export { Host } from './host.js';
 
 const channelsOf = { gray: 1, 'gray-alpha': 2, rgb: 3, rgba: 4 };
 const all = 2 ** 32 - 1;
@@ -16,10 +20,11 @@ let loading = null;
 let memory = null;
 
 /**
- * Loads the decoder, once per thread. Without an argument it is fetched from beside this script.
+ * Loads the decoder, once per thread. Without an argument it comes from where this script is.
  */
 export function load(source = undefined) {
-  loading ??= init(source === undefined ? undefined : { module_or_path: source }).catch((error) => {
+  // Of nothing, it takes the file beside this script.
+  loading ??= init({ module_or_path: source ?? here() }).catch((error) => {
     loading = null;
     throw error;
   });

@@ -84,15 +84,15 @@ export function limitError(message, limit, wanted, allowed) {
   return new LimitError(`${message}; limits: { ${limit}: ... } raises it`, limit, wanted, allowed);
 }
 
-/** A plain object for an error. */
-export function pack(error) {
+/** A plain object for an error of the decoder, or whatever `origin` is. */
+export function pack(error, origin = 'decoder') {
   const { message, kind, chunk, limit, wanted, allowed } = error;
   if (kind === 'limit') return { kind, message, limit, wanted, allowed };
   if (error instanceof GipError) return { kind, message, chunk };
   if (error instanceof RangeError) return { kind: 'request', message };
   if (error instanceof TypeError) return { kind: 'type', message };
   // WebAssembly traps when its memory is exhausted.
-  return { kind: 'failed', message: `the decoder failed: ${message}`, chunk: null };
+  return { kind: 'failed', message: `the ${origin} failed: ${message}`, chunk: null };
 }
 
 /** The error of a plain object. */

@@ -10,8 +10,12 @@ import { contentSize, layoutOf, newSheet } from './styles.js';
 
 export * from './index.js';
 
+/** The longer side in pixels of what is kept of a picture far from the screen, for printing. */
+const farSide = 64;
 /** While a picture arrives it is rendered anew with so many times the Gaussians. */
 const growth = 1.25;
+/** So many times those of a placeholder with a file of its own, whose few Gaussians are fitted to the whole picture. */
+const growthOfPlaceholder = 16;
 
 /** What `decode` rejects with, as that of `<img>` does. */
 const encodingError = (message, cause) =>
@@ -19,6 +23,16 @@ const encodingError = (message, cause) =>
 
 /** The attributes that change how a file is fetched, so that it is loaded anew. */
 const reloads = ['crossorigin', 'referrerpolicy'];
+
+/** The bytes of a placeholder, of base64 or a `data:` URL of it; `null` if it is neither, or there is none. */
+function bytesOf(placeholder) {
+  try {
+    const text = atob(placeholder.slice(placeholder.indexOf(',') + 1));
+    return text ? Uint8Array.from(text, (character) => character.charCodeAt(0)) : null;
+  } catch {
+    return null;
+  }
+}
 
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
@@ -87,6 +101,11 @@ export class GipImageElement extends ImageAttributes {
     return this.#state === 'complete' || this.#state === 'broken' || !this.hasAttribute('src');
   }
 
+  /** Whether the picture is complete, but the file is not: a part of it is missing or damaged. */
+  get incomplete() {
+    return this.#state === 'complete' && this.#loader.error !== null;
+  }
+
   /** Waits for the picture. It is loaded for that even if it is not in the page, or lazy. */
   decode() {
     return new Promise((resolve, reject) => {
@@ -118,7 +137,6 @@ export class GipImageElement extends ImageAttributes {
       },
       onnear: (near) => {
         this.#near = near;
-        if (!near) this.#painting.clear();
         this.#refresh();
       },
     });
@@ -210,6 +228,7 @@ export class GipImageElement extends ImageAttributes {
   /** Does what is to be done: begins, goes on, places what is there, and renders it anew. */
   #refresh() {
     if (this.#state === 'waiting') this.#begin();
+    if (this.#loader?.held && this.#due) this.#loader.release();
     if (!this.#header || !this.#loader) return;
     this.#orient();
     this.#place();
@@ -217,10 +236,15 @@ export class GipImageElement extends ImageAttributes {
     void this.#paint();
   }
 
+  /** Whether the file is to be fetched. */
+  get #due() {
+    return (this.isConnected && (this.loading === 'eager' || this.#near)) || this.#waiting.length > 0;
+  }
+
   #begin() {
     if (!this.hasAttribute('src')) return;
-    const due = this.isConnected && (this.loading === 'eager' || this.#near);
-    if (!due && this.#waiting.length === 0) return;
+    const placeholder = bytesOf(this.placeholder);
+    if (!this.#due && !(placeholder && this.isConnected)) return;
     this.#state = 'loading';
     let loader;
     try {
@@ -230,10 +254,14 @@ export class GipImageElement extends ImageAttributes {
         referrerPolicy: this.referrerPolicy,
         priority: this.fetchPriority,
       };
-      const failed = (error) => {
-        if (this.#loader === loader) this.#fail(error);
+      const failed = () => {
+        if (this.#loader !== loader) return;
+        // Like `<img>`, it shows the part that has arrived.
+        if (loader.showable) void this.#arrived(loader);
+        else this.#fail(loader.error);
       };
-      loader = new Loader(this.src, init, this.limits, () => this.#arrived(loader), failed);
+      const options = { init, limits: this.limits, placeholder };
+      loader = new Loader(this.src, options, () => this.#arrived(loader), failed);
     } catch (error) {
       // Listeners that are added after the attribute are to hear of it.
       queueMicrotask(() => {
@@ -242,7 +270,8 @@ export class GipImageElement extends ImageAttributes {
       return;
     }
     this.#loader = loader;
-    loader.start();
+    if (this.#due) loader.release();
+    else loader.start();
   }
 
   /** Something has arrived. */
@@ -279,23 +308,35 @@ export class GipImageElement extends ImageAttributes {
     return this.#answer;
   }
 
+  #tell(type, error) {
+    this.dispatchEvent(new ErrorEvent(type, { error, message: error.message }));
+  }
+
+  /** What is shown in place of a broken picture: what is inside the element, or the alternative text. */
+  get #fallback() {
+    const isThere = this.querySelector(':scope > :not(noscript)');
+    return isThere ? document.createElement('slot') : this.#alternative;
+  }
+
   #fail(error) {
     this.#loader?.close();
     this.#loader = null;
     this.#header = this.#natural = null;
     this.#state = 'broken';
     this.#painting.clear();
-    this.shadowRoot.replaceChildren(this.#alternative);
+    this.shadowRoot.replaceChildren(this.#fallback);
     this.#layOut();
     this.#answerAll(encodingError(error.message, error));
-    this.dispatchEvent(new ErrorEvent('error', { error, message: error.message }));
+    this.#tell('error', error);
   }
 
   // Painting.
 
-  #plan() {
+  /** What to render for the box: with all of its pixels, or, `far` from the screen, with a few. */
+  #plan(far = false) {
     const { objectFit, objectPosition } = getComputedStyle(this);
-    const scale = pinch();
+    const most = Math.max(this.#device.width, this.#device.height);
+    const scale = far ? Math.min(1, farSide / most) : pinch();
     const device = {
       width: Math.round(this.#device.width * scale),
       height: Math.round(this.#device.height * scale),
@@ -313,15 +354,16 @@ export class GipImageElement extends ImageAttributes {
 
   /** What is to be rendered; `null` if it is there already, or nothing can be. */
   #next() {
-    const { arrived, colorSpace, texture, lacking } = this.#loader;
-    if (!this.#near || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
-    const plan = this.#plan();
+    const { arrived, colorSpace, texture, lacking, preliminary } = this.#loader;
+    if (this.#near === undefined || !this.#header || (arrived === 0 && this.#header.gaussians > 0)) return null;
+    const plan = this.#plan(!this.#near);
     if (!plan) return null;
     const [old, header] = [this.#painting.drawn, this.#header];
-    const next = { plan, arrived, colorSpace, texture, header };
+    const next = { plan, arrived, colorSpace, texture, header, preliminary };
     if (old && equal(old.plan, plan)) {
       // A file that begins again, since it was replaced, is not shown before it is better.
-      const isBetter = arrived >= old.arrived * growth || arrived === header.gaussians;
+      const least = old.arrived * (old.preliminary ? growthOfPlaceholder : growth);
+      const isBetter = arrived >= least || arrived === header.gaussians;
       if ((lacking && !isBetter) || (header === old.header && equal(next, old))) return null;
     }
     return next;
@@ -335,7 +377,7 @@ export class GipImageElement extends ImageAttributes {
         const loader = this.#loader;
         try {
           const image = await this.#render(loader, next);
-          if (this.#loader === loader && this.#near) this.#show(image, next);
+          if (this.#loader === loader && this.#near !== undefined) this.#show(image, next);
         } catch (error) {
           if (this.#loader === loader) this.#fail(error);
         }
@@ -344,9 +386,11 @@ export class GipImageElement extends ImageAttributes {
       this.#busy = false;
     }
     const placed = this.#near !== undefined || !this.isConnected;
-    if (this.#state === 'loading' && this.#header && placed && !this.#loader.lacking) {
+    if (this.#state === 'loading' && this.#header && placed && !this.#loader.held && !this.#loader.lacking) {
       this.#state = 'complete';
       this.#answerAll();
+      const { error } = this.#loader;
+      if (error) this.#tell('incomplete', error);
       this.dispatchEvent(new Event('load'));
     }
   }

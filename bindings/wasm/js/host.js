@@ -1,19 +1,18 @@
 // Decoders by number, for whoever calls from another thread: the other end of `remote.js`.
 
-import { Decoder, load } from './core.js';
-
 export class Host {
+  #Decoder;
   #decoders = new Map();
 
-  /** Loads the decoder. */
-  load() {
-    return load();
+  /** `Decoder` is that of `core.js`, which has been loaded. */
+  constructor(Decoder) {
+    this.#Decoder = Decoder;
   }
 
   /** Calls a method of the decoder with this number. Returns the result and what to transfer. */
   async call(id, method, argument) {
     if (method === 'create') {
-      this.#decoders.set(id, new Decoder(argument));
+      this.#decoders.set(id, new this.#Decoder(argument));
       return [];
     }
     const decoder = this.#decoders.get(id);
@@ -23,24 +22,16 @@ export class Host {
         decoder?.close();
         return [];
       case 'metadata':
-        return [decoder.metadata];
+      case 'progress':
+        return [decoder[method]];
       case 'gaussiansFor':
         return [decoder.gaussiansFor(...argument)];
-      case 'png': {
-        const file = await decoder.png(argument);
-        return [file, [file.buffer]];
+      default: {
+        const result = await decoder[method](argument);
+        // An array of samples, or of numbers or bytes, is nobody else's.
+        const { buffer } = result?.data ?? result ?? {};
+        return [result, buffer && [buffer]];
       }
-      case 'gaussians': {
-        const numbers = decoder.gaussians(argument);
-        return [numbers, [numbers.buffer]];
-      }
-      case 'render':
-      case 'samples': {
-        const image = decoder[method](argument);
-        return [image, [image.data.buffer]];
-      }
-      default:
-        return [decoder[method](argument)];
     }
   }
 }

@@ -1,4 +1,4 @@
-// The attributes of `<img>` as properties, and `texture`.
+// The attributes of `<img>` as properties, and `placeholder` and `texture`.
 
 import { contentSize } from './styles.js';
 
@@ -80,6 +80,14 @@ export class ImageAttributes extends Base {
 
   set referrerPolicy(value) {
     this.setAttribute('referrerpolicy', value);
+  }
+
+  get placeholder() {
+    return this.getAttribute('placeholder') ?? '';
+  }
+
+  set placeholder(value) {
+    this.setAttribute('placeholder', value);
   }
 
   get texture() {

@@ -93,6 +93,8 @@ export class StreamDecoder {
   constructor(options?: { limits?: Limits; statistics?: boolean });
   /** The header; `null` until it has arrived. */
   readonly header: Header | null;
+  /** What has arrived, also after a rejection. */
+  readonly progress: Progress;
 
   /**
    * Takes the next bytes of the file, in pieces of any size. They are copied at the call. After a

@@ -30,7 +30,7 @@ function abortable(promise, signal) {
 /** Decodes bytes as they arrive, and renders what has arrived. */
 export class StreamDecoder extends Upright {
   #remote;
-  #progress = { header: null, orientation: null, gaussians: 0, complete: false };
+  #progress = { header: null, orientation: null, gaussians: 0, colorSpace: false, texture: false, complete: false };
 
   constructor({ limits, statistics } = {}) {
     super();
@@ -49,6 +49,10 @@ export class StreamDecoder extends Upright {
     return this.#progress.complete;
   }
 
+  get progress() {
+    return this.#progress;
+  }
+
   get arrived() {
     return this.#progress.gaussians;
   }
@@ -57,7 +61,13 @@ export class StreamDecoder extends Upright {
     if (bytes?.[Symbol.toStringTag] !== 'Uint8Array') throw new TypeError('the bytes must be a Uint8Array');
     // The caller may write to its own meanwhile.
     const copy = new Uint8Array(bytes);
-    this.#progress = await this.#remote.call('feed', copy, [copy.buffer]);
+    try {
+      this.#progress = await this.#remote.call('feed', copy, [copy.buffer]);
+    } catch (error) {
+      // What came before the damage is there.
+      this.#progress = await this.#remote.call('progress').catch(() => this.#progress);
+      throw error;
+    }
     return this.#progress;
   }
 

@@ -12,8 +12,16 @@ export class Loader {
   colorSpace = false;
   texture = false;
   complete = false;
+  /** Why the file is not complete, though nothing more arrives; `null` if nothing is wrong. */
+  error = null;
+  /** Whether nothing may be fetched yet. */
+  held = true;
   #download;
   #limits;
+  /** Whether what has arrived is a small file in place of this one, which has not begun yet. */
+  preliminary = false;
+  /** What is here without a request: what the file begins with, or a small file; `null` when it has been taken. */
+  #placeholder;
   #decoder;
   #abort = new AbortController();
   /** How many Gaussians are wanted, which is not known while the decoder is being asked. */
@@ -21,17 +29,18 @@ export class Loader {
   #asking = 0;
   #fed = false;
   #running = false;
-  #failed = false;
   #onprogress;
   #onerror;
 
   /**
-   * `init` is that of `fetch`, `limits` those of the decoder. `onprogress` is called after every piece,
-   * and waited for: in it, `want` can say how far to go on. `onerror` is called with the error that ends it.
+   * `init` is that of `fetch`, `limits` those of the decoder, `placeholder` is what to show at once, or
+   * `null`. `onprogress` is called after every piece, and waited for: in it, `want` can say how far to go on.
+   * `onerror` is called when an `error` ends it.
    */
-  constructor(url, init, limits, onprogress, onerror) {
+  constructor(url, { init, limits, placeholder }, onprogress, onerror) {
     this.#download = new Download(url, init);
     this.#limits = limits;
+    this.#placeholder = placeholder;
     this.#decoder = new StreamDecoder({ limits });
     this.#onprogress = onprogress;
     this.#onerror = onerror;
@@ -42,18 +51,28 @@ export class Loader {
     return this.#download.received;
   }
 
+  /** Whether there is something to show. */
+  get showable() {
+    return this.orientation !== null && this.arrived > 0;
+  }
+
   /** Whether more is to arrive. */
   get lacking() {
-    if (this.complete) return false;
-    if (this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted) return true;
+    if (this.complete || this.error) return false;
+    if (this.preliminary || this.orientation === null || this.#asking > 0 || this.arrived < this.#wanted) return true;
     // What comes after all Gaussians, such as texture, is wanted with all of them.
     return this.#wanted === this.header.gaussians;
   }
 
+  /** Allows that the file is fetched. */
+  release() {
+    this.held = false;
+    this.start();
+  }
+
   /** Begins, or goes on: until header and orientation are there, and what `want` asked for. */
   start() {
-    const ended = this.#failed || this.#abort.signal.aborted;
-    if (this.lacking && !this.#running && !ended) void this.#run();
+    if (this.lacking && !this.#running && !this.#abort.signal.aborted) void this.#run();
   }
 
   /** Goes on, or stops, when the Gaussians have arrived that an output of this size needs. */
@@ -83,7 +102,9 @@ export class Loader {
 
   async #run() {
     this.#running = true;
-    while (this.lacking && !this.#failed) {
+    if (this.#placeholder) await this.#showPlaceholder();
+    while (this.lacking && !this.held) {
+      if (this.#abort.signal.aborted) return;
       const resumed = this.received > 0;
       try {
         await this.#transfer();
@@ -94,8 +115,9 @@ export class Loader {
         if (replaced) {
           this.#download.restart();
         } else {
-          this.#failed = true;
-          this.#onerror(error);
+          this.error = error;
+          this.#take(this.#decoder.progress);
+          this.#onerror();
         }
       }
     }
@@ -106,22 +128,47 @@ export class Loader {
     const { signal } = this.#abort;
     for await (const { bytes, first } of this.#download.pieces(signal)) {
       if (first && this.#fed) this.#begin();
-      this.#fed = true;
-      const { header, gaussians, ...progress } = await this.#decoder.feed(bytes);
-      if (signal.aborted) return;
-      this.header ??= header;
-      Object.assign(this, progress, { arrived: gaussians });
-      await this.#onprogress();
-      if (!this.lacking) return;
+      await this.#feed(bytes);
+      if (signal.aborted || !this.lacking) return;
     }
     await this.#decoder.finish();
+  }
+
+  async #feed(bytes, isPlaceholder = false) {
+    this.#fed = true;
+    const progress = await this.#decoder.feed(bytes);
+    if (this.#abort.signal.aborted) return;
+    this.#take(progress);
+    if (isPlaceholder && this.complete) {
+      this.preliminary = true;
+      this.complete = false;
+      this.#download.restart();
+    }
+    await this.#onprogress();
+  }
+
+  #take({ header, gaussians, ...progress }) {
+    this.header ??= header;
+    Object.assign(this, progress, { arrived: gaussians });
+  }
+
+  /** Decodes what is to be shown at once. If it is no beginning of a picture, the file tells all. */
+  async #showPlaceholder() {
+    const bytes = this.#placeholder;
+    this.#placeholder = null;
+    this.#download.beginWith(bytes);
+    try {
+      await this.#feed(bytes, true);
+    } catch {
+      this.#download.restart();
+    }
   }
 
   /** A decoder for a file from its beginning. */
   #begin() {
     this.#decoder.close();
     this.#decoder = new StreamDecoder({ limits: this.#limits });
-    const nothing = { colorSpace: false, texture: false, complete: false };
+    const nothing = { preliminary: false, colorSpace: false, texture: false, complete: false };
     Object.assign(this, { header: null, orientation: null, arrived: 0, ...nothing });
   }
 }

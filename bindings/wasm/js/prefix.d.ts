@@ -26,3 +26,12 @@ export function prefixes(bytes: Uint8Array): Prefix[];
  * `prefixes`, or if there is no complete layer.
  */
 export function prefix(bytes: Uint8Array, maxBytes: number): Uint8Array;
+
+/**
+ * The attribute `placeholder` of `<gip-image>`: the first bytes of the file, at most `maxBytes` (by default 400), up to
+ * where the last complete layer of them ends, in base64. Unlike `prefix` it makes no file of its own: the element goes
+ * on from here, and fetches only the rest.
+ *
+ * Throws as `prefix`.
+ */
+export function placeholder(bytes: Uint8Array, maxBytes?: number): string;

@@ -209,20 +209,31 @@ export function prefixes(bytes) {
   return new Layers(bytes).prefixes;
 }
 
-/** The longest small file of first layers that fits a number of bytes; see the declarations. */
-export function prefix(bytes, maxBytes) {
-  if (typeof maxBytes !== 'number' || !(maxBytes >= 0)) {
-    throw new RangeError(`maxBytes is ${String(maxBytes)}; it must be a number from 0 on`);
-  }
-  const layers = new Layers(bytes);
+function checkMost(maxBytes) {
+  if (typeof maxBytes === 'number' && maxBytes >= 0) return;
+  throw new RangeError(`maxBytes is ${String(maxBytes)}; it must be a number from 0 on`);
+}
+
+/** The longest of the prefixes of which `count` is at most so many, and says how many `what` has otherwise. */
+function longestOf(layers, maxBytes, count, what) {
   const all = layers.prefixes;
   if (all.length === 0) throw new GipError('the file has no complete layer');
-  const longest = all.filter((prefix) => prefix.bytes <= maxBytes).at(-1);
-  if (!longest) {
-    const least = all[0].bytes;
-    throw new RangeError(
-      `the file of the first layer has ${least} bytes; maxBytes is ${maxBytes}, and must be ${least} at least`,
-    );
-  }
-  return layers.file(longest);
+  const longest = all.filter((prefix) => prefix[count] <= maxBytes).at(-1);
+  if (longest) return longest;
+  const least = all[0][count];
+  throw new RangeError(`${what} has ${least} bytes; maxBytes is ${maxBytes}, and must be ${least} at least`);
+}
+
+/** The longest small file of first layers that fits a number of bytes; see the declarations. */
+export function prefix(bytes, maxBytes) {
+  checkMost(maxBytes);
+  const layers = new Layers(bytes);
+  return layers.file(longestOf(layers, maxBytes, 'bytes', 'the file of the first layer'));
+}
+
+/** What of a file an element shows before it is fetched; see the declarations. */
+export function placeholder(bytes, maxBytes = 400) {
+  checkMost(maxBytes);
+  const { end } = longestOf(new Layers(bytes), maxBytes, 'end', 'the file up to the first layer');
+  return btoa(Array.from(bytes.subarray(0, end), (byte) => String.fromCharCode(byte)).join(''));
 }

@@ -1,6 +1,8 @@
 // Decoders in workers, or on this thread where there can be none.
 
 import { GipError, unpack } from './errors.js';
+import { source, starts } from './place.js';
+import { firstOf } from './start.js';
 
 /** Most workers; each takes a few megabytes. */
 const mostWorkers = Math.max(1, Math.min(4, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1));
@@ -45,10 +47,9 @@ class WorkerThread {
 /** This thread. Each call is a task of its own, so that the page can do other things in between. */
 class OwnThread {
   decoders = 0;
-  #host = import('./host.js').then(async ({ Host }) => {
-    const host = new Host();
-    await host.load();
-    return host;
+  #host = import('./core.js').then(async ({ Decoder, Host, load }) => {
+    await load();
+    return new Host(Decoder);
   });
 
   async call(id, method, argument) {
@@ -59,49 +60,15 @@ class OwnThread {
   }
 }
 
-/** Waits until a worker has loaded its decoder. */
-function ready(worker) {
-  return new Promise((resolve, reject) => {
-    worker.onmessage = ({ data }) => {
-      if (data === 'ready') resolve(worker);
-      else reject(new GipError('a worker cannot load the decoder'));
-    };
-    worker.onerror = (event) => {
-      event.preventDefault();
-      reject(new GipError('there can be no worker'));
-    };
-  });
-}
-
-/** The ways to start a worker: a script of another origin needs one of this origin that imports it. */
-const starts = [
-  () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'image-gip' }),
-  () => {
-    const script = `import ${JSON.stringify(new URL('./worker.js', import.meta.url).href)};`;
-    const url = URL.createObjectURL(new Blob([script], { type: 'text/javascript' }));
-    const worker = new Worker(url, { type: 'module', name: 'image-gip' });
-    setTimeout(() => URL.revokeObjectURL(url), 60_000);
-    return worker;
-  },
-];
-
 const threads = new Set();
 let canStart = typeof Worker === 'function';
 let starting = null;
 let own = null;
 
 async function startWorker() {
-  for (const start of starts) {
-    let worker;
-    try {
-      worker = start();
-      threads.add(new WorkerThread(await ready(worker)));
-      return;
-    } catch {
-      worker?.terminate();
-    }
-  }
-  canStart = false;
+  const worker = await firstOf(starts, source);
+  if (worker) threads.add(new WorkerThread(worker));
+  else canStart = false;
 }
 
 /** The thread for the next decoder: the one with the fewest. */

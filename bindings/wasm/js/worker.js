@@ -1,20 +1,20 @@
-// The worker: takes calls, and answers them in their order.
+// The worker: loads the decoder that it is given, takes calls, and answers them in their order.
 
+import { Decoder, Host, load } from './core.js';
 import { pack } from './errors.js';
-import { Host } from './host.js';
 
-const host = new Host();
+const host = new Host(Decoder);
 
-self.onmessage = async ({ data: { call, id, method, argument } }) => {
+async function answer({ call, id, method, argument }) {
   try {
     const [result, transfer = []] = await host.call(id, method, argument);
     self.postMessage({ call, result }, transfer);
   } catch (error) {
     self.postMessage({ call, error: pack(error) });
   }
-};
+}
 
-host.load().then(
-  () => self.postMessage('ready'),
-  () => self.postMessage('failed'),
-);
+self.onmessage = async ({ data }) => {
+  if (!('module' in data)) return answer(data);
+  self.postMessage(await load(data.module).then(() => 'ready', () => 'failed'));
+};

@@ -265,8 +265,8 @@ test('a file that was replaced meanwhile is loaded from its beginning', async ()
 
 const broken = {
   'not-a-picture.gip': ['signature', Buffer.from('<!doctype html>')],
-  'damaged.gip': ['malformed', Buffer.concat([picture.subarray(0, 3000), Buffer.alloc(picture.length - 3000)])],
-  'truncated.gip': ['unexpected-end', picture.subarray(0, picture.length / 2)],
+  'damaged-early.gip': ['malformed', Buffer.concat([picture.subarray(0, 60), Buffer.alloc(picture.length - 60)])],
+  'truncated-early.gip': ['unexpected-end', picture.subarray(0, 30)],
   'empty.gip': ['unexpected-end', Buffer.alloc(0)],
   'missing.gip': ['network', null],
 };
@@ -292,6 +292,61 @@ for (const [name, [kind, bytes]] of Object.entries(broken)) {
       await settled(page);
       assert.equal((await canvasOf(page)).width, 96);
     }, { quiet: true });
+  });
+}
+
+test('in place of a broken picture there is what is inside the element, if there is something', async () => {
+  const inside = '<noscript>never</noscript><b style="display: inline-block; width: 70px">fallback</b>';
+  await withPage(`${script}<gip-image src="/missing.gip" alt="A mountain">${inside}</gip-image>`, async (page) => {
+    const width = () => page.evaluate(() => document.querySelector('b').getBoundingClientRect().width);
+    await settled(page);
+    await until(async () => (await width()) === 70, 'the fallback');
+    await page.evaluate(() => document.querySelector('gip-image').setAttribute('src', '/picture.gip'));
+    await settled(page);
+    assert.equal(await width(), 0);
+    assert.equal((await canvasOf(page)).width, 96);
+  }, { quiet: true });
+});
+
+const partial = {
+  'damaged.gip': ['malformed', Buffer.concat([picture.subarray(0, 3000), Buffer.alloc(picture.length - 3000)])],
+  'truncated.gip': ['unexpected-end', picture.subarray(0, picture.length / 2)],
+};
+
+for (const [name, [kind, bytes]] of Object.entries(partial)) {
+  test(`${name}: the part that arrived, and an event that says so`, async () => {
+    // All at once, and in pieces.
+    const routes = [file(bytes), slow(bytes, { piece: 700 }).route];
+    for (const route of routes) {
+      harness.routes[`/${name}`] = route;
+      const watch = `<script>
+        globalThis.events = [];
+        for (const type of ['incomplete', 'error', 'load']) {
+          document.addEventListener(type, ({ target, error }) => {
+            if (target.localName === 'gip-image') events.push([type, error?.kind ?? null, target.incomplete]);
+          }, true);
+        }
+      </script>`;
+      await withPage(`${watch}${element(`src="/${name}" alt="A mountain"`)}`, async (page) => {
+        await settled(page);
+        assert.deepEqual(await page.evaluate(() => globalThis.events), [['incomplete', kind, true], ['load', null, true]]);
+        const wanted = await page.evaluate(async (name) => {
+          const { StreamDecoder } = await import('/dist/index.js');
+          const bytes = new Uint8Array(await (await fetch(name)).arrayBuffer());
+          const decoder = new StreamDecoder();
+          await decoder.feed(bytes).catch(() => {});
+          const { data } = await decoder.render();
+          return { data: [...data], arrived: decoder.arrived, declared: decoder.header.gaussians };
+        }, `/${name}`);
+        assert.ok(wanted.arrived >= 40 && wanted.arrived < wanted.declared, wanted.arrived);
+        assert.equal(difference(await canvasOf(page), wanted), 0);
+        await page.evaluate(() => document.querySelector('gip-image').decode());
+        // Another source has nothing of it.
+        await page.evaluate(() => document.querySelector('gip-image').setAttribute('src', '/picture.gip'));
+        await settled(page);
+        assert.equal(await page.evaluate(() => document.querySelector('gip-image').incomplete), false);
+      });
+    }
   });
 }
 
@@ -347,16 +402,20 @@ test('it can be taken out of the page and put back, and moved', async () => {
   });
 });
 
-test('a lost connection is an error too', async () => {
-  harness.routes['/lost.gip'] = (_, response) => {
-    response.writeHead(200, { 'Content-Length': picture.length });
-    response.write(picture.subarray(0, 2000), () => setTimeout(() => response.destroy(), 100));
-  };
-  await withPage(element('src="/lost.gip" alt="Lost"'), async (page) => {
-    await settled(page);
-    assert.equal(await page.evaluate(() => document.querySelector('gip-image').shadowRoot.textContent), 'Lost');
-  }, { quiet: true });
-});
+for (const [sent, outcome] of [[30, 'error'], [2000, 'incomplete']]) {
+  test(`a connection that is lost after ${sent} bytes: ${outcome}`, async () => {
+    harness.routes['/lost.gip'] = (_, response) => {
+      response.writeHead(200, { 'Content-Length': picture.length });
+      response.write(picture.subarray(0, sent), () => setTimeout(() => response.destroy(), 100));
+    };
+    await withPage(element('src="/lost.gip" alt="Lost"'), async (page) => {
+      await settled(page);
+      const text = await page.evaluate(() => document.querySelector('gip-image').shadowRoot.textContent);
+      assert.equal(text, outcome === 'error' ? 'Lost' : '');
+      assert.equal(await page.evaluate(() => document.querySelector('gip-image').incomplete), outcome === 'incomplete');
+    }, { quiet: true });
+  });
+}
 
 test('it is an image with a name to those who do not see it', async () => {
   const html = `${script}<gip-image src="/picture.gip" alt="A mountain"></gip-image>

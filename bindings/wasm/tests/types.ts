@@ -3,7 +3,10 @@
 import { decode, GipError, LimitError, open, StreamDecoder } from '../dist/index.js';
 import type { Header, Picture, Region, Samples, Source } from '../dist/index.js';
 import { Decoder, load, memorySize } from '../dist/core.js';
-import { prefix, prefixes } from '../dist/prefix.js';
+import { encode } from '../dist/encoder.js';
+import { encode as encodeHere, load as loadEncoder } from '../dist/encoder-core.js';
+import { placeholder, prefix, prefixes } from '../dist/prefix.js';
+import { install } from '../dist/transparent.js';
 import type { GipImageElement } from '../dist/gip-image.js';
 
 export async function everything(source: Source, signal: AbortSignal): Promise<void> {
@@ -40,6 +43,19 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   await decode(source, { orientation: 6 });
   // @ts-expect-error: there is no such colour model
   await picture.samples({ color: 'cmyk' });
+}
+
+export async function encoding(image: ImageData, signal: AbortSignal): Promise<string> {
+  const onprogress = ({ fraction }: { fraction: number }) => void fraction;
+  const { file, report } = await encode(new Blob(), { quality: 60, effort: 2, signal, onprogress, colorSpace: 'display-p3' });
+  const shortfall: string | null = report.shortfall;
+  await loadEncoder();
+  const other: Uint8Array = encodeHere({ ...image, channels: 4 }, { bytes: 300, metadata: { cicp: [12, 13] } }).file;
+  const registration: ServiceWorkerRegistration = await install('/service-worker.js', { scope: '/' });
+  void [shortfall, other, registration];
+  // @ts-expect-error: there is no such tuning
+  await encode(image, { tune: 'loud' });
+  return placeholder(file, 400);
 }
 
 export function chunkOf(error: unknown): string | null {

@@ -78,8 +78,8 @@ impl TrainingKernel for simd_kernel::Quartic {
     }
 
     #[inline(always)]
-    fn forward<S: Simd>(self, _: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
-        let root = (-v).fused_mul_add(v, column).max(0.0);
+    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+        let root = simd_kernel::larger(simd, (-v).fused_mul_add(v, column), 0.0);
         (root, root * root)
     }
 

@@ -13,6 +13,7 @@ use crate::encode::options::Tune;
 use crate::encode::progress::Observer;
 use crate::encode::sample_tile::{FULL_SCALE, SampleTile, TilePlane, inside};
 use crate::encode::source::Source;
+use crate::render::simd_kernel::{larger, smaller};
 use crate::render::tile_grid::TILE_HEIGHT;
 
 // Constants: docs/tuning.md, "What a person sees".
@@ -151,7 +152,6 @@ impl PictureLoss {
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
         let zero = f32x16::splat(simd, 0.0);
-        let one = f32x16::splat(simd, 1.0);
         let inside = inside(simd, size[0]);
         let mut total = zero;
         for channel in 0..CHANNELS {
@@ -162,7 +162,8 @@ impl PictureLoss {
                 let value = rendering[channel][row];
                 let residual = residual(simd, (value - target) * inside, sample);
                 residual.store_array(&mut planes[channel][row]);
-                let clamped = (value.max(zero).min(one) - target) * inside;
+                let clamped = smaller(simd, larger(simd, value, 0.0), 1.0);
+                let clamped = (clamped - target) * inside;
                 total = clamped.fused_mul_add(clamped, total);
             }
         }
@@ -210,8 +211,8 @@ fn half_step(source: &Source<'_>) -> f32 {
 #[inline(always)]
 pub(crate) fn residual<S: Simd>(simd: S, difference: f32x16<S>, sample: f32x16<S>) -> f32x16<S> {
     let zero = f32x16::splat(simd, 0.0);
-    let residual = sample.simd_ge(FULL_SCALE).select(difference.min(zero), difference);
-    sample.simd_le(zero).select(residual.max(zero), residual)
+    let residual = sample.simd_ge(FULL_SCALE).select(smaller(simd, difference, 0.0), difference);
+    sample.simd_le(zero).select(larger(simd, residual, 0.0), residual)
 }
 
 #[cfg(test)]

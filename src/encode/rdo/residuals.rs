@@ -16,6 +16,7 @@ use crate::encode::sample_tile::{FULL_SCALE, SampleLine, TILE_WIDTH};
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::Gaussian;
 use crate::kernel::QUARTIC_RADIUS;
+use crate::render::simd_kernel::{larger, smaller};
 use crate::render::tile_grid::TILE_HEIGHT;
 use crate::simd::LANES;
 
@@ -347,7 +348,8 @@ pub(crate) fn load<S: Simd>(simd: S, stored: &[i16]) -> f32x16<S> {
 #[inline(always)]
 pub(crate) fn store<S: Simd>(simd: S, residuals: f32x16<S>, to: &mut [i16]) {
     let to: &mut [i16; LANES] = to.first_chunk_mut().expect("lines are padded");
-    let scaled = residuals.max(-MOST).min(MOST) * UNIT + f32x16::splat(simd, ROUNDER);
+    let within = smaller(simd, larger(simd, residuals, -MOST), MOST);
+    let scaled = within * UNIT + f32x16::splat(simd, ROUNDER);
     let scaled = scaled.to_array();
     for lane in 0..LANES {
         to[lane] = scaled[lane].to_bits() as i16;

@@ -1,5 +1,5 @@
-//! CRC-32 (spec, section 4.2) with the interface of the crate `crc32fast`, as far as the decoder
-//! uses it. `Cargo.toml` puts it in the place of that crate.
+//! CRC-32 (spec, section 4.2) with the interface of the crate `crc32fast`, as far as decoder and encoder
+//! use it. `Cargo.toml` puts it in the place of that crate.
 //!
 //! The tables of `crc32fast` are 16 kB that do not compress. A file is short, so that one byte at a
 //! time is fast enough.
@@ -52,4 +52,12 @@ impl Hasher {
     pub const fn finalize(self) -> u32 {
         !self.0
     }
+}
+
+/// The CRC of bytes that are there all at once.
+#[must_use]
+pub fn hash(bytes: &[u8]) -> u32 {
+    let mut hasher = Hasher::new();
+    hasher.update(bytes);
+    hasher.finalize()
 }

@@ -1,0 +1,13 @@
+// Where the decoder is: in this script.
+
+import script from 'embedded:worker.js';
+import module from 'embedded:image_gip_bg.wasm';
+
+import { workerOfText } from '../files.js';
+import { compiledOnce } from './compile.js';
+
+/** The WebAssembly, which is compiled once for all threads. */
+export const source = compiledOnce(module);
+
+/** The ways to start a worker. */
+export const starts = [() => workerOfText(script, { name: 'image-gip' })];

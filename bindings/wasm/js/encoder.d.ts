@@ -1,0 +1,38 @@
+/** The encoder, in workers of its own. It is loaded when it is used first. */
+
+import type { EncodeOptions, Encoded, Pixels, Progress } from './encoder-types.js';
+
+export type { EncodeOptions, Encoded, Pixels, Progress, Target } from './encoder-types.js';
+export { GipError, LimitError } from './errors.js';
+
+/** What a browser can draw, or a file in a format that it knows; turned upright. */
+export type Drawable =
+  | Blob
+  | ImageBitmap
+  | HTMLImageElement
+  | HTMLCanvasElement
+  | OffscreenCanvas
+  | HTMLVideoElement
+  | VideoFrame;
+
+/**
+ * Encodes a picture. The same pixels and options give the same file, in all browsers and in Node; natively they give
+ * another one that is as good.
+ *
+ * Rejects with a `RangeError` or a `TypeError` if an option or the picture is out of range, with a `LimitError` if
+ * decoders would refuse the file, with the reason of the signal if that is aborted, and with a `GipError` if the
+ * worker fails, for instance for want of memory.
+ */
+export function encode(
+  picture: Pixels | ImageData | Drawable,
+  options?: EncodeOptions & {
+    /** Aborting it ends the worker at once. */
+    signal?: AbortSignal;
+    /** Called on this thread, at most every 50 ms. */
+    onprogress?: (progress: Progress) => void;
+    /** Whether the samples may be moved to the worker, so that they are not copied and gone afterwards. */
+    transfer?: boolean;
+    /** The colour space in which what can be drawn is read. Default `srgb`. */
+    colorSpace?: 'srgb' | 'display-p3';
+  },
+): Promise<Encoded>;

@@ -1,0 +1,63 @@
+// `.gip` wherever a browser shows a picture, by a service worker.
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { test } from 'node:test';
+
+import { file, harness, until, withPage } from './harness.js';
+import { makePicture } from './picture.js';
+
+const picture = makePicture({ width: 96, height: 64, layers: [40, 160] });
+const gif = Buffer.from('R0lGODlhAQABAIAAAP///wAAACH5BAAAAAAALAAAAAABAAEAAAICRAEAOw==', 'base64');
+harness.routes['/photo.gip'] = file(picture);
+harness.routes['/part.gip'] = file(picture.subarray(0, picture.length / 2));
+harness.routes['/other.gip'] = (_, response) => response.writeHead(200, { 'Content-Type': 'image/gif' }).end(gif);
+harness.routes['/style.css'] = (_, response) =>
+  response.writeHead(200, { 'Content-Type': 'text/css' }).end('p { width: 96px; height: 64px; background: url(/photo.gip) }');
+// At the root of the site, so that it is for all pages.
+harness.routes['/service-worker.js'] = (_, response) => {
+  const script = readFileSync(new URL('../dist/service-worker.js', import.meta.url));
+  response.writeHead(200, { 'Content-Type': 'text/javascript' }).end(script);
+};
+
+const html = `<link rel="stylesheet" href="/style.css">
+  <img src="/photo.gip" alt="">
+  <picture><source srcset="/photo.gip" type="image/png"><img src="/missing.png" alt=""></picture>
+  <img src="/part.gip" alt=""><img src="/other.gip" alt=""><p></p>`;
+
+test('images, sources and backgrounds are shown, on the first visit and on later ones', async () => {
+  await withPage(html, async (page) => {
+    const widths = () => page.evaluate(() => [...document.images].map(({ naturalWidth }) => naturalWidth));
+    /** The mean of what is on the screen where the background is, and where the first image is. */
+    const colors = async () => {
+      const means = [];
+      for (const selector of ['img', 'p']) {
+        const shot = (await page.locator(selector).first().screenshot()).toString('base64');
+        means.push(await page.evaluate(async (shot) => {
+          const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${shot}`)).blob());
+          const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+          context.drawImage(bitmap, 0, 0);
+          const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+          return data.reduce((sum, value) => sum + value, 0) / data.length;
+        }, shot));
+      }
+      return means;
+    };
+    const isShown = async () => {
+      if (JSON.stringify(await widths()) !== '[96,96,96,1]') return false;
+      const [image, background] = await colors();
+      return Math.abs(image - background) < 0.5;
+    };
+    assert.equal((await widths())[0], 0);
+    await page.evaluate(async () => {
+      const { install } = await import('/dist/transparent.js');
+      await install();
+    });
+    await until(isShown, 'all pictures');
+    await page.reload();
+    await until(isShown, 'all pictures on the next visit');
+    // Scripts get the file itself.
+    const size = await page.evaluate(async () => (await (await fetch('/photo.gip')).arrayBuffer()).byteLength);
+    assert.equal(size, picture.length);
+  }, { quiet: true });
+});

@@ -1,0 +1,124 @@
+// A picture that the page makes a .gip of.
+
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { after, before, test } from 'node:test';
+
+import { drop, missing, openViewer, settled, start } from './viewer.js';
+
+let viewer;
+
+if (!missing) {
+  before(async () => {
+    viewer = await start();
+  });
+  after(() => viewer?.stop());
+}
+
+/** A PNG of a disc on a gradient, made in the page. */
+async function picture(page, { width = 160, height = 120 } = {}) {
+  const text = await page.evaluate(async ([width, height]) => {
+    const canvas = new OffscreenCanvas(width, height);
+    const context = canvas.getContext('2d');
+    const gradient = context.createLinearGradient(0, 0, width, height);
+    gradient.addColorStop(0, 'rgb(30 60 140)');
+    gradient.addColorStop(1, 'rgb(240 180 90)');
+    context.fillStyle = gradient;
+    context.fillRect(0, 0, width, height);
+    context.fillStyle = 'rgb(250 240 220)';
+    context.arc(width / 3, height / 2, height / 4, 0, 7);
+    context.fill();
+    const bytes = new Uint8Array(await (await canvas.convertToBlob()).arrayBuffer());
+    return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(''));
+  }, [width, height]);
+  return { name: 'evening.png', type: 'image/png', bytes: Buffer.from(text, 'base64') };
+}
+
+/** Waits until the file is made, and its picture is at rest. */
+async function made(page) {
+  await page.waitForSelector('#maker[aria-busy="false"] [name="download"]:not(:disabled)');
+  await settled(page);
+}
+
+const download = async (page) => {
+  const [file] = await Promise.all([page.waitForEvent('download'), page.click('#maker [name="download"]')]);
+  return { name: file.suggestedFilename(), bytes: await readFile(await file.path()) };
+};
+
+function onPage(name, options, run) {
+  test(name, { skip: missing, timeout: 90_000 }, async () => {
+    const { page, problems, close } = await openViewer(viewer, '/', { reducedMotion: 'reduce', ...options });
+    try {
+      await run(page);
+      assert.deepEqual(problems, []);
+    } finally {
+      await close();
+    }
+  });
+}
+
+onPage('a picture that is dropped becomes a .gip, with the original beside it', {}, async (page) => {
+  await drop(page, await picture(page));
+  await made(page);
+  assert.equal(await page.title(), 'evening.gip - gip viewer');
+  assert.equal(await page.textContent('#beside'), 'original');
+  assert.equal(await page.getAttribute('[data-action="compare"]', 'aria-pressed'), 'true');
+  assert.match(await page.textContent('#maker [name="size"]'), /^original: [\d,]+ bytes; \.gip: [\d,]+ bytes$/);
+  const { name, bytes } = await download(page);
+  assert.equal(name, 'evening.gip');
+  assert.deepEqual([...bytes.subarray(0, 4)], [0xc7, 0x47, 0x49, 0x50]);
+  // Half a bit for each of 160 x 120 pixels.
+  assert.ok(bytes.length <= 1200 && bytes.length > 600, bytes.length);
+});
+
+onPage('with more bytes it is made anew, and the window stays where it is', {}, async (page) => {
+  await drop(page, await picture(page));
+  await made(page);
+  const first = (await download(page)).bytes.length;
+  await page.keyboard.press('+');
+  await settled(page);
+  const zoom = await page.textContent('#zoom');
+  await page.locator('#maker [name="bytes"]').fill('800');
+  await page.waitForSelector('#maker[aria-busy="true"]');
+  await made(page);
+  assert.ok((await download(page)).bytes.length > 1.5 * first);
+  assert.equal(await page.textContent('#zoom'), zoom);
+});
+
+onPage('it is compared with what the browser makes of as many bytes', {}, async (page) => {
+  await drop(page, await picture(page, { width: 320, height: 240 }));
+  await made(page);
+  const { length } = (await download(page)).bytes;
+  for (const [type, label] of [['image/jpeg', 'JPEG'], ['image/webp', 'WebP']]) {
+    await page.selectOption('#maker [name="rival"]', type);
+    await page.waitForFunction((label) => document.querySelector('#maker [name="size"]').textContent.startsWith(label), label);
+    const text = await page.textContent('#maker [name="size"]');
+    const bytes = Number(/: ([\d,]+) bytes/.exec(text)[1].replaceAll(',', ''));
+    assert.ok(bytes <= length || text.includes('none that is as small'), text);
+    assert.equal(await page.textContent('#beside'), label);
+  }
+  await page.selectOption('#maker [name="rival"]', 'image/avif');
+  await page.waitForSelector('#message:not([hidden])');
+  assert.match(await page.textContent('#message p'), /does not write AVIF/);
+});
+
+onPage('a .gip that is opened takes its place, and encoding can be stopped', {}, async (page) => {
+  await drop(page, await picture(page, { width: 640, height: 480 }));
+  await page.waitForSelector('#maker [name="cancel"]:not([hidden])');
+  await page.click('#maker [name="cancel"]');
+  await page.waitForSelector('#maker[aria-busy="false"]');
+  const sample = await readFile(new URL('../sample/sumac.gip', import.meta.url));
+  await drop(page, { name: 'sumac.gip', bytes: sample });
+  await settled(page);
+  assert.equal(await page.title(), 'sumac.gip - gip viewer');
+  assert.equal(await page.isHidden('#maker'), true);
+});
+
+onPage('it fits on a phone', { viewport: { width: 360, height: 740 }, hasTouch: true, colorScheme: 'dark' }, async (page) => {
+  await drop(page, await picture(page));
+  await made(page);
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+  assert.ok(wide <= 360, wide);
+  const { height } = await page.locator('#stage').boundingBox();
+  assert.ok(height > 300, height);
+});
