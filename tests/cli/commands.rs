@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageEncoder, ImageReader};
@@ -821,5 +822,40 @@ fn help_is_printed_on_request() {
         let help = room.ok(&[command, "--help"]);
         assert!(help.contains(&format!("Usage: gip {command} ")), "{help}");
         assert_eq!(room.ok(&["help", command]), help);
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn messages_that_nobody_can_read_change_no_status() {
+    let room = Room::new();
+    room.save_picture("a.png", &pictures::picture((40, 30), ColorType::Rgb8));
+    room.ok(&["encode", "a.png", "a.gip", "--effort", "1"]);
+    room.write("broken.gip", &room.read("a.gip")[..20]);
+    let status = |args: &[&str]| {
+        let full = fs::File::options().write(true).open("/dev/full").expect("Linux has it");
+        let mut gip = Command::new(env!("CARGO_BIN_EXE_gip"));
+        let gip = gip.args(args).current_dir(room.path(".")).stdout(Stdio::null()).stderr(full);
+        gip.status().expect("the binary was built").code()
+    };
+    assert_eq!(status(&["info", "a.gip", "broken.gip"]), Some(3));
+    assert_eq!(status(&["info", "broken.gip"]), Some(1));
+    assert_eq!(status(&["encode", "a.png", "-", "--effort", "1"]), Some(0));
+}
+
+#[test]
+fn no_result_takes_the_place_of_its_input() {
+    let room = Room::new();
+    room.save_picture("a.png", &pictures::picture((40, 30), ColorType::Rgb8));
+    room.ok(&["encode", "a.png", "a.gip", "--effort", "1"]);
+    let file = room.read("a.gip");
+    room.write("b/c", "");
+    for args in [
+        ["decode", "--format", "png", "a.gip", "a.gip"],
+        ["decode", "--format", "png", "a.gip", "b/../a.gip"],
+        ["export", "--format", "json", "./a.gip", "a.gip"],
+    ] {
+        assert!(room.fails(&args).contains("a.gip is the input; use another name"), "{args:?}");
+        assert_eq!(room.read("a.gip"), file);
     }
 }

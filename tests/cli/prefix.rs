@@ -58,6 +58,7 @@ fn what_cannot_be_done_is_told_and_leaves_the_output_alone() {
         (["prefix", "cut.gip", "900", "small.gip"], 1, "cut.gip: has no complete layer"),
         (["prefix", "picture.png", "900", "small.gip"], 1, "not a .gip file"),
         (["prefix", "none.gip", "900", "small.gip"], 1, "none.gip"),
+        (["prefix", "a.gip", "300", "./a.gip"], 1, "a.gip is the input; use another name"),
         (["prefix", "a.gip", "many", "small.gip"], 2, "many"),
         (
             ["prefix", "a.gip", "300", "picture.png"],

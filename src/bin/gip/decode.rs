@@ -19,6 +19,7 @@ const MOST_SKIPPED: usize = 16;
 
 pub(crate) fn run(args: &args::Decode) -> Result<()> {
     let output = Output::new(&args.output)?;
+    output.check_is_not(&args.input)?;
     let codec = Codec::of(&args.output, args.format.as_deref())?;
     let times = args.keep.preserve_times.then(|| output.times_of(&args.input)).transpose()?;
     let file = files::read(&args.input)?;

@@ -51,10 +51,15 @@ pub(crate) fn unique_text(path: &Path) -> String {
     text
 }
 
+/// Prints a line to standard error. Where nobody can read it, the work is no worse for it.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
 /// Prints what of an input is lost to standard error.
 pub(crate) fn warn(input: &Path, warnings: &[String]) {
     for warning in warnings {
-        let _ = writeln!(io::stderr(), "warning: {}: {warning}", input_name(input));
+        tell(&format!("warning: {}: {warning}", input_name(input)));
     }
 }
 
@@ -80,12 +85,11 @@ pub(crate) fn times(path: &Path) -> Result<FileTimes> {
 /// Prints text to standard output, or to standard error if the output file goes to standard output.
 /// It is not an error if the reader has closed the pipe.
 pub(crate) fn print(text: &str, output: Option<&Path>) -> Result<()> {
-    let written = if output.is_some_and(is_standard_stream) {
-        writeln!(io::stderr(), "{text}")
-    } else {
-        writeln!(io::stdout(), "{text}")
-    };
-    match written {
+    if output.is_some_and(is_standard_stream) {
+        tell(text);
+        return Ok(());
+    }
+    match writeln!(io::stdout(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
         _ => Ok(()),
     }
@@ -138,6 +142,15 @@ impl Output {
                 "{}: gip {command} writes .gip files only; use a name that ends in .gip, or --force",
                 path.display()
             );
+        }
+        Ok(())
+    }
+
+    /// Refuses to replace the input by what is made of it, which has less than the input.
+    pub(crate) fn check_is_not(&self, input: &Path) -> Result<()> {
+        let Self::Regular { path, .. } = self else { return Ok(()) };
+        if input.canonicalize().is_ok_and(|input| input == *path) {
+            bail!("{} is the input; use another name", path.display());
         }
         Ok(())
     }

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &args::Info) -> Result<ExitCode> {
                 shown += 1;
             }
             Err(error) => {
-                eprintln!("error: {}", one_line(&error));
+                files::tell(&format!("error: {}", one_line(&error)));
                 failed = true;
             }
         }

@@ -38,7 +38,7 @@ fn main() -> ExitCode {
         Command::Import(args) => gaussians::import(&args).map(success),
     };
     outcome.unwrap_or_else(|error| {
-        eprintln!("error: {}", errors::one_line(&error));
+        files::tell(&format!("error: {}", errors::one_line(&error)));
         ExitCode::from(errors::exit_status(&error))
     })
 }

@@ -12,6 +12,7 @@ pub(crate) fn run(args: &args::Prefix) -> Result<()> {
     if !args.force {
         output.check_name("prefix")?;
     }
+    output.check_is_not(&args.input)?;
     let file = files::read(&args.input)?;
     let prefixes = Prefixes::new(&file).with_context(|| files::input_name(&args.input))?;
     let Some(prefix) = prefixes.within(args.bytes) else {

@@ -102,10 +102,10 @@ impl Batch {
     /// Tells what will not be done.
     fn tell_rest(&self) {
         for line in self.rest.left_out.lines() {
-            eprintln!("{line}");
+            files::tell(&line);
         }
         for error in self.rest.failed.values() {
-            eprintln!("error: {error}");
+            files::tell(&format!("error: {error}"));
         }
     }
 

@@ -12,6 +12,7 @@ use crate::files::{self, Output};
 
 pub(crate) fn run(args: &args::Export) -> Result<()> {
     let output = Output::new(&args.output)?;
+    output.check_is_not(&args.input)?;
     let format = format_of(args.format, &args.output)?;
     let context = || files::input_name(&args.input);
     let limits = args.limits.limits();
