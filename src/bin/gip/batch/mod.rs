@@ -9,7 +9,9 @@ mod manifest;
 mod outputs;
 mod run;
 mod selection;
+mod shards;
 mod stop;
+mod tar;
 mod task;
 mod workers;
 
