@@ -22,3 +22,4 @@ mod prefix;
 mod room;
 mod square;
 mod tiff;
+mod transform;
