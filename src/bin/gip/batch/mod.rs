@@ -13,6 +13,7 @@ mod shards;
 mod stop;
 mod tar;
 mod task;
+mod work;
 mod workers;
 
 pub(crate) use run::run;

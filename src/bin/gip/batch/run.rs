@@ -1,29 +1,28 @@
 //! The run of a batch, from its arguments to its exit status.
 
-use core::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image_gip::EncodeError;
-use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::age;
 use super::budget::Budget;
 use super::failure::{catch_panic, is_disk_full};
-use super::inputs::{self, Item, Rest};
+use super::inputs::{self, Item};
 use super::manifest::{self, Manifest, Record, Written};
 use super::outputs::{self, Plan};
 use super::selection::Selection;
 use super::shards;
 use super::stop::{self, Stop};
 use super::task::{Facts, Task};
+use super::work::{Batch, Tally, bar};
 use super::workers;
 use crate::args;
 use crate::errors::{SOME_FAILED, WrongUsage, one_line};
@@ -93,27 +92,6 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
         None if tally.failed.into_inner() > 0 || !batch.rest.failed.is_empty() => SOME_FAILED,
         None => 0,
     }))
-}
-
-/// What is done, to which files, and how many of them at the same time.
-pub(super) struct Batch {
-    task: Task,
-    pub(super) items: Vec<Item>,
-    rest: Rest,
-    /// Whether results get the times of their sources.
-    preserve_times: bool,
-    pub(super) jobs: usize,
-    budget: Budget,
-    pub(super) stop: Stop,
-}
-
-/// What has been done.
-#[derive(Debug, Default)]
-pub(super) struct Tally {
-    pub(super) written: AtomicUsize,
-    pub(super) bytes: AtomicU64,
-    pub(super) failed: AtomicUsize,
-    pub(super) is_disk_full: AtomicBool,
 }
 
 impl Batch {
@@ -193,18 +171,6 @@ impl Batch {
         fatal.into_inner().map_or(Ok(tally), Err)
     }
 
-    /// Makes the bytes of the result of one file.
-    pub(super) fn bytes(&self, item: &Item) -> Result<(Vec<u8>, Facts)> {
-        let stamp = || age::stamp(&item.source).with_context(|| item.source.display().to_string());
-        let before = stamp()?;
-        let made = self.task.perform(item, &self.budget, &self.stop)?;
-        // The result will be newer, and would never be made again.
-        if stamp()? != before {
-            bail!("{}: the file changed while it was worked on", item.source.display());
-        }
-        Ok(made)
-    }
-
     /// Makes the result of one file.
     fn result(&self, item: &Item) -> Result<Facts> {
         let times = self.preserve_times.then(|| files::times(&item.source)).transpose()?;
@@ -241,22 +207,9 @@ impl Batch {
     }
 }
 
-/// A progress bar, which is visible on a terminal only.
-pub(super) fn bar(length: usize) -> Result<ProgressBar> {
-    let template = "{bar:40} {pos}/{len}  {rate}  {eta} left  {msg}";
-    let style = ProgressStyle::with_template(template)?;
-    let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
-        _ = write!(out, "{:.2} files/s", state.per_sec());
-    });
-    let bar = ProgressBar::new(length as u64).with_style(style);
-    if !bar.is_hidden() {
-        bar.enable_steady_tick(Duration::from_millis(500));
-    }
-    Ok(bar)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::inputs::Rest;
     use super::*;
     use crate::source::Reading;
     use image_gip::{Limits, RenderOptions};
