@@ -3,6 +3,8 @@
 use alloc::vec::Vec;
 
 use crate::error::RequestError;
+#[cfg(feature = "encode")]
+use crate::gaussian::Gaussian;
 use crate::region::Region;
 
 /// How a picture as stored is turned for display, as Exif has it (spec, section 5.5). See
@@ -123,6 +125,46 @@ impl Orientation {
         turned
     }
 
+    /// The orientation that turns a picture as this one and then the next one do.
+    ///
+    /// ```
+    /// use image_gip::Orientation;
+    ///
+    /// let turned = Orientation::Rotate90.then(Orientation::FlipHorizontal);
+    /// assert_eq!(turned, Orientation::Rotate90FlipH);
+    /// ```
+    #[must_use]
+    pub fn then(self, next: Self) -> Self {
+        let (columns, rows) = (next.mirrors_columns(), next.mirrors_rows());
+        // What the next one mirrors, along the axes as stored.
+        let (columns, rows) = if self.exchanges_axes() { (rows, columns) } else { (columns, rows) };
+        let is_it = |both: &Self| {
+            both.exchanges_axes() == (self.exchanges_axes() != next.exchanges_axes())
+                && both.mirrors_columns() == (self.mirrors_columns() != columns)
+                && both.mirrors_rows() == (self.mirrors_rows() != rows)
+        };
+        Self::ALL.into_iter().find(is_it).expect("they are a group")
+    }
+
+    /// Turns a Gaussian of a picture of `width` x `height` pixels as stored. Where rows stay rows, its shape is exact;
+    /// all else is rounded to `f32`.
+    #[cfg(feature = "encode")]
+    #[must_use]
+    pub fn apply_to_gaussian(self, gaussian: &Gaussian, width: f32, height: f32) -> Gaussian {
+        let ([x, y], [l11, l21, l22]) = (gaussian.center, gaussian.cholesky);
+        let x = if self.mirrors_columns() { width - x } else { x };
+        let y = if self.mirrors_rows() { height - y } else { y };
+        let l21 = if self.mirrors_columns() == self.mirrors_rows() { l21 } else { -l21 };
+        if !self.exchanges_axes() {
+            return Gaussian { center: [x, y], cholesky: [l11, l21, l22], ..*gaussian };
+        }
+        // The Cholesky factor of the covariance with its axes exchanged.
+        let [l11, l21, l22] = [l11, l21, l22].map(f64::from);
+        let extent = l21.hypot(l22);
+        let cholesky = [extent, l11 * l21 / extent, l11 * l22 / extent].map(|entry| entry as f32);
+        Gaussian { center: [y, x], cholesky, ..*gaussian }
+    }
+
     /// Whether rows as stored are columns of the upright picture.
     fn exchanges_axes(self) -> bool {
         use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
@@ -166,6 +208,47 @@ mod tests {
         }
         assert_eq!([0, 9, 255].map(Orientation::from_exif), [None; 3]);
         assert!(Orientation::Rotate90.apply::<u16>(&[], 0, 3).is_empty());
+    }
+
+    #[test]
+    fn one_orientation_after_another_is_one() {
+        for first in Orientation::ALL {
+            for next in Orientation::ALL {
+                let columns = first.turned_size(2, 3).0 as usize;
+                let expected = next.apply(&turned(first), columns, 1);
+                assert_eq!(turned(first.then(next)), expected, "{first:?} {next:?}");
+            }
+        }
+    }
+
+    #[cfg(feature = "encode")]
+    #[test]
+    fn gaussians_are_turned_as_samples_are() {
+        let stored = Gaussian {
+            center: [3.25, 1.5],
+            cholesky: [2.0, -0.75, 0.5],
+            color: [0.25, -0.5, 0.0, 0.0],
+        };
+        let q = |gaussian: &Gaussian, x: usize, y: usize| {
+            let [dx, dy] =
+                [x as f32 + 0.5 - gaussian.center[0], y as f32 + 0.5 - gaussian.center[1]];
+            let [xx, xy, yy] = gaussian.conic();
+            xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy
+        };
+        let distances = |gaussian: &Gaussian, width: usize, height: usize| {
+            let place = |at: usize| q(gaussian, at % width, at / width);
+            (0..width * height).map(place).collect::<Vec<_>>()
+        };
+        for orientation in Orientation::ALL {
+            let gaussian = orientation.apply_to_gaussian(&stored, 7.0, 5.0);
+            let (width, height) = orientation.turned_size(7, 5);
+            let found = distances(&gaussian, width as usize, height as usize);
+            let expected = orientation.apply(&distances(&stored, 7, 5), 7, 1);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found / expected - 1.0).abs() < 1e-5, "{orientation:?}");
+            }
+            assert_eq!(gaussian.color, stored.color);
+        }
     }
 
     #[test]

@@ -31,6 +31,7 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('info', 'info', [CompletionResultType]::ParameterValue, 'Shows what .gip files contain')
             [CompletionResult]::new('compare', 'compare', [CompletionResultType]::ParameterValue, 'Measures how much two pictures differ')
             [CompletionResult]::new('prefix', 'prefix', [CompletionResultType]::ParameterValue, 'Cuts a small .gip file from the beginning of a large one')
+            [CompletionResult]::new('transform', 'transform', [CompletionResultType]::ParameterValue, 'Turns, mirrors or crops a .gip file without encoding it again')
             [CompletionResult]::new('export', 'export', [CompletionResultType]::ParameterValue, 'Writes the Gaussians of a .gip file for other programs')
             [CompletionResult]::new('import', 'import', [CompletionResultType]::ParameterValue, 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
@@ -83,6 +84,7 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('--exclude', '--exclude', [CompletionResultType]::ParameterName, 'Leave out files and folders that match GLOB, even if --include takes them; may be given again')
             [CompletionResult]::new('--jobs', '--jobs', [CompletionResultType]::ParameterName, 'Number of pictures that are worked on at the same time, from 1 to 1024; each takes one thread [default: one per core]')
             [CompletionResult]::new('--budget', '--budget', [CompletionResultType]::ParameterName, 'Most megapixels that are worked on at the same time, from 0.001 to 1000000 [default: 16 for each job]')
+            [CompletionResult]::new('--shards', '--shards', [CompletionResultType]::ParameterName, 'Write tar files of N pictures each, as WebDataset reads them, in place of a file per picture: DIR/000000.tar and so on, from 1 to 1000000')
             [CompletionResult]::new('--manifest', '--manifest', [CompletionResultType]::ParameterName, 'Write a line of JSON for every file to FILE, or to standard output if it is `-`')
             [CompletionResult]::new('--limit', '--limit', [CompletionResultType]::ParameterName, 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits')
             [CompletionResult]::new('--thumbnail', '--thumbnail', [CompletionResultType]::ParameterName, 'Decode .gip files to thumbnails that fit into SIZE: one number for both sides, or WxH')
@@ -131,6 +133,19 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
             break
         }
+        'gip;transform' {
+            [CompletionResult]::new('--crop', '--crop', [CompletionResultType]::ParameterName, 'Keep only the W by H pixels whose first one is (X, Y), in pixels of the upright picture')
+            [CompletionResult]::new('--rotate', '--rotate', [CompletionResultType]::ParameterName, 'Rotate clockwise by so many degrees')
+            [CompletionResult]::new('--flip', '--flip', [CompletionResultType]::ParameterName, 'Mirror the picture')
+            [CompletionResult]::new('--metadata', '--metadata', [CompletionResultType]::ParameterName, 'Which metadata is kept [default: all, but safe for the thumbnails of gip batch]')
+            [CompletionResult]::new('--limit', '--limit', [CompletionResultType]::ParameterName, 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits')
+            [CompletionResult]::new('--threads', '--threads', [CompletionResultType]::ParameterName, 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]')
+            [CompletionResult]::new('--force', '--force', [CompletionResultType]::ParameterName, 'Write OUTPUT even if its name does not end in .gip')
+            [CompletionResult]::new('--preserve-times', '--preserve-times', [CompletionResultType]::ParameterName, 'Give the result the times of its source: of the last change and the last access, as cp does with --preserve=timestamps')
+            [CompletionResult]::new('-h', '-h', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            [CompletionResult]::new('--help', '--help', [CompletionResultType]::ParameterName, 'Print help (see more with ''--help'')')
+            break
+        }
         'gip;export' {
             [CompletionResult]::new('--format', '--format', [CompletionResultType]::ParameterName, 'The format, in place of the one that the extension of OUTPUT names')
             [CompletionResult]::new('--limit', '--limit', [CompletionResultType]::ParameterName, 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits')
@@ -163,6 +178,7 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             [CompletionResult]::new('info', 'info', [CompletionResultType]::ParameterValue, 'Shows what .gip files contain')
             [CompletionResult]::new('compare', 'compare', [CompletionResultType]::ParameterValue, 'Measures how much two pictures differ')
             [CompletionResult]::new('prefix', 'prefix', [CompletionResultType]::ParameterValue, 'Cuts a small .gip file from the beginning of a large one')
+            [CompletionResult]::new('transform', 'transform', [CompletionResultType]::ParameterValue, 'Turns, mirrors or crops a .gip file without encoding it again')
             [CompletionResult]::new('export', 'export', [CompletionResultType]::ParameterValue, 'Writes the Gaussians of a .gip file for other programs')
             [CompletionResult]::new('import', 'import', [CompletionResultType]::ParameterValue, 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes')
             [CompletionResult]::new('help', 'help', [CompletionResultType]::ParameterValue, 'Print this message or the help of the given subcommand(s)')
@@ -184,6 +200,9 @@ Register-ArgumentCompleter -Native -CommandName 'gip' -ScriptBlock {
             break
         }
         'gip;help;prefix' {
+            break
+        }
+        'gip;help;transform' {
             break
         }
         'gip;help;export' {

@@ -43,6 +43,9 @@ _gip() {
             gip,prefix)
                 cmd="gip__subcmd__prefix"
                 ;;
+            gip,transform)
+                cmd="gip__subcmd__transform"
+                ;;
             gip__subcmd__help,batch)
                 cmd="gip__subcmd__help__subcmd__batch"
                 ;;
@@ -70,6 +73,9 @@ _gip() {
             gip__subcmd__help,prefix)
                 cmd="gip__subcmd__help__subcmd__prefix"
                 ;;
+            gip__subcmd__help,transform)
+                cmd="gip__subcmd__help__subcmd__transform"
+                ;;
             *)
                 ;;
         esac
@@ -77,7 +83,7 @@ _gip() {
 
     case "${cmd}" in
         gip)
-            opts="-h -V --help --version encode decode batch info compare prefix export import help"
+            opts="-h -V --help --version encode decode batch info compare prefix transform export import help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 1 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -91,7 +97,7 @@ _gip() {
             return 0
             ;;
         gip__subcmd__batch)
-            opts="-h --out --include --exclude --jobs --budget --resume --manifest --allow-partial --limit --decode --thumbnail --format --no-texture --metadata --preserve-times --gaussians --bpp --bytes --psnr --quality --lambda --tune --effort --texture --first-layer --precision --seed --keep-invisible --help"
+            opts="-h --out --include --exclude --jobs --budget --resume --shards --manifest --allow-partial --limit --decode --thumbnail --format --no-texture --metadata --preserve-times --gaussians --bpp --bytes --psnr --quality --lambda --tune --effort --texture --first-layer --precision --seed --keep-invisible --help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -114,6 +120,10 @@ _gip() {
                     return 0
                     ;;
                 --budget)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --shards)
                     COMPREPLY=($(compgen -f "${cur}"))
                     return 0
                     ;;
@@ -353,7 +363,7 @@ _gip() {
             return 0
             ;;
         gip__subcmd__help)
-            opts="encode decode batch info compare prefix export import help"
+            opts="encode decode batch info compare prefix transform export import help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
                 COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
                 return 0
@@ -492,6 +502,20 @@ _gip() {
             COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
             return 0
             ;;
+        gip__subcmd__help__subcmd__transform)
+            opts=""
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 3 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
         gip__subcmd__import)
             opts="-h --format --precision --bits --color-step --parameterization --size --depth --kernel --cutoff --base-color --force --limit --threads --help"
             if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
@@ -579,6 +603,44 @@ _gip() {
                 return 0
             fi
             case "${prev}" in
+                *)
+                    COMPREPLY=()
+                    ;;
+            esac
+            COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+            return 0
+            ;;
+        gip__subcmd__transform)
+            opts="-h --crop --rotate --flip --force --metadata --preserve-times --limit --threads --help"
+            if [[ ${cur} == -* || ${COMP_CWORD} -eq 2 ]] ; then
+                COMPREPLY=( $(compgen -W "${opts}" -- "${cur}") )
+                return 0
+            fi
+            case "${prev}" in
+                --crop)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --rotate)
+                    COMPREPLY=($(compgen -W "90 180 270" -- "${cur}"))
+                    return 0
+                    ;;
+                --flip)
+                    COMPREPLY=($(compgen -W "horizontal vertical" -- "${cur}"))
+                    return 0
+                    ;;
+                --metadata)
+                    COMPREPLY=($(compgen -W "all safe none" -- "${cur}"))
+                    return 0
+                    ;;
+                --limit)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
+                --threads)
+                    COMPREPLY=($(compgen -f "${cur}"))
+                    return 0
+                    ;;
                 *)
                     COMPREPLY=()
                     ;;

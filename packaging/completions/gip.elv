@@ -28,6 +28,7 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand info 'Shows what .gip files contain'
             cand compare 'Measures how much two pictures differ'
             cand prefix 'Cuts a small .gip file from the beginning of a large one'
+            cand transform 'Turns, mirrors or crops a .gip file without encoding it again'
             cand export 'Writes the Gaussians of a .gip file for other programs'
             cand import 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
             cand help 'Print this message or the help of the given subcommand(s)'
@@ -77,6 +78,7 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand --exclude 'Leave out files and folders that match GLOB, even if --include takes them; may be given again'
             cand --jobs 'Number of pictures that are worked on at the same time, from 1 to 1024; each takes one thread [default: one per core]'
             cand --budget 'Most megapixels that are worked on at the same time, from 0.001 to 1000000 [default: 16 for each job]'
+            cand --shards 'Write tar files of N pictures each, as WebDataset reads them, in place of a file per picture: DIR/000000.tar and so on, from 1 to 1000000'
             cand --manifest 'Write a line of JSON for every file to FILE, or to standard output if it is `-`'
             cand --limit 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits'
             cand --thumbnail 'Decode .gip files to thumbnails that fit into SIZE: one number for both sides, or WxH'
@@ -121,6 +123,18 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand -h 'Print help (see more with ''--help'')'
             cand --help 'Print help (see more with ''--help'')'
         }
+        &'gip;transform'= {
+            cand --crop 'Keep only the W by H pixels whose first one is (X, Y), in pixels of the upright picture'
+            cand --rotate 'Rotate clockwise by so many degrees'
+            cand --flip 'Mirror the picture'
+            cand --metadata 'Which metadata is kept [default: all, but safe for the thumbnails of gip batch]'
+            cand --limit 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits'
+            cand --threads 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]'
+            cand --force 'Write OUTPUT even if its name does not end in .gip'
+            cand --preserve-times 'Give the result the times of its source: of the last change and the last access, as cp does with --preserve=timestamps'
+            cand -h 'Print help (see more with ''--help'')'
+            cand --help 'Print help (see more with ''--help'')'
+        }
         &'gip;export'= {
             cand --format 'The format, in place of the one that the extension of OUTPUT names'
             cand --limit 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits'
@@ -151,6 +165,7 @@ set edit:completion:arg-completer[gip] = {|@words|
             cand info 'Shows what .gip files contain'
             cand compare 'Measures how much two pictures differ'
             cand prefix 'Cuts a small .gip file from the beginning of a large one'
+            cand transform 'Turns, mirrors or crops a .gip file without encoding it again'
             cand export 'Writes the Gaussians of a .gip file for other programs'
             cand import 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
             cand help 'Print this message or the help of the given subcommand(s)'
@@ -166,6 +181,8 @@ set edit:completion:arg-completer[gip] = {|@words|
         &'gip;help;compare'= {
         }
         &'gip;help;prefix'= {
+        }
+        &'gip;help;transform'= {
         }
         &'gip;help;export'= {
         }

@@ -32,6 +32,7 @@ complete -c gip -n "__fish_gip_needs_command" -f -a "batch" -d 'Encodes or decod
 complete -c gip -n "__fish_gip_needs_command" -f -a "info" -d 'Shows what .gip files contain'
 complete -c gip -n "__fish_gip_needs_command" -f -a "compare" -d 'Measures how much two pictures differ'
 complete -c gip -n "__fish_gip_needs_command" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
+complete -c gip -n "__fish_gip_needs_command" -f -a "transform" -d 'Turns, mirrors or crops a .gip file without encoding it again'
 complete -c gip -n "__fish_gip_needs_command" -f -a "export" -d 'Writes the Gaussians of a .gip file for other programs'
 complete -c gip -n "__fish_gip_needs_command" -f -a "import" -d 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
 complete -c gip -n "__fish_gip_needs_command" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
@@ -80,6 +81,7 @@ complete -c gip -n "__fish_gip_using_subcommand batch" -l include -d 'Take only 
 complete -c gip -n "__fish_gip_using_subcommand batch" -l exclude -d 'Leave out files and folders that match GLOB, even if --include takes them; may be given again' -r
 complete -c gip -n "__fish_gip_using_subcommand batch" -l jobs -d 'Number of pictures that are worked on at the same time, from 1 to 1024; each takes one thread [default: one per core]' -r
 complete -c gip -n "__fish_gip_using_subcommand batch" -l budget -d 'Most megapixels that are worked on at the same time, from 0.001 to 1000000 [default: 16 for each job]' -r
+complete -c gip -n "__fish_gip_using_subcommand batch" -l shards -d 'Write tar files of N pictures each, as WebDataset reads them, in place of a file per picture: DIR/000000.tar and so on, from 1 to 1000000' -r
 complete -c gip -n "__fish_gip_using_subcommand batch" -l manifest -d 'Write a line of JSON for every file to FILE, or to standard output if it is `-`' -r -F
 complete -c gip -n "__fish_gip_using_subcommand batch" -l limit -d 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits' -r
 complete -c gip -n "__fish_gip_using_subcommand batch" -l thumbnail -d 'Decode .gip files to thumbnails that fit into SIZE: one number for both sides, or WxH' -r
@@ -118,6 +120,20 @@ complete -c gip -n "__fish_gip_using_subcommand compare" -l json -d 'Print one J
 complete -c gip -n "__fish_gip_using_subcommand compare" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c gip -n "__fish_gip_using_subcommand prefix" -l force -d 'Write OUTPUT even if its name does not end in .gip'
 complete -c gip -n "__fish_gip_using_subcommand prefix" -s h -l help -d 'Print help (see more with \'--help\')'
+complete -c gip -n "__fish_gip_using_subcommand transform" -l crop -d 'Keep only the W by H pixels whose first one is (X, Y), in pixels of the upright picture' -r
+complete -c gip -n "__fish_gip_using_subcommand transform" -l rotate -d 'Rotate clockwise by so many degrees' -r -f -a "90\t'A quarter of a turn'
+180\t'Half of a turn'
+270\t'Three quarters of a turn'"
+complete -c gip -n "__fish_gip_using_subcommand transform" -l flip -d 'Mirror the picture' -r -f -a "horizontal\t'Left and right'
+vertical\t'Top and bottom'"
+complete -c gip -n "__fish_gip_using_subcommand transform" -l metadata -d 'Which metadata is kept [default: all, but safe for the thumbnails of gip batch]' -r -f -a "all\t'All of it, as it is'
+safe\t'Colours, orientation, title, description, artist, copyright and dates; no position, maker notes, embedded thumbnails, cameras, serial numbers, owners, comments or anything unknown'
+none\t'Only the colour space in codes (cICP), not even a colour profile'"
+complete -c gip -n "__fish_gip_using_subcommand transform" -l limit -d 'Allow what takes more than by default, or less: NAME=VALUE, where NAME is width, height or pixels (of pictures that are read or written), gaussians, memory (in bytes) or work (kernel evaluations of a rendering beyond 64 for each pixel); or `none` for no limits' -r
+complete -c gip -n "__fish_gip_using_subcommand transform" -l threads -d 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]' -r
+complete -c gip -n "__fish_gip_using_subcommand transform" -l force -d 'Write OUTPUT even if its name does not end in .gip'
+complete -c gip -n "__fish_gip_using_subcommand transform" -l preserve-times -d 'Give the result the times of its source: of the last change and the last access, as cp does with --preserve=timestamps'
+complete -c gip -n "__fish_gip_using_subcommand transform" -s h -l help -d 'Print help (see more with \'--help\')'
 complete -c gip -n "__fish_gip_using_subcommand export" -l format -d 'The format, in place of the one that the extension of OUTPUT names' -r -f -a "npz\t'Arrays of NumPy, as numpy.load reads them'
 json\t'One JSON object'
 jsonl\t'A JSON object of the header on the first line, and one of a Gaussian on each further line'
@@ -148,12 +164,13 @@ complete -c gip -n "__fish_gip_using_subcommand import" -l limit -d 'Allow what 
 complete -c gip -n "__fish_gip_using_subcommand import" -l threads -d 'Number of threads, from 1 to 1024; the result does not depend on it [default: one per core]' -r
 complete -c gip -n "__fish_gip_using_subcommand import" -l force -d 'Write OUTPUT even if its name does not end in .gip'
 complete -c gip -n "__fish_gip_using_subcommand import" -s h -l help -d 'Print help (see more with \'--help\')'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "encode" -d 'Encodes a picture as a .gip file'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "decode" -d 'Decodes a .gip file to a picture'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "batch" -d 'Encodes or decodes many files and whole folders, one picture per core'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "info" -d 'Shows what .gip files contain'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "compare" -d 'Measures how much two pictures differ'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "export" -d 'Writes the Gaussians of a .gip file for other programs'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "import" -d 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
-complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix export import help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "encode" -d 'Encodes a picture as a .gip file'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "decode" -d 'Decodes a .gip file to a picture'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "batch" -d 'Encodes or decodes many files and whole folders, one picture per core'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "info" -d 'Shows what .gip files contain'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "compare" -d 'Measures how much two pictures differ'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "prefix" -d 'Cuts a small .gip file from the beginning of a large one'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "transform" -d 'Turns, mirrors or crops a .gip file without encoding it again'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "export" -d 'Writes the Gaussians of a .gip file for other programs'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "import" -d 'Makes a .gip file of Gaussians of other programs, or of what `gip export` writes'
+complete -c gip -n "__fish_gip_using_subcommand help; and not __fish_seen_subcommand_from encode decode batch info compare prefix transform export import help" -f -a "help" -d 'Print this message or the help of the given subcommand(s)'

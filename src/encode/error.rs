@@ -46,12 +46,18 @@ pub enum WriteError {
     /// The header or a Gaussian is out of range.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// A Gaussian of the texture's map is out of range.
+    #[error("texture: {0}")]
+    Texture(#[source] PictureError),
     /// An option is out of range.
     #[error("invalid option: {0}")]
     Option(#[from] OptionError),
     /// The quantizers are not such that a file can have them; the text is the rule that they break.
     #[error("quantizers: {0}")]
     Quantizers(&'static str),
+    /// No file of this colour model can have the steps.
+    #[error("steps that no file can have; take those of a file")]
+    Steps,
     /// The step of colour is out of range.
     #[error("a step of colour of {0}; it must be 10^-6 to 1000")]
     ColorStep(f32),

@@ -11,17 +11,22 @@ use super::options::Precision;
 use super::progress::Observer;
 use super::rate_model;
 use super::rdo;
-use crate::coding::entropy::{CenterGrid, Code, MOST_CODE, QuantizedCodes};
+use crate::coding::entropy::{
+    CenterGrid, Code, MOST_CODE, Quantization, QuantizationSteps, QuantizedCodes,
+};
 use crate::coding::packed::{PackedCodes, Quantizer};
 use crate::container::{Header, Metadata};
 use crate::error::PictureError;
 use crate::gaussian::{CENTER, Gaussian, MAX_COMPONENTS, MAX_GAUSSIANS, SHAPE};
 use crate::kernel::Kernel;
 use crate::render;
+use crate::texture::Texture;
 use crate::threads::Threads;
 
 /// The least and the largest step of colour.
 const COLOR_STEPS: (f32, f32) = (1e-6, 1000.0);
+/// The step of colour of a texture's map in that of the picture, as the encoder has it.
+const TEXTURE_STEP: f64 = 0.25;
 
 /// Writes Gaussians that come from elsewhere to a file: those of another method, or of another file. Nothing is
 /// fitted. By default it stores floats, which lose nothing.
@@ -51,6 +56,8 @@ pub struct Writer {
     quantizers: Option<Vec<Quantizer>>,
     bit_depths: [u8; 3],
     color_step: f32,
+    steps: Option<QuantizationSteps>,
+    texture: Vec<Gaussian>,
     metadata: Metadata,
     first_layer: Option<u32>,
     threads: Threads,
@@ -67,6 +74,8 @@ impl Writer {
             quantizers: None,
             bit_depths: [12, 10, 6],
             color_step: 0.02,
+            steps: None,
+            texture: Vec::new(),
             metadata: Metadata::default(),
             first_layer: None,
             threads: Threads::default(),
@@ -103,6 +112,21 @@ impl Writer {
         Self { color_step: step, ..self }
     }
 
+    /// Sets all steps of [`Precision::Entropy`], in place of a step of colour: those of a file
+    /// ([`StreamDecoder::quantization_steps`](crate::StreamDecoder::quantization_steps)), so that its Gaussians, and
+    /// others that are on its grid, are stored as they are.
+    #[must_use]
+    pub fn with_steps(self, steps: QuantizationSteps) -> Self {
+        Self { steps: Some(steps), ..self }
+    }
+
+    /// Sets the Gaussians of a texture's map ([`Picture::texture_map`](crate::Picture::texture_map)), which are rounded
+    /// with a quarter of the step of colour. Default: none, for a picture without texture.
+    #[must_use]
+    pub fn with_texture(self, gaussians: Vec<Gaussian>) -> Self {
+        Self { texture: gaussians, ..self }
+    }
+
     /// Sets the metadata to store. Default: none.
     #[must_use]
     pub fn with_metadata(self, metadata: Metadata) -> Self {
@@ -132,11 +156,15 @@ impl Writer {
         self.header.check()?;
         render::check(gaussians, MAX_GAUSSIANS)?;
         self.metadata.check().map_err(OptionError::Metadata)?;
+        let quantization = self.quantization()?;
+        let texture = self.texture(&quantization)?;
         let layout = FileLayout::of(self.header.clone(), &self.metadata);
+        let layout = layout.with_texture(texture.as_deref());
         if self.precision == Precision::Entropy {
             let layout = layout.with_first_layer(self.first_layer);
             layout.check_first_layer()?;
-            return on_threads(self.threads, || self.write_entropy(&layout, gaussians))?;
+            let write = || self.write_entropy(&layout, quantization, gaussians);
+            return on_threads(self.threads, write)?;
         }
         let quantizers = match (self.precision, &self.quantizers) {
             (Precision::Packed, Some(quantizers)) => quantizers.clone(),
@@ -149,6 +177,35 @@ impl Writer {
             _ => vec![Quantizer::Float; self.header.components()],
         };
         Ok(layout.write_packed(&self.packed(gaussians, quantizers)?))
+    }
+
+    /// The quantization grid of the entropy coding.
+    fn quantization(&self) -> Result<Quantization, WriteError> {
+        let channels = self.header.color.channels();
+        if let Some(steps) = &self.steps {
+            return Quantization::of_steps(steps, channels).ok_or(WriteError::Steps);
+        }
+        let step = self.color_step;
+        if !(COLOR_STEPS.0..=COLOR_STEPS.1).contains(&step) {
+            return Err(WriteError::ColorStep(step));
+        }
+        Ok(rate_model::quantization(f64::from(step).log2(), &[1.0; 4][..channels]))
+    }
+
+    /// The payload of the texture's map; `None` without texture.
+    fn texture(&self, quantization: &Quantization) -> Result<Option<Vec<u8>>, WriteError> {
+        let map = Texture::map_header(&self.header);
+        let step = f64::from(quantization.color[0]) * TEXTURE_STEP;
+        let quantization = rate_model::quantization(step.log2(), &[1.0; 3]);
+        render::check(&self.texture, MAX_GAUSSIANS).map_err(WriteError::Texture)?;
+        let mut codes =
+            codes_of(&self.texture, &map, &quantization).map_err(WriteError::Texture)?;
+        let (found, allowed) = (codes.len(), map.width.saturating_mul(map.height));
+        if found > allowed as usize {
+            return Err(WriteError::Texture(PictureError::Count { found, allowed }));
+        }
+        let step = quantization.color[0];
+        Ok((!codes.is_empty()).then(|| Texture::to_payload(&mut codes, step, &self.header)))
     }
 
     /// The values of the components of Gaussians.
@@ -200,40 +257,47 @@ impl Writer {
     fn write_entropy(
         &self,
         layout: &FileLayout<'_>,
+        quantization: Quantization,
         gaussians: &[Gaussian],
     ) -> Result<Vec<u8>, WriteError> {
-        let (step, color) = (self.color_step, self.header.color);
-        if !(COLOR_STEPS.0..=COLOR_STEPS.1).contains(&step) {
-            return Err(WriteError::ColorStep(step));
-        }
         if self.header.kernel != Kernel::Quartic {
             return Err(PictureError::Header("the entropy coding needs the quartic kernel").into());
         }
-        let size = [self.header.width, self.header.height];
-        let grid = CenterGrid::new(size[0], size[1]);
-        let steps = [1.0; 4];
-        let quantization =
-            rate_model::quantization(f64::from(step).log2(), &steps[..color.channels()]);
-        let curvature = ColorCurvature::of_squared_error(color);
-        let mut codes = Vec::with_capacity(gaussians.len());
-        for (index, gaussian) in gaussians.iter().enumerate() {
-            if !rdo::is_seen(gaussian, size) {
-                continue;
-            }
-            let exponent =
-                rate_model::step_exponent(gaussian, 1.0, &curvature, &quantization, color);
-            let code = quantization.code(gaussian, exponent, &grid, color);
-            if let Some(rule) = without_code(gaussian, &code, &grid) {
-                return Err(PictureError::Gaussian { index, rule }.into());
-            }
-            codes.push(code);
-        }
+        let codes = codes_of(gaussians, &self.header, &quantization)?;
         let mut callback = |_: &_| ControlFlow::Continue(());
         let mut observer = Observer::new(&mut callback, 0);
         let coded = layout.coded(QuantizedCodes { quantization, codes }, &mut observer);
         let file = coded.and_then(|coded| layout.write_entropy(&coded, &mut observer));
         Ok(file.expect("nobody cancels"))
     }
+}
+
+/// The codes of those Gaussians that show in a picture, on a quantization grid.
+fn codes_of(
+    gaussians: &[Gaussian],
+    header: &Header,
+    quantization: &Quantization,
+) -> Result<Vec<Code>, PictureError> {
+    let (size, color) = ([header.width, header.height], header.color);
+    let grid = CenterGrid::new(size[0], size[1]);
+    let curvature = ColorCurvature::of_squared_error(color);
+    let rounded = |gaussian: &Gaussian| {
+        let exponent = rate_model::step_exponent(gaussian, 1.0, &curvature, quantization, color);
+        quantization.code(gaussian, exponent, &grid, color)
+    };
+    let mut codes = Vec::with_capacity(gaussians.len());
+    for (index, gaussian) in gaussians.iter().enumerate() {
+        if !rdo::is_seen(gaussian, size) {
+            continue;
+        }
+        let exact = quantization.exact_code(gaussian, &grid, color);
+        let code = exact.unwrap_or_else(|| rounded(gaussian));
+        if let Some(rule) = without_code(gaussian, &code, &grid) {
+            return Err(PictureError::Gaussian { index, rule });
+        }
+        codes.push(code);
+    }
+    Ok(codes)
 }
 
 /// Why a Gaussian is not the one that a code, the nearest to it, stands for.

@@ -65,6 +65,12 @@ impl Texture {
         payload
     }
 
+    /// The header of the map of a picture.
+    #[cfg(feature = "encode")]
+    pub(crate) fn map_header(picture: &Header) -> Header {
+        map::header(picture)
+    }
+
     /// The header of the map.
     pub(crate) fn header(&self) -> &Header {
         &self.header

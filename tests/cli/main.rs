@@ -3,6 +3,7 @@
 mod batch;
 mod batch_inputs;
 mod batch_recovery;
+mod batch_shards;
 mod colors;
 mod commands;
 #[path = "../common/mod.rs"]
@@ -21,3 +22,4 @@ mod prefix;
 mod room;
 mod square;
 mod tiff;
+mod transform;

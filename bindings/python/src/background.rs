@@ -110,6 +110,8 @@ pub(crate) struct Channels<'a> {
     pub(crate) drops_alpha: bool,
     /// What the caller gives as the background; else it is white.
     pub(crate) background: Option<&'a Background>,
+    /// Whether the caller gets one plane per channel.
+    pub(crate) planar: bool,
 }
 
 /// The caller's samples, of one type.
@@ -121,6 +123,8 @@ pub(crate) struct Pixels<'a, T> {
     rendered: usize,
     /// What pixels with alpha are composed over.
     background: Option<Vec<T>>,
+    /// Whether `out` is one plane per channel.
+    planar: bool,
 }
 
 impl Channels<'_> {
@@ -133,68 +137,77 @@ impl Channels<'_> {
         let given = self.background.map(|given| given.samples(self.returned)).transpose()?;
         let background = || given.unwrap_or_else(|| vec![T::FULL; self.returned]);
         let background = self.drops_alpha.then(background);
-        Ok(Pixels { out, scratch, rendered: self.rendered, background })
+        Ok(Pixels { out, scratch, rendered: self.rendered, background, planar: self.planar })
     }
 }
 
 impl<T: Sample> Pixels<'_, T> {
     /// Has the samples rendered interleaved.
     pub(crate) fn fill<E>(self, render: impl FnOnce(&mut [T]) -> Result<(), E>) -> Result<(), E> {
-        let Self { out, scratch, rendered, background } = self;
-        let (Some(pixels), Some(background)) = (scratch, background) else { return render(out) };
+        let Self { out, scratch, rendered, background, planar } = self;
+        let Some(pixels) = scratch else { return render(out) };
         render(pixels)?;
-        compose(pixels, rendered, &background, out);
+        let channel = |channel| pixels.chunks_exact(rendered).map(move |pixel| pixel[channel]);
+        fill_channels(out, rendered, background, planar, channel);
         Ok(())
     }
 
-    /// Has the samples rendered as planes, and interleaves them.
+    /// Has the samples rendered as planes.
     pub(crate) fn fill_from_planes<E>(
         self,
         render: impl FnOnce(&mut [T]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Self { out, scratch, rendered, background } = self;
+        let Self { out, scratch, rendered, background, planar } = self;
         let Some(planes) = scratch else { return render(out) };
         render(planes)?;
-        let planes: Vec<_> = planes.chunks_exact(planes.len() / rendered).collect();
-        match background {
-            None => {
-                for (channel, plane) in planes.iter().enumerate() {
-                    fill_channel(out, (channel, rendered), plane.iter().copied());
-                }
-            }
-            Some(background) => {
-                let (alpha, colors) = planes.split_last().expect("at least alpha is rendered");
-                for (channel, &behind) in background.iter().enumerate() {
-                    let color = colors[channel.min(colors.len() - 1)];
-                    let pixels = color.iter().zip(*alpha);
-                    let composed = pixels.map(|(color, &opacity)| color.over(opacity, behind));
-                    fill_channel(out, (channel, background.len()), composed);
-                }
-            }
-        }
+        let pixels = planes.len() / rendered;
+        let channel = |channel| planes[channel * pixels..][..pixels].iter().copied();
+        fill_channels(out, rendered, background, planar, channel);
         Ok(())
     }
 }
 
-/// Fills one channel of so many in interleaved samples.
-fn fill_channel<T>(
+/// Fills the caller's samples from all of each rendered channel. With a background, which has as many channels as
+/// `out`, the last one is alpha, and pixels are composed over it; gray is repeated.
+fn fill_channels<T: Sample, I: Iterator<Item = T>>(
     out: &mut [T],
-    (channel, channels): (usize, usize),
-    samples: impl Iterator<Item = T>,
+    rendered: usize,
+    background: Option<Vec<T>>,
+    planar: bool,
+    channel: impl Fn(usize) -> I,
 ) {
-    for (out, sample) in out.iter_mut().skip(channel).step_by(channels).zip(samples) {
-        *out = sample;
+    match background {
+        None => {
+            for at in 0..rendered {
+                fill_channel(out, (at, rendered), planar, channel(at));
+            }
+        }
+        Some(background) => {
+            let colors = rendered - 1;
+            for (at, &behind) in background.iter().enumerate() {
+                let pixels = channel(at.min(colors - 1)).zip(channel(colors));
+                let composed = pixels.map(|(color, opacity)| color.over(opacity, behind));
+                fill_channel(out, (at, background.len()), planar, composed);
+            }
+        }
     }
 }
 
-/// Composes pixels, whose last channel is alpha, over a background. `out` has as many channels as
-/// the background; gray is repeated.
-fn compose<T: Sample>(pixels: &[T], channels: usize, background: &[T], out: &mut [T]) {
-    let colors = channels - 1;
-    for (pixel, out) in pixels.chunks_exact(channels).zip(out.chunks_exact_mut(background.len())) {
-        let opacity = pixel[colors];
-        for (channel, (out, &background)) in out.iter_mut().zip(background).enumerate() {
-            *out = pixel[channel.min(colors - 1)].over(opacity, background);
+/// Fills one channel of so many in samples that are interleaved or planes.
+fn fill_channel<T>(
+    out: &mut [T],
+    (channel, channels): (usize, usize),
+    planar: bool,
+    samples: impl Iterator<Item = T>,
+) {
+    if planar {
+        let pixels = out.len() / channels;
+        for (out, sample) in out[channel * pixels..][..pixels].iter_mut().zip(samples) {
+            *out = sample;
+        }
+    } else {
+        for (out, sample) in out.chunks_exact_mut(channels).zip(samples) {
+            out[channel] = sample;
         }
     }
 }

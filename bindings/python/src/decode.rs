@@ -31,6 +31,7 @@ use crate::{metadata, threads};
 ///         colours, or one for each, in the units of `dtype`. The samples composed are those that
 ///         show, clamped and not linear, as in browsers. With a background, the default mode is that of
 ///         the file without alpha. Default: white.
+///     planar: Whether the result is channels x height x width, as networks take it, also with one channel.
 ///     dtype: numpy.uint8 (0 to 255), numpy.uint16 (0 to 65535) or numpy.float32 (1.0 is a full sample;
 ///         neither clamped nor rounded, unless composed). Default: that of `out`, else uint8 or uint16, whichever the
 ///         encoded picture had.
@@ -43,8 +44,8 @@ use crate::{metadata, threads};
 ///     limits: What the file may cost at most. Default: Limits().
 ///
 /// Returns:
-///     height x width (mode "L") or height x width x channels samples, rows from the top: a new array,
-///     or `out`. Colours are sRGB unless the file has an ICC profile; alpha is straight. The picture is
+///     height x width (mode "L") or height x width x channels samples, rows from the top; with `planar`,
+///     channels x height x width: a new array, or `out`. Colours are sRGB unless the file has an ICC profile; alpha is straight. The picture is
 ///     as it is stored, and so are size and region: `Info.orientation` tells how to turn it for display.
 ///
 /// Raises:
@@ -52,10 +53,10 @@ use crate::{metadata, threads};
 ///     ValueError: An argument is out of range, or `out` does not fit.
 ///     TypeError: An argument has the wrong type.
 ///     MemoryError: There is no memory for the result, or for as much again, which is needed to compose,
-///         and for float32 of several channels.
+///         and for several channels that are planar in uint8 or uint16, or not planar in float32.
 ///     OSError: The file cannot be read.
 #[pyfunction]
-#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, texture=true, threads=1, limits=None))]
+#[pyo3(signature = (src, *, size=None, scale=None, region=None, mode=None, background=None, planar=false, dtype=None, out=None, texture=true, threads=1, limits=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn decode<'py>(
     py: Python<'py>,
@@ -65,6 +66,7 @@ pub(crate) fn decode<'py>(
     region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
     mode: Option<&str>,
     background: Option<&Bound<'py, PyAny>>,
+    planar: bool,
     dtype: Option<&Bound<'py, PyAny>>,
     out: Option<&Bound<'py, PyAny>>,
     texture: bool,
@@ -72,8 +74,19 @@ pub(crate) fn decode<'py>(
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let prefix = None;
-    let request =
-        Request { size, scale, region, mode, background, dtype, out, prefix, texture, threads };
+    let request = Request {
+        size,
+        scale,
+        region,
+        mode,
+        background,
+        planar,
+        dtype,
+        out,
+        prefix,
+        texture,
+        threads,
+    };
     let rendering = request.check()?;
     let file = Bytes::of_file(src)?;
     let bytes = file.as_slice()?;

@@ -36,7 +36,7 @@ pub(crate) struct Output<'a, 'py> {
     channels: Channels<'a>,
 }
 
-/// The samples of an output array: height x width x channels.
+/// The samples of an output array: height x width x channels, or planes.
 #[derive(Debug)]
 pub(crate) enum Samples<'a> {
     U8(Pixels<'a, u8>),
@@ -56,7 +56,9 @@ impl<'a, 'py> Output<'a, 'py> {
         let (width, height) = rendering.options(header).output_size(header);
         let channels = rendering.channels(header).map_err(|error| decode_error(py, error))?;
         let mut shape = vec![height as usize, width as usize];
-        if channels.returned > 1 {
+        if channels.planar {
+            shape.insert(0, channels.returned);
+        } else if channels.returned > 1 {
             shape.push(channels.returned);
         }
         let kind = match (request.dtype, request.out) {
@@ -66,15 +68,15 @@ impl<'a, 'py> Output<'a, 'py> {
             (None, None) => dtype::<u8>(py),
         };
         let samples = (height as usize * width as usize).saturating_mul(channels.rendered);
-        let composed = channels.drops_alpha.then_some(samples);
+        // 8 and 16 bits are rendered interleaved, and floats as planes.
+        let differs = |planar| channels.rendered > 1 && channels.planar != planar;
+        let scratch = |planar| (channels.drops_alpha || differs(planar)).then_some(samples);
         let arrays = if kind.is_equiv_to(&dtype::<u8>(py)) {
-            Typed::U8(Arrays::new(py, shape, request.out, composed)?)
+            Typed::U8(Arrays::new(py, shape, request.out, scratch(false))?)
         } else if kind.is_equiv_to(&dtype::<u16>(py)) {
-            Typed::U16(Arrays::new(py, shape, request.out, composed)?)
+            Typed::U16(Arrays::new(py, shape, request.out, scratch(false))?)
         } else if kind.is_equiv_to(&dtype::<f32>(py)) {
-            // They are rendered as planes.
-            let planes = (channels.rendered > 1).then_some(samples);
-            Typed::F32(Arrays::new(py, shape, request.out, planes)?)
+            Typed::F32(Arrays::new(py, shape, request.out, scratch(true))?)
         } else {
             let message = format!("dtype {kind}; it must be uint8, uint16 or float32");
             return Err(PyTypeError::new_err(message));

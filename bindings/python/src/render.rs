@@ -39,7 +39,7 @@ use crate::threads;
 ///         11.082527, where exp(-q / 2) is 1/255.
 ///     base_color: The colour that the Gaussians are added to, in 1/65535 of a full sample: an integer 0 to 65535,
 ///         or one for each channel; with depth=8 they must be multiples of 257. Default: 0.
-///     size, scale, region, mode, background, dtype, out, threads: As for `decode`, with the picture's own mode by
+///     size, scale, region, mode, background, planar, dtype, out, threads: As for `decode`, with the picture's own mode by
 ///         its channels.
 ///     limits: What the picture may cost at most. Default: Limits().
 ///
@@ -53,7 +53,7 @@ use crate::threads;
 ///     LimitError: The picture costs more than `limits` allow.
 ///     MemoryError: As for `decode`.
 #[pyfunction]
-#[pyo3(signature = (gaussians, *, like=None, width=None, height=None, depth=None, kernel=None, cutoff=None, base_color=None, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, threads=1, limits=None))]
+#[pyo3(signature = (gaussians, *, like=None, width=None, height=None, depth=None, kernel=None, cutoff=None, base_color=None, size=None, scale=None, region=None, mode=None, background=None, planar=false, dtype=None, out=None, threads=1, limits=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn render<'py>(
     py: Python<'py>,
@@ -70,14 +70,26 @@ pub(crate) fn render<'py>(
     region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
     mode: Option<&str>,
     background: Option<&Bound<'py, PyAny>>,
+    planar: bool,
     dtype: Option<&Bound<'py, PyAny>>,
     out: Option<&Bound<'py, PyAny>>,
     #[pyo3(from_py_with = threads::checked)] threads: usize,
     limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (prefix, texture) = (None, false);
-    let request =
-        Request { size, scale, region, mode, background, dtype, out, prefix, texture, threads };
+    let request = Request {
+        size,
+        scale,
+        region,
+        mode,
+        background,
+        planar,
+        dtype,
+        out,
+        prefix,
+        texture,
+        threads,
+    };
     let rendering = request.check()?;
     let given = Given::new(gaussians)?;
     let fields = HeaderFields { like, width, height, depth, kernel, cutoff, base_color };

@@ -28,6 +28,8 @@ pub(crate) struct Request<'a, 'py> {
     pub(crate) region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
     pub(crate) mode: Option<&'a str>,
     pub(crate) background: Option<&'a Bound<'py, PyAny>>,
+    /// Whether the result is one plane per channel.
+    pub(crate) planar: bool,
     pub(crate) dtype: Option<&'a Bound<'py, PyAny>>,
     pub(crate) out: Option<&'a Bound<'py, PyAny>>,
     /// Render only the first Gaussians of the file.
@@ -42,6 +44,7 @@ pub(crate) struct Rendering {
     scale: Option<f64>,
     mode: Option<ColorModel>,
     background: Option<Background>,
+    planar: bool,
     options: RenderOptions,
     pub(crate) threads: usize,
 }
@@ -84,7 +87,14 @@ impl Request<'_, '_> {
         if let Some(prefix) = &self.prefix {
             options = options.with_prefix(prefix.within("prefix", 0..=u32::MAX)?);
         }
-        Ok(Rendering { scale, mode, background, options, threads: self.threads })
+        Ok(Rendering {
+            scale,
+            mode,
+            background,
+            planar: self.planar,
+            options,
+            threads: self.threads,
+        })
     }
 }
 
@@ -112,7 +122,8 @@ impl Rendering {
             Some(mode) => mode.channels(),
             None => rendered - usize::from(drops_alpha),
         };
-        Ok(Channels { rendered, returned, drops_alpha, background: self.background.as_ref() })
+        let (background, planar) = (self.background.as_ref(), self.planar);
+        Ok(Channels { rendered, returned, drops_alpha, background, planar })
     }
 
     /// Whether the picture has alpha, and is composed over a background.

@@ -82,7 +82,7 @@ impl StreamDecoder {
     /// Renders the Gaussians that have arrived.
     ///
     /// Args:
-    ///     size, scale, region, mode, background, dtype, out, texture, threads: As for `decode`.
+    ///     size, scale, region, mode, background, planar, dtype, out, texture, threads: As for `decode`.
     ///     prefix: Render only so many Gaussians, the first of the file.
     ///
     /// Returns:
@@ -93,7 +93,7 @@ impl StreamDecoder {
     ///         fit.
     ///     TypeError: An argument has the wrong type.
     ///     LimitError: The output or the work exceeds a limit.
-    #[pyo3(signature = (*, size=None, scale=None, region=None, mode=None, background=None, dtype=None, out=None, prefix=None, texture=true, threads=1))]
+    #[pyo3(signature = (*, size=None, scale=None, region=None, mode=None, background=None, planar=false, dtype=None, out=None, prefix=None, texture=true, threads=1))]
     #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
     fn image<'py>(
         &self,
@@ -103,14 +103,26 @@ impl StreamDecoder {
         region: Option<(Integer<'py>, Integer<'py>, Integer<'py>, Integer<'py>)>,
         mode: Option<&str>,
         background: Option<&Bound<'py, PyAny>>,
+        planar: bool,
         dtype: Option<&Bound<'py, PyAny>>,
         out: Option<&Bound<'py, PyAny>>,
         prefix: Option<Integer<'py>>,
         texture: bool,
         #[pyo3(from_py_with = threads::checked)] threads: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let request =
-            Request { size, scale, region, mode, background, dtype, out, prefix, texture, threads };
+        let request = Request {
+            size,
+            scale,
+            region,
+            mode,
+            background,
+            planar,
+            dtype,
+            out,
+            prefix,
+            texture,
+            threads,
+        };
         let rendering = request.check()?;
         let failed = |error| decode_error(py, error);
 

@@ -1,7 +1,9 @@
 """What the tests share: the test vectors, a picture, a file of it, the tool."""
 
+import importlib.util
 import io
 import os
+import sys
 import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +18,12 @@ import image_gip.pillow
 
 ROOT = Path(__file__).resolve().parents[3]
 VECTORS = ROOT / "spec" / "vectors"
+#: Where there is as much of torch as is needed, for machines without it.
+STAND_IN = Path(__file__).parent / "stand_in"
+HAS_TORCH = importlib.util.find_spec("torch") is not None
+
+if not HAS_TORCH:
+    sys.path.append(str(STAND_IN))
 
 Picture = NDArray[np.uint8]
 

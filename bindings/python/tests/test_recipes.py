@@ -1,6 +1,6 @@
 """The Python code of the documentation runs as it stands there."""
 
-import importlib.util
+import os
 import re
 import subprocess
 import sys
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT, draw
+from conftest import HAS_TORCH, ROOT, STAND_IN, draw
 from PIL import Image
 
 import image_gip
@@ -24,21 +24,6 @@ RECIPES = [
     # Those are run by the tests of integrations/ray, where Ray is installed.
     if "image_gip.ray" not in code
 ]
-
-#: As much of torch as a `Dataset` needs, where there is none.
-TORCH = """
-import numpy
-
-
-class Tensor(numpy.ndarray):
-    def permute(self, *axes):
-        return self.transpose(axes)
-
-
-def from_numpy(array):
-    return array.view(Tensor)
-"""
-DATASET = "class Dataset:\n    pass\n"
 
 #: Renders by the formula of GaussianImage's code, without its order and tiles.
 CHECKPOINTS = """
@@ -106,10 +91,12 @@ CHECKS = {
         "    turned = upright(np.asarray(image), orientation)\n"
         "    assert np.array_equal(turned, ImageOps.exif_transpose(image))\n"
     ),
-    "A torch `Dataset` that decodes at training size": (
-        "pictures = Pictures('.', (64, 48))\n"
+    "Training with PyTorch": (
+        "pictures = Pictures('.', crop)\n"
         "assert len(pictures) == 1\n"
-        "assert pictures[0].shape == (3, 48, 64)\n"
+        "assert pictures[0].shape == (3, 224, 224)\n"
+        "assert batch.images.shape == (3, 3, 224, 224)\n"
+        "assert list(batch.errors) == [1]\n"
     ),
 }
 
@@ -142,13 +129,11 @@ def test_recipe(page: str, heading: str, code: str, tmp_path: Path, photo_file: 
     Image.fromarray(draw(288, 192, 3)).save(tmp_path / "photo.png")
     Image.fromarray(draw(48, 32, 3)).save(tmp_path / "photos" / "first.png")
     save_checkpoint(tmp_path / "checkpoint.npz")
-    if importlib.util.find_spec("torch") is None:
-        (tmp_path / "torch" / "utils").mkdir(parents=True)
-        (tmp_path / "torch" / "__init__.py").write_text(TORCH)
-        (tmp_path / "torch" / "utils" / "data.py").write_text(DATASET)
     script = tmp_path / "recipe.py"
     script.write_text(code + CHECKS.get(heading, ""))
-    subprocess.run([sys.executable, "-W", "error", script], cwd=tmp_path, check=True)
+    paths = {} if HAS_TORCH else {"PYTHONPATH": str(STAND_IN)}
+    command = [sys.executable, "-W", "error", str(script)]
+    subprocess.run(command, cwd=tmp_path, env=os.environ | paths, check=True)
 
 
 def test_the_recipes_are_found() -> None:

@@ -17,6 +17,7 @@ mod limits;
 mod picture;
 mod prefix;
 mod source;
+mod transform;
 
 use std::process::ExitCode;
 
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args).map(success),
         Command::Prefix(args) => prefix::run(&args).map(success),
+        Command::Transform(args) => transform::run(&args).map(success),
         Command::Export(args) => gaussians::export(&args).map(success),
         Command::Import(args) => gaussians::import(&args).map(success),
     };

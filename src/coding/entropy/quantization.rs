@@ -175,6 +175,19 @@ impl Quantization {
         Ok(Self::new(geometry, color))
     }
 
+    /// The quantization grid with these steps; `None` if a file of so many channels cannot have them.
+    #[cfg(feature = "encode")]
+    pub(crate) fn of_steps(steps: &QuantizationSteps, channels: usize) -> Option<Self> {
+        let QuantizationSteps { position, size, ratio, slant, ref color } = *steps;
+        let geometry = [position, size, ratio, slant];
+        let first = *color.first()?;
+        let can_be_stored = steps::is_step(first)
+            && color.len() == channels
+            && color.iter().all(|&step| steps::is_related(step, first))
+            && (geometry == steps::USUAL_GEOMETRY || geometry.into_iter().all(steps::is_step));
+        can_be_stored.then(|| Self::new(geometry, color.clone()))
+    }
+
     /// The steps.
     pub(crate) fn steps(&self) -> QuantizationSteps {
         let [position, size, ratio, slant] = self.geometry();
@@ -284,6 +297,19 @@ impl Quantization {
             *code = nearest(axis * size, *step) as i32;
         }
         code
+    }
+
+    /// The code that stands for exactly this Gaussian, if there is one.
+    pub(crate) fn exact_code(
+        &self,
+        gaussian: &Gaussian,
+        grid: &CenterGrid,
+        model: ColorModel,
+    ) -> Option<Code> {
+        let mut codes =
+            (0..=MAX_EXPONENT).map(|exponent| self.code(gaussian, exponent, grid, model));
+        let is_it = |code: &Code| self.gaussian(code, &self.shape(code), grid, model) == *gaussian;
+        codes.find(is_it)
     }
 
     /// The coordinates, in units and with the precision of a code, that are nearest to a centre in

@@ -78,6 +78,18 @@ pub(crate) fn rounded(value: f32) -> f32 {
     step(number(value))
 }
 
+/// Whether a file can have a step.
+#[cfg(feature = "encode")]
+pub(super) fn is_step(value: f32) -> bool {
+    (step(0)..=step(MOST_STEP)).contains(&value) && rounded(value) == value
+}
+
+/// Whether a file can have a step beside another one, which it can have.
+#[cfg(feature = "encode")]
+pub(super) fn is_related(value: f32, other: f32) -> bool {
+    (step(0)..=step(MOST_STEP)).contains(&value) && other * rounded_ratio(value / other) == value
+}
+
 /// The nearest ratio of two steps that a file can have.
 #[cfg(feature = "encode")]
 pub(crate) fn rounded_ratio(value: f32) -> f32 {

@@ -3,8 +3,8 @@
 ``decode`` gives a NumPy array, at any size, of the whole picture or a part of it; ``encode`` makes
 a file of one; ``prefix`` cuts a placeholder off it. ``gaussians`` gives the Gaussians of a file,
 ``render`` renders those of your own, and ``pack`` makes a file of them. With
-``image_gip.register()``, Pillow opens and saves ``.gip``; and ``image_gip.ray`` encodes and decodes
-data sets on a cluster.
+``image_gip.register()``, Pillow opens and saves ``.gip``; ``image_gip.torch`` decodes crops to
+tensors, for training; and ``image_gip.ray`` encodes and decodes data sets on a cluster.
 """
 
 from image_gip._errors import (

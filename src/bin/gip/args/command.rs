@@ -8,6 +8,7 @@ use super::encode::Encode;
 use super::gaussians::{Export, Import};
 use super::inspect::{Compare, Info};
 use super::prefix::Prefix;
+use super::transform::Transform;
 
 /// Encodes, decodes, inspects and compares .gip files: pictures made of 2D Gaussians.
 #[derive(Debug, Parser)]
@@ -24,6 +25,7 @@ Examples:
   gip batch photos --out gips                        a folder, one picture per core
   gip info photo.gip                                 what the file contains
   gip prefix photo.gip 500 placeholder.gip           its first layers, in 500 bytes at most
+  gip transform photo.gip turned.gip --rotate 90     turned, without encoding it again
   gip compare photo.png photo.gip                    how much they differ
   gip export photo.gip photo.npz                     its Gaussians, as arrays of NumPy
 
@@ -44,6 +46,7 @@ pub(crate) enum Command {
     Info(Info),
     Compare(Compare),
     Prefix(Prefix),
+    Transform(Transform),
     Export(Export),
     Import(Import),
 }
@@ -63,7 +66,7 @@ mod tests {
         let mut tool = Args::command();
         tool.build();
         let mut commands: Vec<clap::Command> = tool.get_subcommands().cloned().collect();
-        assert_eq!(commands.len(), 8 + 1, "eight and `help`");
+        assert_eq!(commands.len(), 9 + 1, "nine and `help`");
         commands.push(tool);
         for mut command in commands {
             let help = command.render_long_help().to_string();

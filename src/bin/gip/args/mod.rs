@@ -11,6 +11,7 @@ mod limits;
 #[cfg(test)]
 mod packaged;
 mod prefix;
+mod transform;
 mod values;
 
 pub(crate) use batch::Batch;
@@ -20,3 +21,4 @@ pub(crate) use encode::Encode;
 pub(crate) use gaussians::{Export, GaussianFormat, HeaderArgs, Import};
 pub(crate) use inspect::{Compare, Info};
 pub(crate) use prefix::Prefix;
+pub(crate) use transform::Transform;

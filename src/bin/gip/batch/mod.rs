@@ -9,8 +9,11 @@ mod manifest;
 mod outputs;
 mod run;
 mod selection;
+mod shards;
 mod stop;
+mod tar;
 mod task;
+mod work;
 mod workers;
 
 pub(crate) use run::run;

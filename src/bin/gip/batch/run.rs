@@ -1,31 +1,31 @@
 //! The run of a batch, from its arguments to its exit status.
 
-use core::fmt;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image_gip::EncodeError;
-use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::age;
 use super::budget::Budget;
 use super::failure::{catch_panic, is_disk_full};
-use super::inputs::{self, Item, Rest};
+use super::inputs::{self, Item};
 use super::manifest::{self, Manifest, Record, Written};
 use super::outputs::{self, Plan};
 use super::selection::Selection;
+use super::shards;
 use super::stop::{self, Stop};
 use super::task::{Facts, Task};
+use super::work::{Batch, Tally, bar};
 use super::workers;
 use crate::args;
-use crate::errors::{SOME_FAILED, one_line};
+use crate::errors::{SOME_FAILED, WrongUsage, one_line};
 use crate::files::{self, Output};
 
 /// The budget of one job by default, in pixels.
@@ -35,9 +35,19 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let start = Instant::now();
     let task = Task::new(args)?;
     let selection = Selection::new(&args.include, &args.exclude)?;
-    let output = |below: &Path| args.out.join(below).with_extension(task.extension());
+    if args.shards.is_some() && args.keep.preserve_times {
+        bail!(WrongUsage("--preserve-times needs a file per picture, and not --shards".into()));
+    }
+    let output = |below: &Path| {
+        let name = if args.shards.is_some() { &shards::member(below) } else { below };
+        args.out.join(name).with_extension(task.extension())
+    };
     let (items, rest) = inputs::find(&args.inputs, &selection, |path| task.kind(path), output)?;
-    let Plan { items, folders } = Plan::new(items, args.manifest.as_deref())?;
+    let Plan { mut items, mut folders } = Plan::new(items, args.manifest.as_deref())?;
+    if let Some(each) = args.shards {
+        shards::assign(&mut items, &args.out, each as usize);
+        folders = [args.out.clone()].into();
+    }
     args.manifest.as_deref().map_or(Ok(()), manifest::check)?;
     let jobs = match args.jobs {
         Some(jobs) => usize::from(jobs),
@@ -51,7 +61,11 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let preserve_times = args.keep.preserve_times;
     let batch = Batch { task, items, rest, preserve_times, jobs, budget, stop };
 
-    let skipped = if args.resume { batch.up_to_date()? } else { vec![None; batch.items.len()] };
+    let skipped = match args.shards {
+        _ if !args.resume => vec![None; batch.items.len()],
+        None => batch.up_to_date()?,
+        Some(_) => batch.up_to_date_shards(&args.out),
+    };
     // A .gip file is a result, but a picture may be an original.
     if matches!(batch.task, Task::Decode { .. }) && !batch.stop.is_asked_for() {
         let earlier = args.manifest.as_deref().map(Written::read).unwrap_or_default();
@@ -67,7 +81,10 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     if !batch.stop.is_asked_for() {
         let begin = |path| Manifest::begin(path, &batch.items, &skipped, &batch.rest, args.resume);
         let manifest = args.manifest.as_deref().map(begin).transpose()?;
-        tally = batch.work(&skipped, manifest.as_ref())?;
+        tally = match args.shards {
+            None => batch.work(&skipped, manifest.as_ref())?,
+            Some(_) => batch.work_on_shards(&args.out, &skipped, manifest.as_ref())?,
+        };
     }
     files::print(&batch.summary(&skipped, &tally, start), args.manifest.as_deref())?;
     Ok(ExitCode::from(match batch.stop.signal() {
@@ -75,27 +92,6 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
         None if tally.failed.into_inner() > 0 || !batch.rest.failed.is_empty() => SOME_FAILED,
         None => 0,
     }))
-}
-
-/// What is done, to which files, and how many of them at the same time.
-struct Batch {
-    task: Task,
-    items: Vec<Item>,
-    rest: Rest,
-    /// Whether results get the times of their sources.
-    preserve_times: bool,
-    jobs: usize,
-    budget: Budget,
-    stop: Stop,
-}
-
-/// What has been done.
-#[derive(Debug, Default)]
-struct Tally {
-    written: AtomicUsize,
-    bytes: AtomicU64,
-    failed: AtomicUsize,
-    is_disk_full: AtomicBool,
 }
 
 impl Batch {
@@ -177,14 +173,8 @@ impl Batch {
 
     /// Makes the result of one file.
     fn result(&self, item: &Item) -> Result<Facts> {
-        let stamp = || age::stamp(&item.source).with_context(|| item.source.display().to_string());
-        let before = stamp()?;
         let times = self.preserve_times.then(|| files::times(&item.source)).transpose()?;
-        let (bytes, facts) = self.task.perform(item, &self.budget, &self.stop)?;
-        // The result will be newer, and would never be made again.
-        if stamp()? != before {
-            bail!("{}: the file changed while it was worked on", item.source.display());
-        }
+        let (bytes, facts) = self.bytes(item)?;
         if let Some(folder) = item.output.parent() {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
@@ -217,22 +207,9 @@ impl Batch {
     }
 }
 
-/// A progress bar, which is visible on a terminal only.
-fn bar(length: usize) -> Result<ProgressBar> {
-    let template = "{bar:40} {pos}/{len}  {rate}  {eta} left  {msg}";
-    let style = ProgressStyle::with_template(template)?;
-    let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
-        _ = write!(out, "{:.2} files/s", state.per_sec());
-    });
-    let bar = ProgressBar::new(length as u64).with_style(style);
-    if !bar.is_hidden() {
-        bar.enable_steady_tick(Duration::from_millis(500));
-    }
-    Ok(bar)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::inputs::Rest;
     use super::*;
     use crate::source::Reading;
     use image_gip::{Limits, RenderOptions};

@@ -56,6 +56,13 @@ pub(crate) struct Facts {
     pub(crate) warnings: Vec<String>,
 }
 
+impl Facts {
+    /// Those of a result of which no more than its size in bytes is known.
+    pub(crate) fn of_size(bytes: u64) -> Self {
+        Self { bytes: Some(bytes), ..Self::default() }
+    }
+}
+
 impl Task {
     /// # Errors
     /// When options of the encoder exclude each other.
