@@ -143,7 +143,8 @@ impl Orientation {
                 && both.mirrors_columns() == (self.mirrors_columns() != columns)
                 && both.mirrors_rows() == (self.mirrors_rows() != rows)
         };
-        Self::ALL.into_iter().find(is_it).expect("they are a group")
+        // They are a group: there always is one.
+        Self::ALL.into_iter().find(is_it).unwrap_or(self)
     }
 
     /// Turns a Gaussian of a picture of `width` x `height` pixels as stored. Where rows stay rows, its shape is exact;

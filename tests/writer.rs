@@ -260,6 +260,19 @@ fn a_picture_without_gaussians_is_its_base_colour() {
     }
 }
 
+#[test]
+fn the_header_of_a_file_writes_files_of_every_precision() {
+    let gaussians = gaussians(80, ColorModel::Rgb);
+    let writer = Writer::new(header(ColorModel::Rgb)).with_precision(Precision::Entropy);
+    let file = writer.write(&gaussians).expect("it has options of a file");
+    let (of_file, coded) = read(&file);
+    for precision in [Precision::Float, Precision::Packed, Precision::Entropy] {
+        let writer = Writer::new(of_file.clone()).with_precision(precision);
+        let (_, written) = read(&writer.write(&coded).expect("they are those of a file"));
+        assert_eq!(written.len(), coded.len(), "{precision:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 

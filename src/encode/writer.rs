@@ -25,6 +25,7 @@ use crate::threads::Threads;
 
 /// The least and the largest step of colour.
 const COLOR_STEPS: (f32, f32) = (1e-6, 1000.0);
+// Constants: docs/tuning.md, "Not measured".
 /// The step of colour of a texture's map in that of the picture, as the encoder has it.
 const TEXTURE_STEP: f64 = 0.25;
 

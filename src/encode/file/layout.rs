@@ -117,7 +117,8 @@ impl<'a> FileLayout<'a> {
         let PackedCodes { quantizers, codes } = self.ordered(packed);
         let layers = layers::write_packed_layers(&codes, &quantizers);
         let layers = layers.iter().map(|(count, bytes)| (*count, &bytes[..]));
-        let header = Header { gaussians: codes.len() as u32, ..self.header.clone() };
+        let header =
+            Header { coding: Coding::Packed, gaussians: codes.len() as u32, ..self.header.clone() };
         self.write(&header, &Dequantizer::Packed(quantizers), None, layers)
     }
 
