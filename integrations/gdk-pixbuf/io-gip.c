@@ -132,19 +132,35 @@ static void set_options(GipContext *context, const gip_info *info)
     }
 }
 
+/* Whether there is something to show before `status`, which the library has just found: a warning says why no more,
+ * or else the error why nothing. */
+static gboolean is_shown_until(GipContext *context, gip_status status, GError **error)
+{
+    gip_info info = gip_info_default();
+    GError *found = NULL;
+
+    /* Before what follows fails for a reason of its own. */
+    failed(&found, status);
+    if (gip_decoder_info(context->decoder, &info) || info.decoded_gaussians == 0) {
+        g_propagate_error(error, found);
+        return FALSE;
+    }
+    g_warning("%s", found->message);
+    g_error_free(found);
+    return TRUE;
+}
+
 static gboolean take(GipContext *context, const guchar *bytes, guint size, GError **error)
 {
     gip_info info = gip_info_default();
     gip_status status = gip_decoder_feed(context->decoder, bytes, size, NULL);
     gboolean is_first = !context->pixbuf;
 
-    if (gip_decoder_info(context->decoder, &info))
-        return status ? failed(error, status) : TRUE;
     /* What precedes damage can be shown, if there is something. */
-    if (status && info.decoded_gaussians == 0)
-        return failed(error, status);
-    if (status)
-        g_warning("%s", gip_last_error());
+    if (status && !is_shown_until(context, status, error))
+        return FALSE;
+    if (gip_decoder_info(context->decoder, &info))
+        return TRUE;
     if (is_first && !prepare(context, &info, error))
         return FALSE;
     context->is_done = status || info.is_complete
@@ -178,13 +194,11 @@ static gboolean stop_load(gpointer data, GError **error)
     gboolean result = TRUE;
 
     if (!context->is_done) {
-        gip_info info = gip_info_default();
         gip_status status = gip_decoder_finish(context->decoder, 0);
 
-        if (status && (gip_decoder_info(context->decoder, &info) || info.decoded_gaussians == 0)) {
-            result = failed(error, status);
+        if (status && !is_shown_until(context, status, error)) {
+            result = FALSE;
         } else if (status) {
-            g_warning("%s", gip_last_error());
             /* A part of a layer may have arrived. */
             result = render(context, error);
             tell_update(context);

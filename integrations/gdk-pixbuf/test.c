@@ -50,6 +50,26 @@ static GdkPixbuf *loaded(const char *bytes, gsize size, gsize piece, int divisor
     return pixbuf;
 }
 
+/* Why a file of which `size` bytes arrive is refused. */
+static void check_refusal(const char *folder, const char *name, gsize size, const char *reason)
+{
+    GdkPixbufLoader *loader = gdk_pixbuf_loader_new_with_type("gip", NULL);
+    GError *error = NULL;
+    gsize whole;
+    char *bytes = bytes_of(folder, name, &whole);
+
+    if (gdk_pixbuf_loader_write(loader, (const guchar *)bytes, MIN(size, whole), &error))
+        g_assert_false(gdk_pixbuf_loader_close(loader, &error));
+    else
+        gdk_pixbuf_loader_close(loader, NULL);
+    g_assert_nonnull(error);
+    if (!strstr(error->message, reason))
+        g_error("%s, %d bytes: %s", name, (int)size, error->message);
+    g_error_free(error);
+    g_object_unref(loader);
+    g_free(bytes);
+}
+
 static void check_same(GdkPixbuf *a, GdkPixbuf *b)
 {
     gsize row = (gsize)gdk_pixbuf_get_width(a) * (gsize)gdk_pixbuf_get_n_channels(a);
@@ -119,6 +139,11 @@ int main(int argc, char **argv)
         g_free(bytes);
     }
     g_dir_close(vectors);
+    check_refusal(folder, "xversion.gip", G_MAXSIZE, "version 2");
+    check_refusal(folder, "xcrc-header.gip", G_MAXSIZE, "CRC");
+    check_refusal(folder, "xwidth-zero.gip", G_MAXSIZE, "width");
+    check_refusal(folder, "rgb8.gip", 12, "unexpected end");
+    check_refusal(folder, "rgb8.gip", 60, "unexpected end");
     g_log_set_always_fatal(fatal);
 
     /* Metadata, and the size without a picture. */

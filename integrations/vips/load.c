@@ -203,7 +203,10 @@ static int gip_load_load(VipsForeignLoad *load)
         return failed(gip);
     g_object_set_data_full(G_OBJECT(load->real), "gip-decoder", decoder, (GDestroyNotify)gip_decoder_free);
     if (feed(gip, decoder)) {
-        if (load->fail_on >= VIPS_FAIL_ON_TRUNCATED)
+        gip_info info = gip_info_default();
+
+        /* Of what has arrived there may be no picture. */
+        if (load->fail_on >= VIPS_FAIL_ON_TRUNCATED || gip_decoder_info(decoder, &info) || info.decoded_gaussians == 0)
             return failed(gip);
         g_warning("%s", gip_last_error());
     }

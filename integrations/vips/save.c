@@ -9,6 +9,8 @@
 
 typedef struct {
     VipsForeignSave parent;
+    /* Where the file goes: one of the two. */
+    char *filename;
     VipsTarget *target;
     int quality;
     int effort;
@@ -88,7 +90,8 @@ static int gip_save_build(VipsObject *object)
 {
     VipsForeignSave *save = (VipsForeignSave *)object;
     GipSave *gip = (GipSave *)object;
-    VipsImage **t = (VipsImage **)vips_object_local_array(object, 2);
+    VipsImage **t = (VipsImage **)vips_object_local_array(object, 3);
+    VipsImage *upright;
     gip_source source = gip_source_default();
     gip_metadata metadata = gip_metadata_default();
     gip_encode_options options = gip_encode_options_default();
@@ -103,17 +106,25 @@ static int gip_save_build(VipsObject *object)
     /* A picture is stored upright, so that its orientation is not lost with its metadata. */
     if (!(t[0] = vips_image_copy_memory(save->ready)) || vips_autorot(t[0], &t[1], NULL))
         return -1;
-    if (!(pixels = vips_image_write_to_memory(t[1], &source.size)))
+    upright = t[1];
+    /* Samples of 8 bits may be held in 16, as after an addition. What 16 mean, the interpretation says. */
+    if (upright->BandFmt == VIPS_FORMAT_USHORT && upright->Type != VIPS_INTERPRETATION_RGB16
+        && upright->Type != VIPS_INTERPRETATION_GREY16) {
+        if (vips_cast(upright, &t[2], VIPS_FORMAT_UCHAR, NULL))
+            return -1;
+        upright = t[2];
+    }
+    if (!(pixels = vips_image_write_to_memory(upright, &source.size)))
         return -1;
-    source.width = (guint32)t[1]->Xsize;
-    source.height = (guint32)t[1]->Ysize;
-    source.color = (guint32)t[1]->Bands;
-    source.samples = t[1]->BandFmt == VIPS_FORMAT_USHORT ? GIP_SAMPLES_U16 : GIP_SAMPLES_U8;
+    source.width = (guint32)upright->Xsize;
+    source.height = (guint32)upright->Ysize;
+    source.color = (guint32)upright->Bands;
+    source.samples = upright->BandFmt == VIPS_FORMAT_USHORT ? GIP_SAMPLES_U16 : GIP_SAMPLES_U8;
     source.pixels = pixels;
     if (!save->strip) {
-        metadata.icc = blob_of(t[1], VIPS_META_ICC_NAME);
-        metadata.xmp = blob_of(t[1], VIPS_META_XMP_NAME);
-        metadata.exif = blob_of(t[1], VIPS_META_EXIF_NAME);
+        metadata.icc = blob_of(upright, VIPS_META_ICC_NAME);
+        metadata.xmp = blob_of(upright, VIPS_META_XMP_NAME);
+        metadata.exif = blob_of(upright, VIPS_META_EXIF_NAME);
         if (metadata.exif.size > 0) {
             exif = g_malloc(metadata.exif.size);
             memcpy(exif, metadata.exif.data, metadata.exif.size);
@@ -135,7 +146,12 @@ static int gip_save_build(VipsObject *object)
         vips_error(VIPS_OBJECT_GET_CLASS(object)->nickname, "%s", gip_last_error());
         return -1;
     }
-    result = vips_target_write(gip->target, file.data, file.size) || vips_target_end(gip->target) ? -1 : 0;
+    /* Not before, as that empties a file that is there. */
+    if (gip->filename)
+        gip->target = vips_target_new_to_file(gip->filename);
+    result = -1;
+    if (gip->target && !vips_target_write(gip->target, file.data, file.size) && !vips_target_end(gip->target))
+        result = 0;
     gip_buffer_free(&file);
     return result;
 }
@@ -179,29 +195,16 @@ static void gip_save_init(GipSave *gip)
 
 /* To a file. */
 
-typedef struct {
-    GipSave parent;
-    char *filename;
-} GipSaveFile;
+typedef GipSave GipSaveFile;
 
 typedef GipSaveClass GipSaveFileClass;
 
 G_DEFINE_TYPE(GipSaveFile, gip_save_file, gip_save_get_type())
 
-static int gip_save_file_build(VipsObject *object)
-{
-    GipSaveFile *file = (GipSaveFile *)object;
-
-    if (file->filename && !(file->parent.target = vips_target_new_to_file(file->filename)))
-        return -1;
-    return VIPS_OBJECT_CLASS(gip_save_file_parent_class)->build(object);
-}
-
 static void gip_save_file_class_init(GipSaveFileClass *class)
 {
     take_properties(class);
     VIPS_OBJECT_CLASS(class)->nickname = "gipsave";
-    VIPS_OBJECT_CLASS(class)->build = gip_save_file_build;
 
     VIPS_ARG_STRING(class, "filename", 1, "Filename", "Filename to save to", VIPS_ARGUMENT_REQUIRED_INPUT,
                     G_STRUCT_OFFSET(GipSaveFile, filename), NULL);

@@ -90,6 +90,37 @@ quietly vips colourspace picture.png lab.v lab
 quietly vips copy lab.v lab.gip
 check lab.gip '300x200 uchar, 3 bands, srgb, gipload'
 
+# Samples of 8 bits may be held in more.
+quietly vips add picture.png picture.png sum.v
+check sum.v '300x200 ushort, 3 bands, srgb, pngload'
+for interpretation in srgb multiband; do
+    quietly vips copy sum.v held.v --interpretation "$interpretation"
+    quietly vips copy held.v held.png
+    quietly vips copy held.v 'held.gip[psnr=60,effort=1]'
+    expected=$(vipsheader held.png)
+    expected=${expected#*: }
+    check held.gip "${expected%pngload}gipload"
+    awk -v png="$(vips avg held.png)" -v gip="$(vips avg held.gip)" 'BEGIN { exit (png - gip) ^ 2 > 1 }' ||
+        fail "of $interpretation, the mean is $(vips avg held.gip) in place of $(vips avg held.png)"
+done
+quietly vips copy sum.v held.v --interpretation rgb16
+quietly vips copy held.v 'held.gip[effort=1]'
+check held.gip '300x200 ushort, 3 bands, rgb16, gipload'
+quietly vips extract_band sum.v band.v 0
+quietly vips copy band.v gray.v --interpretation b-w
+quietly vips copy gray.v 'gray.gip[effort=1]'
+check gray.gip '300x200 uchar, 1 band, b-w, gipload'
+
+# What cannot be saved leaves the file that was there.
+cp picture.gip keep.gip
+if vips gipsave picture.png keep.gip --psnr 0.5 2>said; then
+    fail 'there is no such PSNR'
+fi
+cmp keep.gip picture.gip || fail 'the file is lost'
+if vips gipsave picture.png no/folder.gip 2>said; then
+    fail 'there is no such folder'
+fi
+
 # Metadata, and a picture that lies on its side and is stored upright.
 metadata=$root/spec/vectors/metadata.gip
 field "$metadata" orientation 6
@@ -117,6 +148,12 @@ check cut.png '300x200 uchar, 3 bands, srgb, pngload'
 if vips copy 'cut.gip[fail_on=truncated]' cut.png 2>said; then
     fail 'a cut file is taken for a whole one'
 fi
+# Of one that is cut within its first layer there is nothing to show.
+head -c 60 picture.gip >cut.gip
+if vips copy cut.gip none.png 2>said; then
+    fail 'a picture comes from nowhere'
+fi
+grep -q 'unexpected end' said || fail "what is said of a cut file: $(<said)"
 if vips copy "$root/spec/vectors/xformat.gip" none.png 2>said; then
     fail 'a picture comes from nowhere'
 fi
