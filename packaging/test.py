@@ -48,18 +48,19 @@ class Owner(unittest.TestCase):
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, copy)
 
-    def set_owner(self, repository: str, contact: str) -> int:
-        command = [self.root / "packaging/set-owner", repository, contact]
+    def set_owner(self, *words: str) -> int:
+        command = [self.root / "packaging/set-owner", *words]
         return subprocess.run(command, stderr=subprocess.DEVNULL).returncode
 
     def test_all_that_is_published(self) -> None:
-        for repository in ("https://old.example/a", f"{REPOSITORY}/"):
+        for repository in ("https://old.example/a", f"{REPOSITORY}.git", f"{REPOSITORY}/"):
             self.assertEqual(self.set_owner(repository, CONTACT), 0)
             # It can be run again, to the same effect.
             once = {path: path.read_text() for path in self.root.rglob("*") if path.is_file()}
             self.assertEqual(self.set_owner(repository, CONTACT), 0)
             again = {path: path.read_text() for path in self.root.rglob("*") if path.is_file()}
             self.assertEqual(once, again)
+            self.assertNotIn(".git.git", again[self.root / "bindings/wasm/package.json"])
         for path in ("Cargo.toml", "gpu/Cargo.toml", "bindings/python/Cargo.toml"):
             before, after = manifest(path), manifest(path, self.root)
             self.assertEqual(after["package"].pop("repository"), REPOSITORY, path)
@@ -86,6 +87,7 @@ class Owner(unittest.TestCase):
             (REPOSITORY, "<somebody@code.example>"),
         ]:
             self.assertEqual(self.set_owner(repository, contact), 2)
+        self.assertEqual(self.set_owner(REPOSITORY), 2)
 
 
 class Published(unittest.TestCase):
@@ -115,6 +117,11 @@ class Published(unittest.TestCase):
                 self.assertFalse(target.startswith(("/", ".")), f"{name}: {target}")
                 path, _, _ = target.partition("#")
                 self.assertTrue(((ROOT / name).parent / path).exists(), f"{name}: {target}")
+
+    def test_archive_of_nothing(self) -> None:
+        told = subprocess.run([ROOT / "packaging/archive"], capture_output=True, text=True)
+        self.assertEqual(told.returncode, 2)
+        self.assertIn("TARGET TOOL FOLDER", told.stderr)
 
     def test_archive(self) -> None:
         if not GIP.exists():
