@@ -90,6 +90,56 @@ class Owner(unittest.TestCase):
         self.assertEqual(self.set_owner(REPOSITORY), 2)
 
 
+class Notices(unittest.TestCase):
+    """`notices`, of a program with one crate of somebody else."""
+
+    def setUp(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name)
+        self.write("Cargo.toml", '[package]\nname = "own"\n[dependencies]\nother = "1"\n')
+        self.write("src/main.rs", "")
+        self.write("vendor/other/src/lib.rs", "")
+        self.write("vendor/other/.cargo-checksum.json", '{"files": {}}')
+        self.write(
+            "config.toml",
+            f'[source.crates-io]\nreplace-with = "kept"\n[source.kept]\ndirectory = "{self.root}/vendor"\n',
+        )
+
+    def write(self, name: str, text: str) -> None:
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    def notices(self, licence: str) -> subprocess.CompletedProcess:
+        package = f'[package]\nname = "other"\nversion = "1.2.3"\nauthors = ["Some Body"]\nlicense = "{licence}"\n'
+        self.write("vendor/other/Cargo.toml", package)
+        command = [
+            *(ROOT / "packaging/notices", self.root / "out", "--offline"),
+            *("--config", self.root / "config.toml", "--manifest-path", self.root / "Cargo.toml"),
+        ]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_licences_of_the_crate(self) -> None:
+        self.write("vendor/other/LICENSE-APACHE", "the one that is not chosen")
+        self.write("vendor/other/LICENSE-MIT", "the one that is")
+        self.write("vendor/other/NOTICE", "what they demand")
+        self.assertEqual(self.notices("MIT OR Apache-2.0").returncode, 0)
+        told = (self.root / "out").read_text()
+        self.assertIn("other 1.2.3\n\nthe one that is\n", told)
+        self.assertIn("what they demand", told)
+        self.assertNotIn("not chosen", told)
+        self.assertNotIn("own 0", told)
+
+    def test_without_a_text(self) -> None:
+        self.assertEqual(self.notices("Apache-2.0/MIT").returncode, 0)
+        told = (self.root / "out").read_text()
+        self.assertIn("Copyright (c) Some Body\n\nPermission is hereby granted", told)
+        # Of others the words differ.
+        refused = self.notices("BSD-3-Clause")
+        self.assertEqual((refused.returncode, "other 1.2.3" in refused.stderr), (1, True))
+
+
 class Published(unittest.TestCase):
     def test_one_version(self) -> None:
         version = manifest("Cargo.toml")["package"]["version"]
@@ -153,6 +203,13 @@ class Published(unittest.TestCase):
                 tool = archive.extractfile(filled(place["bin-dir"]))
                 self.assertIsNotNone(tool)
                 self.assertEqual(tool and tool.read(), GIP.read_bytes())
+                notices = archive.extractfile(f"{made.name.removesuffix('.tgz')}/LICENSE-THIRD-PARTY")
+                told = notices.read().decode() if notices else ""
+            crates = {crate.split()[0] for line in re.findall("=\n(.+)\n", told) for crate in line.split(",")}
+            self.assertLessEqual({"exr", "kamadak-exif", "lebe", "mutate_once", "tiff"}, crates)
+            # Neither what is only in tests, nor what only builds.
+            self.assertTrue(crates.isdisjoint({"clap_mangen", "proptest", "syn", "thiserror-impl"}))
+            self.assertTrue("Redistributions in binary form must reproduce" in told)
             for name in ("LICENSE-MIT", "man/gip.1", "completions/gip.bash", "desktop/gip.xml"):
                 self.assertIn(f"{made.name.removesuffix('.tgz')}/{name}", names)
             told = Path(f"{made}.sha256").read_text().split()
