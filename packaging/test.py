@@ -14,6 +14,7 @@ import tarfile
 import tempfile
 import tomllib
 import unittest
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -153,6 +154,23 @@ class Published(unittest.TestCase):
         news = (ROOT / "packaging/debian/changelog").read_text()
         self.assertTrue(news.startswith(f"image-gip ({version}-"), news)
 
+    def test_manual_pages(self) -> None:
+        news = (ROOT / "packaging/debian/changelog").read_text()
+        released = parsedate_to_datetime(re.findall("^ -- .*>  (.*)$", news, re.MULTILINE)[0]).date()
+        version = manifest("Cargo.toml")["package"]["version"]
+        pages = sorted((ROOT / "packaging/man").iterdir())
+        self.assertTrue(pages)
+        for page in pages:
+            text = page.read_text()
+            self.assertRegex(text, f'(?m)^.TH {page.stem} 1 {released} "gip {version}" *$')
+            # Tables of the help are wider than a page, and would be filled as any text.
+            self.assertNotRegex(text, "(?m)^ ", page.name)
+        if shutil.which("mandoc"):
+            command = ["mandoc", "-Tlint", "-Wwarning", *pages]
+            self.assertEqual(subprocess.run(command, capture_output=True, text=True).stdout, "")
+        else:
+            print("skipped: there is no mandoc to check manual pages")
+
     def test_links(self) -> None:
         """crates.io and npm follow links in the repository that is named; PyPI does not."""
         link = re.compile(r"\]\(([^)\s]+)\)")
@@ -210,7 +228,7 @@ class Published(unittest.TestCase):
             # Neither what is only in tests, nor what only builds.
             self.assertTrue(crates.isdisjoint({"clap_mangen", "proptest", "syn", "thiserror-impl"}))
             self.assertTrue("Redistributions in binary form must reproduce" in told)
-            for name in ("LICENSE-MIT", "man/gip.1", "completions/gip.bash", "desktop/gip.xml"):
+            for name in ("LICENSE-MIT", "man/gip.1", "completions/gip.bash", "desktop/gip.xml", "docs/metadata.md"):
                 self.assertIn(f"{made.name.removesuffix('.tgz')}/{name}", names)
             told = Path(f"{made}.sha256").read_text().split()
             self.assertEqual(told, [hashlib.sha256(made.read_bytes()).hexdigest(), made.name])
