@@ -1,6 +1,6 @@
 // Builds the package into `dist/`: `npm run build`.
 //
-// It needs a Rust toolchain with the target wasm32-unknown-unknown, and the npm packages of
+// It needs a Rust toolchain with the target wasm32-unknown-unknown, Python, and the npm packages of
 // `npm ci`. The command line tool of wasm-bindgen comes from crates.io, in exactly the version that
 // Cargo.lock has.
 
@@ -151,3 +151,5 @@ for (const file of readdirSync(scripts)) {
 }
 // npm packs no links.
 for (const file of ['LICENSE-APACHE', 'LICENSE-MIT']) copyFileSync(join(root, file), join(dist, file));
+const crates = ['--locked', '--target', 'wasm32-unknown-unknown'];
+run('python3', '../../packaging/notices', join(dist, 'LICENSE-THIRD-PARTY'), ...crates);

@@ -290,6 +290,7 @@ pub unsafe extern "C" fn gip_decoder_gaussians_for(
     guard(|| {
         // SAFETY: the caller passes a decoder.
         let state = unsafe { Decoder::of(decoder) }?.read()?;
+        pointers::check(gaussians, "gaussians")?;
         let enough = state.input.picture()?.header().gaussians_for(width, height);
         // SAFETY: the caller passes a place for the number.
         unsafe { pointers::store(gaussians, enough, "gaussians") }

@@ -291,20 +291,22 @@ impl EncodeOptions {
 
     fn target(&self) -> Result<Target, Failure> {
         let value = self.value;
-        // The encoder refuses what is out of range; the casts saturate.
+        // The encoder refuses what is out of range, and names what a cast has left of it.
         let whole = || {
-            if value.fract() == 0.0 {
-                return Ok(value);
+            let number = value as u32;
+            if f64::from(number) == value {
+                return Ok(number);
             }
-            Err(Failure::argument(format!("value {value}; it must be a whole number")))
+            let message = format!("value {value}; it must be a positive whole number of 32 bits");
+            Err(Failure::argument(message))
         };
         Ok(match self.target {
             target if target == CTarget::Auto as u32 => Target::Auto,
             target if target == CTarget::Quality as u32 => Target::Quality(value),
-            target if target == CTarget::Bytes as u32 => Target::Bytes(whole()? as u64),
+            target if target == CTarget::Bytes as u32 => Target::Bytes(whole()?.into()),
             target if target == CTarget::BitsPerPixel as u32 => Target::BitsPerPixel(value),
             target if target == CTarget::Psnr as u32 => Target::Psnr(value),
-            target if target == CTarget::Gaussians as u32 => Target::Gaussians(whole()? as u32),
+            target if target == CTarget::Gaussians as u32 => Target::Gaussians(whole()?),
             target if target == CTarget::Lambda as u32 => Target::Lambda(value),
             other => return Err(unknown("target", other)),
         })

@@ -54,6 +54,8 @@ pub unsafe extern "C" fn gip_decoder_info(decoder: *const Decoder, info: *mut In
     guard(|| {
         // SAFETY: the caller passes a decoder.
         let state = unsafe { Decoder::of(decoder) }?.read()?;
+        // SAFETY: the caller passes a structure with its size.
+        unsafe { structures::check(info) }?;
         let (header, stream) = (state.input.picture()?.header(), state.input.stream());
         let orientation = stream.orientation().map_or(0, |orientation| orientation.to_exif());
         let known = Info {

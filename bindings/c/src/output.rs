@@ -50,6 +50,8 @@ pub unsafe extern "C" fn gip_output_size(
         let view = unsafe { structures::read_or_default(view) }?;
         // SAFETY: the caller passes a decoder.
         let state = unsafe { Decoder::of(decoder) }?.read()?;
+        // SAFETY: the caller passes a structure with its size.
+        unsafe { structures::check(output) }?;
         let picture = state.input.picture()?;
         let request = view.request(picture.header())?;
         let shape = Shape::of(&request, &picture)?;

@@ -6,7 +6,7 @@ use core::slice;
 use crate::status::Failure;
 
 /// Refuses a pointer that is null or not aligned, with the name that it has in the header.
-fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
+pub(crate) fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     if pointer.is_null() {
         return Err(Failure::argument(format!("{name} is null")));
     }

@@ -7,9 +7,9 @@ use image_gip::{DecodeError, Picture, RenderOptions};
 use crate::decoder::{Bytes, Decoder, Input};
 use crate::output::{Rows, Shape};
 use crate::status::{Failure, Status, guard};
-use crate::structures;
 use crate::threads;
 use crate::view::{Request, Samples, View};
+use crate::{pointers, structures};
 
 /// Renders a view of the picture to `out`: the rows of gip_output_size, each `stride` bytes after the one
 /// before; 0 stands for rows without padding. Bytes between rows are left alone.
@@ -35,6 +35,8 @@ pub unsafe extern "C" fn gip_render(
         let view = unsafe { structures::read_or_default(view) }?;
         // SAFETY: the caller passes a decoder.
         let decoder = unsafe { Decoder::of(decoder) }?;
+        // How it is aligned depends on the samples.
+        pointers::check(out.cast::<u8>(), "the output")?;
         let state = decoder.read()?;
         let picture = state.input.picture()?;
         let request = view.request(picture.header())?;

@@ -85,6 +85,15 @@ pub(crate) unsafe fn read_or_default<T: Structure>(from: *const T) -> Result<T, 
     unsafe { read(from) }
 }
 
+/// Refuses a structure that [`write`] would refuse, before there is anything to write.
+///
+/// # Safety
+/// As of [`write`].
+pub(crate) unsafe fn check<T: Structure>(to: *const T) -> Result<(), Failure> {
+    // SAFETY: the same contract.
+    unsafe { size_of_callers(to) }.map(drop)
+}
+
 /// Fills the caller's structure. Its size remains; fields that this library does not know become 0.
 ///
 /// # Safety

@@ -333,6 +333,10 @@ static void refused(const uint8_t *pixels)
     EXPECT(GIP_STATUS_ARGUMENT, gip_encode(&source, &options, &file, NULL));
     options = fast(GIP_TARGET_GAUSSIANS, -1);
     EXPECT(GIP_STATUS_ARGUMENT, gip_encode(&source, &options, &file, NULL));
+    CHECK(strstr(gip_last_error(), "value -1;"));
+    options = fast(GIP_TARGET_BYTES, 1e12);
+    EXPECT(GIP_STATUS_ARGUMENT, gip_encode(&source, &options, &file, NULL));
+    CHECK(strstr(gip_last_error(), "value 1000000000000;"));
 }
 
 int main(void)

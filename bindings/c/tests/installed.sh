@@ -35,6 +35,11 @@ nm -D --defined-only "$prefix/lib/libgip.so" | awk '{ print $3 }' | sort >"$scra
 "${CC:-cc}" -fpreprocessed -dD -E -P include/gip.h | grep -o '\bgip_[a-z_]*(' | tr -d '(' |
     sort -u >"$scratch/declared"
 diff "$scratch/exported" "$scratch/declared" || fail 'exported is other than what is declared'
+# What the crates in it ask of those who pass them on.
+notices=$prefix/share/doc/libgip/LICENSE-THIRD-PARTY
+for words in '^kamadak-exif ' '^mutate_once ' 'Redistributions in binary form'; do
+    grep -q "$words" "$notices" || fail "LICENSE-THIRD-PARTY lacks $words"
+done
 
 # The command of the README, in the words of the README, with the example beside it.
 awk '/^```/ { inside = ($0 == "```c"); next } inside' README.md | diff - examples/gip2ppm.c ||

@@ -324,6 +324,11 @@ static void refused(void)
     EXPECT(GIP_STATUS_ARGUMENT, gip_decoder_gaussians_for(decoder, 1, 1, NULL));
     EXPECT(GIP_STATUS_ARGUMENT, gip_decoder_gaussians_for(NULL, 1, 1, &number));
     EXPECT(GIP_STATUS_NEED_MORE, gip_decoder_gaussians_for(fed, 1, 1, &number));
+    /* A call that could never succeed needs no more of the file. */
+    EXPECT(GIP_STATUS_ARGUMENT, gip_decoder_gaussians_for(fed, 1, 1, NULL));
+    EXPECT(GIP_STATUS_ARGUMENT, gip_decoder_info(fed, NULL));
+    EXPECT(GIP_STATUS_ARGUMENT, gip_output_size(fed, NULL, NULL));
+    EXPECT(GIP_STATUS_ARGUMENT, gip_render(fed, NULL, NULL, 0, 0));
     EXPECT(GIP_STATUS_ARGUMENT, gip_output_size(NULL, NULL, &output));
     EXPECT(GIP_STATUS_ARGUMENT, gip_output_size(decoder, NULL, NULL));
     EXPECT(GIP_STATUS_NEED_MORE, gip_output_size(fed, NULL, &output));

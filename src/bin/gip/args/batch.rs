@@ -40,7 +40,7 @@ Examples:
   gip batch gips --out back --decode --format webp
   gip batch gips --out thumbs --thumbnail 160 --format jpg
 
-Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files failed. After Ctrl-C or a
+Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files failed. After Ctrl-C or a \
 SIGTERM, the run stops within milliseconds to seconds and ends by that signal (130 or 143 in a shell)."
 )]
 pub(crate) struct Batch {

@@ -30,7 +30,7 @@ Examples:
   gip export photo.gip photo.npz                     its Gaussians, as arrays of NumPy
 
 In place of any file, `-` is standard input or standard output, but not as an input of `gip batch`.
-Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` or some of
+Exit status: 0 for success, 1 for failure, 2 for wrong usage, 3 if some files of `gip batch` or some of \
 several files of `gip info` failed."
 )]
 pub(crate) struct Args {

@@ -33,8 +33,8 @@ use crate::errors::WrongUsage;
 #[command(
     allow_negative_numbers = true,
     after_help = "\
-At most one of --gaussians, --bpp, --bytes, --psnr, --quality and --lambda may be given. If the target cannot
-be met, the file comes as close as possible, and the report gives the reason. A size counts the metadata: one
+At most one of --gaussians, --bpp, --bytes, --psnr, --quality and --lambda may be given. If the target cannot \
+be met, the file comes as close as possible, and the report gives the reason. A size counts the metadata: one \
 that the file would have without them, but not with them, is an error."
 )]
 pub(crate) struct Encode {

@@ -12,6 +12,9 @@ use clap_mangen::Man;
 
 use super::Args;
 
+/// When this version is released, as packaging/debian/changelog says.
+const DATE: &str = "2026-10-01";
+
 /// The manual pages by their names: of the tool, and of each of its commands.
 fn pages() -> BTreeMap<String, Vec<u8>> {
     let mut tool = Args::command().disable_help_subcommand(true);
@@ -23,10 +26,30 @@ fn pages() -> BTreeMap<String, Vec<u8>> {
     for (name, command) in named.chain([("gip".into(), tool.clone())]) {
         let mut page = Vec::new();
         let man = Man::new(command.display_name(name.clone()));
-        man.source(&source).render(&mut page).expect("in memory");
-        pages.insert(format!("{name}.1"), page);
+        man.date(DATE).source(&source).render(&mut page).expect("in memory");
+        let page = readable(&String::from_utf8(page).expect("UTF-8"));
+        pages.insert(format!("{name}.1"), page.into_bytes());
     }
     pages
+}
+
+/// A page without what programs that show it warn of, and with examples that stay in their lines.
+fn readable(page: &str) -> String {
+    let page = page.replace("\n.br\n\n.br\n", "\n.sp\n");
+    let (options, notes) = page.split_once("\n.SH EXTRA\n").unwrap_or((&page, ""));
+    let mut readable = options.to_owned();
+    if !notes.is_empty() {
+        readable += "\n.SH EXTRA\n";
+    }
+    for line in notes.lines() {
+        readable += &match line.strip_prefix("  ").map(|example| example.split_once("  ")) {
+            Some(Some((command, text))) => format!(".TP\n{command}\n{}\n", text.trim_start()),
+            Some(None) => format!(".PP\n{}\n", line.trim_start()),
+            None if line.is_empty() => ".PP\n".into(),
+            None => format!("{line}\n"),
+        };
+    }
+    readable
 }
 
 /// The completions by their names, which are those that the shells expect.
