@@ -260,7 +260,7 @@ test('the size waits for the Exif, and every step is upright', async () => {
     assert.deepEqual((await state()).box, upright);
     for (const part of [0.5, 0.8, 1]) {
       allowed = part === 1 ? Infinity : bytes.length * part;
-      await until(async () => (await state()).canvas !== undefined, 'a picture');
+      await until(async () => Boolean((await state()).canvas), 'a picture');
       assert.deepEqual((await state()).canvas, upright);
     }
     await settled(page);
