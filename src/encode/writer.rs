@@ -11,6 +11,7 @@ use super::options::Precision;
 use super::progress::Observer;
 use super::rate_model;
 use super::rdo;
+use super::texture;
 use crate::coding::entropy::{
     CenterGrid, Code, MOST_CODE, Quantization, QuantizationSteps, QuantizedCodes,
 };
@@ -25,9 +26,6 @@ use crate::threads::Threads;
 
 /// The least and the largest step of colour.
 const COLOR_STEPS: (f32, f32) = (1e-6, 1000.0);
-// Constants: docs/tuning.md, "Not measured".
-/// The step of colour of a texture's map in that of the picture, as the encoder has it.
-const TEXTURE_STEP: f64 = 0.25;
 
 /// Writes Gaussians that come from elsewhere to a file: those of another method, or of another file. Nothing is
 /// fitted. By default it stores floats, which lose nothing.
@@ -196,7 +194,7 @@ impl Writer {
     /// The payload of the texture's map; `None` without texture.
     fn texture(&self, quantization: &Quantization) -> Result<Option<Vec<u8>>, WriteError> {
         let map = Texture::map_header(&self.header);
-        let step = f64::from(quantization.color[0]) * TEXTURE_STEP;
+        let step = f64::from(quantization.color[0]) * texture::STEP;
         let quantization = rate_model::quantization(step.log2(), &[1.0; 3]);
         render::check(&self.texture, MAX_GAUSSIANS).map_err(WriteError::Texture)?;
         let mut codes =

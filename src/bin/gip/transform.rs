@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use anyhow::{Context, Result, anyhow};
 use image_gip::{
-    Coding, Gaussian, Header, Kernel, Limits, Orientation, Picture, PictureError, Precision,
-    Region, RenderOptions, StreamDecoder, WriteError, Writer, metrics,
+    Coding, Gaussian, Header, Limits, Orientation, Picture, PictureError, Precision, Region,
+    RenderOptions, StreamDecoder, WriteError, Writer, metrics,
 };
 
 use crate::args;
@@ -125,10 +125,7 @@ impl Move {
 
 /// Whether the box around a Gaussian reaches into a picture.
 fn shows(gaussian: &Gaussian, header: &Header) -> bool {
-    let reach = match header.kernel {
-        Kernel::Exponential { cutoff } => cutoff.sqrt(),
-        _ => 2.0,
-    };
+    let reach = header.kernel.cutoff().sqrt();
     let [xx, _, yy] = gaussian.covariance();
     let reaches = |center: f32, variance: f32, side: u32| {
         let extent = reach * variance.sqrt();

@@ -30,7 +30,7 @@ use crate::texture::{OCTAVES, Texture, amplitude_sum, direction_sum, has_amplitu
 pub(crate) const USUAL_STRENGTH: u8 = 50;
 /// The colour step of a map as a share of that of the file. An error of a node's sum is one of half as much in
 /// 64 pixels of three channels, so with 0.144 it would count as much as theirs.
-const STEP: f64 = 0.25;
+pub(crate) const STEP: f64 = 0.25;
 /// The amplitude from which on the direction counts in full.
 const LEAST_DIRECTED: f32 = 0.06;
 /// The fewest and the most iterations of training. A map is small, so it has time for more of them than its

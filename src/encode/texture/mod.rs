@@ -9,4 +9,4 @@ mod cells;
 mod fit;
 mod strengths;
 
-pub(crate) use fit::{USUAL_STRENGTH, payload};
+pub(crate) use fit::{STEP, USUAL_STRENGTH, payload};

@@ -4,6 +4,7 @@ use std::io::{self, ErrorKind};
 use std::panic::{self, AssertUnwindSafe};
 
 use anyhow::{Error, Result, bail};
+use image_gip::EncodeError;
 
 use super::inputs::Item;
 
@@ -14,6 +15,11 @@ pub(super) fn catch_panic<T>(item: &Item, work: impl FnOnce() -> Result<T>) -> R
         let text = text.or_else(|| panic.downcast_ref().cloned()).unwrap_or_default();
         bail!("{}: internal error: {text}", item.source.display())
     })
+}
+
+/// Whether an error says no more than that the batch was asked to stop.
+pub(super) fn is_cancelled(error: &Error) -> bool {
+    matches!(error.downcast_ref(), Some(EncodeError::Cancelled))
 }
 
 /// Whether an error is that of a full disk, or of a full quota.

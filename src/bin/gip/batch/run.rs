@@ -1,7 +1,6 @@
 //! The run of a batch, from its arguments to its exit status.
 
 use std::fs;
-use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
@@ -10,11 +9,10 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use image_gip::EncodeError;
 
 use super::age;
 use super::budget::Budget;
-use super::failure::{catch_panic, is_disk_full};
+use super::failure::{catch_panic, is_cancelled};
 use super::inputs::{self, Item};
 use super::manifest::{self, Manifest, Record, Written};
 use super::outputs::{self, Plan};
@@ -25,7 +23,7 @@ use super::task::{Facts, Task};
 use super::work::{Batch, Tally, bar};
 use super::workers;
 use crate::args;
-use crate::errors::{SOME_FAILED, WrongUsage, one_line};
+use crate::errors::{SOME_FAILED, WrongUsage};
 use crate::files::{self, Output};
 
 /// The budget of one job by default, in pixels.
@@ -146,16 +144,9 @@ impl Batch {
                     tally.bytes.fetch_add(facts.bytes.unwrap_or(0), Ordering::Relaxed);
                     Record::written(item, facts)
                 }
-                Err(error) if matches!(error.downcast_ref(), Some(EncodeError::Cancelled)) => {
-                    return;
-                }
+                Err(error) if is_cancelled(&error) => return,
                 Err(error) => {
-                    if is_disk_full(&error) {
-                        tally.is_disk_full.store(true, Ordering::Relaxed);
-                        self.stop.halt();
-                    }
-                    let line = one_line(&error);
-                    bar.suspend(|| _ = writeln!(io::stderr(), "error: {line}"));
+                    let line = self.tell(&error, &tally, &bar);
                     let failed = tally.failed.fetch_add(1, Ordering::Relaxed) + 1;
                     bar.set_message(format!("{failed} failed"));
                     Record::failed(item, line)

@@ -2,23 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
 
 use anyhow::{Context, Result, bail};
-use image_gip::EncodeError;
 
 use super::age;
-use super::failure::{catch_panic, is_disk_full};
+use super::failure::{catch_panic, is_cancelled};
 use super::inputs::Item;
 use super::manifest::{Manifest, Record};
 use super::tar::{self, TarWriter};
 use super::task::Facts;
 use super::work::{Batch, Tally, bar};
 use super::workers;
-use crate::errors::one_line;
 use crate::files;
 
 /// The path of a result below the folder of the results, as the key that a member is named by: what follows the
@@ -92,15 +90,7 @@ impl Batch {
         let is_missing = |shard: &Shard<'_>| skipped[shard.members[0].0].is_none();
         let shards: Vec<_> = self.shards(out).into_iter().filter(is_missing).collect();
         let progress = bar(shards.iter().map(|shard| shard.members.len()).sum())?;
-        let tell = |error: &anyhow::Error| {
-            if is_disk_full(error) {
-                tally.is_disk_full.store(true, Ordering::Relaxed);
-                self.stop.halt();
-            }
-            let line = one_line(error);
-            progress.suspend(|| _ = writeln!(io::stderr(), "error: {line}"));
-            line
-        };
+        let tell = |error: &anyhow::Error| self.tell(error, &tally, &progress);
         workers::for_each(self.jobs, shards.len(), &self.stop, |index| {
             let shard = &shards[index];
             let (mut written, mut failed) = (Vec::new(), Vec::new());
@@ -147,8 +137,4 @@ impl Batch {
         progress.finish_and_clear();
         fatal.into_inner().map_or(Ok(tally), Err)
     }
-}
-
-fn is_cancelled(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(EncodeError::Cancelled))
 }

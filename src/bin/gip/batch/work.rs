@@ -1,17 +1,20 @@
 //! What a batch works on, and what has been done.
 
 use core::fmt;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 use super::age;
 use super::budget::Budget;
+use super::failure::is_disk_full;
 use super::inputs::{Item, Rest};
 use super::stop::Stop;
 use super::task::{Facts, Task};
+use crate::errors::one_line;
+use crate::files;
 
 /// What is done, to which files, and how many of them at the same time.
 pub(super) struct Batch {
@@ -45,6 +48,17 @@ impl Batch {
             bail!("{}: the file changed while it was worked on", item.source.display());
         }
         Ok(made)
+    }
+
+    /// Tells why something failed, and stops when the disk is full. Returns the line that was told.
+    pub(super) fn tell(&self, error: &Error, tally: &Tally, bar: &ProgressBar) -> String {
+        if is_disk_full(error) {
+            tally.is_disk_full.store(true, Ordering::Relaxed);
+            self.stop.halt();
+        }
+        let line = one_line(error);
+        bar.suspend(|| files::tell(&format!("error: {line}")));
+        line
     }
 }
 
