@@ -135,8 +135,8 @@ pub use decode::Decoder;
 pub use decode::{ChunkStatistics, Decoded, Samples, StreamDecoder, decode};
 #[cfg(feature = "encode")]
 pub use encode::{
-    EncodeError, Encoded, Encoder, OptionError, Precision, Progress, Report, Shortfall, Source,
-    SourceError, Target, Tune, WriteError, Writer, encode,
+    EncodeError, Encoded, Encoder, Importance, OptionError, Precision, Progress, Report, Shortfall,
+    Source, SourceError, Target, Tune, WriteError, Writer, encode,
 };
 pub use error::{
     DecodeError, LimitKind, PictureError, Reason, RequestError, SkippedChunk, Unsupported,
@@ -162,5 +162,5 @@ pub mod training {
         Adam, Densification, GaussNewton, GaussianFilter, LearningRateSchedule, NewColor, NewShape,
         Optimizer, Placement, Portion, Quantization, Training,
     };
-    pub use crate::encode::{ErrorNorm, VectorQuantizer};
+    pub use crate::encode::{CustomPlacement, ErrorMap, ErrorNorm, VectorQuantizer};
 }

@@ -48,7 +48,7 @@ impl Bled {
     }
 
     /// The source with these samples.
-    pub(crate) fn source<'a>(&'a self, source: &Source<'_>) -> Source<'a> {
+    pub(crate) fn source<'a>(&'a self, source: &Source<'a>) -> Source<'a> {
         source.with_samples(match self {
             Self::Eight(samples) => SourceSamples::Eight(samples),
             Self::Sixteen(samples) => SourceSamples::Sixteen(samples),

@@ -1,11 +1,13 @@
 //! The public interface of the encoder: its options, and the file and report that it returns.
 
 use core::ops::ControlFlow;
+use std::sync::Arc;
 
 use super::aim::Aim;
 use super::appearance::Curve;
 use super::error::{EncodeError, OptionError};
 use super::fit::training::Training;
+use super::importance::Importance;
 use super::job::Job;
 use super::options::{Precision, Target, Tune};
 use super::pipeline;
@@ -15,9 +17,10 @@ use super::source::Source;
 use super::stopwatch::Stopwatch;
 use super::texture::USUAL_STRENGTH;
 use crate::color::ColorModel;
-use crate::container::Metadata;
+use crate::container::{Header, Metadata};
 use crate::kernel::Kernel;
 use crate::limits::Limits;
+use crate::render::Picture;
 use crate::threads::Threads;
 
 // Constants: docs/tuning.md, "Iterations".
@@ -91,6 +94,7 @@ pub struct Encoder {
     pub(crate) metadata: Metadata,
     training: Option<Training>,
     keep_invisible: bool,
+    importance: Option<Arc<dyn Importance>>,
 }
 
 impl Default for Encoder {
@@ -116,6 +120,7 @@ impl Encoder {
             metadata: Metadata::default(),
             training: None,
             keep_invisible: false,
+            importance: None,
         }
     }
 
@@ -210,6 +215,13 @@ impl Encoder {
         self
     }
 
+    /// What part of the picture matters more: how much errors count by their place, with [`Tune::Visual`]. The target
+    /// is still that of the whole picture. Default `None`: everything matters the same.
+    pub fn with_importance(mut self, importance: Option<Arc<dyn Importance>>) -> Self {
+        self.importance = importance;
+        self
+    }
+
     /// Encodes `source`. A target that cannot be met is not an error: the file comes as close as
     /// it can, and [`Report::shortfall`] gives the reason.
     ///
@@ -234,12 +246,60 @@ impl Encoder {
         source: &Source<'_>,
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
+        self.run(source, None, progress)
+    }
+
+    /// Encodes Gaussians that were fitted to `source` by other means: codes are chosen for the target as they are
+    /// for those of [`Encoder::encode`], by coordinate descent over rate and distortion. Nothing is trained. The
+    /// base colour is that of the picture's header.
+    ///
+    /// A Gaussian whose colour exceeds 2 full samples, whose centre is far outside of the picture, or one of whose
+    /// standard deviations exceeds twice the longer side, begins with the nearest values within. Those that are not
+    /// worth their bytes are left out. For a target of more bytes or quality than the Gaussians have, see
+    /// [`Report::shortfall`]. [`Writer`](crate::Writer) stores Gaussians as they are, without a source.
+    ///
+    /// # Errors
+    /// Those of [`Encoder::encode`]; and [`EncodeError::Option`] when the precision is not
+    /// [`Precision::Entropy`], when the picture's header has another size, colour model or depth than the source,
+    /// or when its kernel is not the quartic one.
+    pub fn encode_fitted(
+        &self,
+        source: &Source<'_>,
+        fitted: &Picture<'_>,
+    ) -> Result<Encoded, EncodeError> {
+        self.encode_fitted_with(source, fitted, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Encoder::encode_fitted`], with a callback as that of [`Encoder::encode_with`].
+    ///
+    /// # Errors
+    /// Those of [`Encoder::encode_fitted`], and [`EncodeError::Cancelled`] when `progress` cancels.
+    pub fn encode_fitted_with(
+        &self,
+        source: &Source<'_>,
+        fitted: &Picture<'_>,
+        progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
+    ) -> Result<Encoded, EncodeError> {
+        self.run(source, Some(fitted), progress)
+    }
+
+    /// Encodes `source`: with Gaussians of its own, or those that are fitted.
+    fn run(
+        &self,
+        source: &Source<'_>,
+        fitted: Option<&Picture<'_>>,
+        progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
+    ) -> Result<Encoded, EncodeError> {
         let start = Stopwatch::start();
         let (aim, runs) = self.check(source.pixels())?;
+        if let Some(fitted) = fitted {
+            self.check_fitted(source, fitted.header())?;
+        }
         let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
         let mut observer = Observer::new(progress, iterations);
         let source = source.keeping_invisible(self.keep_invisible);
         let source = source.seen_by(Curve::of(&self.metadata));
+        let source = source.weighted_by(self.importance.as_deref());
         let jobs: Vec<_> = runs
             .iter()
             .map(|(training, passes)| Job {
@@ -256,7 +316,10 @@ impl Encoder {
                 passes: *passes,
             })
             .collect();
-        let outcome = on_threads(self.threads, || pipeline::encode(&jobs, &mut observer))??;
+        let outcome = on_threads(self.threads, || match fitted {
+            Some(fitted) => pipeline::encode_fitted(&jobs, fitted, &mut observer),
+            None => pipeline::encode(&jobs, &mut observer),
+        })??;
         Ok(Encoded {
             bytes: outcome.file,
             report: Report {
@@ -275,6 +338,25 @@ impl Encoder {
         })
     }
 
+    /// Checks that Gaussians with this header can be encoded for a source.
+    fn check_fitted(&self, source: &Source<'_>, header: &Header) -> Result<(), OptionError> {
+        let is_of_source = [header.width, header.height] == [source.width(), source.height()]
+            && header.color == source.color()
+            && header.depth == source.depth();
+        let rules = [
+            (
+                self.precision == Precision::Entropy,
+                "the precision must be Entropy; a Writer stores them with another one",
+            ),
+            (is_of_source, "their header must have the source's size, colour model and depth"),
+            (header.kernel == Kernel::Quartic, "entropy coding needs the quartic kernel"),
+        ];
+        match rules.into_iter().find(|(holds, _)| !holds) {
+            Some((_, rule)) => Err(OptionError::Fitted(rule)),
+            None => Ok(()),
+        }
+    }
+
     /// Checks all options; returns the aim for a picture with so many pixels, and the constants of training and
     /// the number of passes of rate-distortion optimization, of lower efforts as well if it is small.
     fn check(&self, pixels: usize) -> Result<(Aim, Vec<(Training, u32)>), EncodeError> {
@@ -282,6 +364,9 @@ impl Encoder {
         let efforts = efforts.ok_or(OptionError::Effort(self.effort))?;
         if self.texture > MOST_STRENGTH {
             return Err(OptionError::Texture(self.texture).into());
+        }
+        if self.importance.is_some() && self.tune == Tune::Psnr {
+            return Err(OptionError::Importance.into());
         }
         let aim = Aim::new(self.target, pixels)?;
         let fewest = if aim.is_by_error() { MIN_ITERATIONS_BY_ERROR } else { 1 };

@@ -44,7 +44,7 @@ const MISSED: f64 = 0.1;
 const MOST_OF_SIZE: f64 = 0.1;
 
 /// A fit before it was changed.
-struct Fitted {
+pub(crate) struct Fitted {
     gaussians: Vec<Gaussian>,
     distortion: Distortion,
 }
@@ -74,6 +74,19 @@ pub(crate) fn finish(
     } else {
         None
     };
+    code(fit, too_good, job, judge, tiled, layout, observer)
+}
+
+/// The file of a fit as it is, coded for the target, or of `too_good` if that comes nearer to the target.
+pub(crate) fn code(
+    fit: Fit<'_>,
+    too_good: Option<Fitted>,
+    job: &Job<'_>,
+    judge: &Judge<'_>,
+    tiled: &TiledSource,
+    layout: &FileLayout<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<(Vec<u8>, Work)> {
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
     let of_other = too_good.as_ref().map_or(0, |fitted| size_of_val(&fitted.gaussians[..]));

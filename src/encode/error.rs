@@ -101,6 +101,9 @@ pub enum OptionError {
     /// The strength of the texture is more than 100.
     #[error("texture {0}; it must be 0 to 100")]
     Texture(u8),
+    /// Importance is given, but all errors are to count the same.
+    #[error("importance; Tune::Psnr counts all errors the same")]
+    Importance,
     /// The number in a [`Target`](crate::Target) is out of range.
     #[error("{name} {value}; it must be {least} to {most}")]
     Target {
@@ -144,6 +147,9 @@ pub enum OptionError {
     /// that it breaks.
     #[error("training: {0}")]
     Training(&'static str),
+    /// Gaussians that are given cannot be encoded so; the text is the rule that they break.
+    #[error("Gaussians: {0}")]
+    Fitted(&'static str),
     /// No thread could be started.
     #[error("no thread could be started: {0}")]
     Threads(String),

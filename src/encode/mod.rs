@@ -11,6 +11,7 @@ mod entropy;
 mod error;
 mod file;
 mod fit;
+mod importance;
 mod job;
 mod loss;
 mod mul_add;
@@ -43,8 +44,9 @@ mod writer;
 
 pub use encoder::{Encoded, Encoder, Report, encode};
 pub use error::{EncodeError, OptionError, SourceError, WriteError};
-pub use fit::VectorQuantizer;
 pub(crate) use fit::training;
+pub use fit::{CustomPlacement, ErrorMap, VectorQuantizer};
+pub use importance::Importance;
 pub use loss::ErrorNorm;
 pub use options::{Precision, Target, Tune};
 pub use progress::Progress;

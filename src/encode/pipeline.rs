@@ -20,6 +20,7 @@ use super::tiled_source::TiledSource;
 use super::verify::Verified;
 use super::workload::PREPARATION;
 use super::{entropy, packed, resolutions, verify};
+use crate::render::Picture;
 
 // Constants: docs/tuning.md, "Search for a target".
 /// If the target is a size, and fewer pixels than this come to each Gaussian, the file is compared with one
@@ -52,6 +53,18 @@ pub(crate) fn encode(jobs: &[Job<'_>], observer: &mut Observer<'_>) -> Result<Ou
         best.work = work;
     }
     Ok(best)
+}
+
+/// The file of the last job, of Gaussians that are given for its source.
+pub(crate) fn encode_fitted(
+    jobs: &[Job<'_>],
+    fitted: &Picture<'_>,
+    observer: &mut Observer<'_>,
+) -> Result<Outcome> {
+    let job = jobs.last().expect("there is a job");
+    verify::check_limits(job)?;
+    let judge = Judge::new(job.source);
+    encode_for_target(job, &judge, Form::Fitted(fitted), Work::default(), observer)
 }
 
 /// The file of a job: a sketch, unless one of the picture itself shows more.
@@ -157,11 +170,13 @@ fn with_fewer(
 
 /// What is fitted.
 #[derive(Clone, Copy, Debug)]
-enum Form {
+enum Form<'a> {
     /// A small copy of the picture.
     Sketch,
     /// The picture, with so many Gaussians, or as many as the target asks for.
     Whole(Option<usize>),
+    /// Nothing: these are the Gaussians.
+    Fitted(&'a Picture<'a>),
 }
 
 /// Fits the source, codes the Gaussians for the target, and decodes the file to tell what it shows. `work` was done
@@ -169,7 +184,7 @@ enum Form {
 fn encode_for_target(
     job: &Job<'_>,
     judge: &Judge<'_>,
-    form: Form,
+    form: Form<'_>,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
@@ -179,14 +194,18 @@ fn encode_for_target(
     let (sketch, count) = match form {
         Form::Sketch => (Some(Sketch::of(job, observer)?), None),
         Form::Whole(count) => (None, count),
+        Form::Fitted(fitted) => (None, Some(fitted.gaussians().len())),
     };
     let tiled = match &sketch {
         Some(sketch) => sketch.tiled(source, observer)?,
         None => TiledSource::new(source, job.tune, observer)?,
     };
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata)
-        .with_first_layer(job.first_layer);
+    let layout = match form {
+        Form::Fitted(fitted) => FileLayout::of_fitted(fitted.header(), job.metadata),
+        _ => FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata),
+    };
+    let layout = layout.with_first_layer(job.first_layer);
 
     let asked = job.aim;
     let (aim, budget) = within_reach(job, &layout, &tiled, observer)?;
@@ -208,6 +227,11 @@ fn encode_for_target(
     let mut is_lost_to_rounding = false;
     let (file, mut work) = if let Some(sketch) = &sketch {
         sketch.encode(job, budget, &tiled, &layout, work, observer)
+    } else if let Form::Fitted(fitted) = form {
+        let sources = Resolutions::single(&tiled);
+        let mut fit = Fit::new(sources, training, budget, precision, layout.base(), job.seed, work);
+        fit.adopt(fitted.gaussians(), observer)?;
+        entropy::code(fit, None, job, judge, &tiled, &layout, observer)
     } else {
         let copies = resolutions::copies(job, observer)?;
         let sources = Resolutions { picture: &tiled, copies: &copies };

@@ -2,6 +2,7 @@
 
 use super::appearance::Curve;
 use super::error::SourceError;
+use super::importance::Importance;
 use crate::color::{ColorModel, SampleDepth, with_channels};
 use crate::container::MAX_SIDE;
 
@@ -16,6 +17,16 @@ pub struct Source<'a> {
     keeps_invisible: bool,
     /// What samples look like, if they are not about those of sRGB.
     curve: Option<&'static Curve>,
+    /// How much errors count by their place, if not the same everywhere.
+    importance: Option<PlacedImportance<'a>>,
+}
+
+/// How much errors of a picture, or of a smaller copy of it, count.
+#[derive(Clone, Copy, Debug)]
+struct PlacedImportance<'a> {
+    of_picture: &'a dyn Importance,
+    /// The size of the picture.
+    size: [u32; 2],
 }
 
 /// Most pixels of a row that are read at a time.
@@ -60,7 +71,15 @@ impl<'a> Source<'a> {
     }
 
     fn of(width: u32, height: u32, color: ColorModel, samples: SourceSamples<'a>) -> Self {
-        Self { width, height, color, samples, keeps_invisible: false, curve: None }
+        Self {
+            width,
+            height,
+            color,
+            samples,
+            keeps_invisible: false,
+            curve: None,
+            importance: None,
+        }
     }
 
     /// The same picture, where colours count under alpha 0 as well, or not.
@@ -73,21 +92,43 @@ impl<'a> Source<'a> {
         Self { curve, ..self }
     }
 
+    /// The same picture, where errors count by their place.
+    pub(crate) fn weighted_by<'b>(&self, importance: Option<&'b dyn Importance>) -> Source<'b>
+    where
+        'a: 'b,
+    {
+        let size = [self.width, self.height];
+        let importance = importance.map(|of_picture| PlacedImportance { of_picture, size });
+        Source { importance, ..*self }
+    }
+
+    /// How much errors count around a pixel, if not the same everywhere.
+    pub(crate) fn importance(&self) -> Option<impl Fn([f32; 2]) -> f32> {
+        let PlacedImportance { of_picture, size } = self.importance?;
+        let scale = [size[0] as f32 / self.width as f32, size[1] as f32 / self.height as f32];
+        Some(move |[x, y]: [f32; 2]| of_picture.at([x * scale[0], y * scale[1]]))
+    }
+
     /// What samples look like, if they are not about those of sRGB.
     pub(crate) fn curve(&self) -> Option<&'static Curve> {
         self.curve
     }
 
     /// A picture of the same size, model and depth with other samples.
-    pub(crate) fn with_samples<'b>(&self, samples: SourceSamples<'b>) -> Source<'b> {
+    pub(crate) fn with_samples<'b>(&self, samples: SourceSamples<'b>) -> Source<'b>
+    where
+        'a: 'b,
+    {
         self.resized(self.size(), samples)
     }
 
     /// A picture of the same model with another size, and its samples.
-    pub(crate) fn resized<'b>(&self, size: [usize; 2], samples: SourceSamples<'b>) -> Source<'b> {
-        let Self { color, keeps_invisible, curve, .. } = *self;
+    pub(crate) fn resized<'b>(&self, size: [usize; 2], samples: SourceSamples<'b>) -> Source<'b>
+    where
+        'a: 'b,
+    {
         let [width, height] = size.map(|side| side as u32);
-        Source { width, height, color, samples, keeps_invisible, curve }
+        Source { width, height, samples, ..*self }
     }
 
     /// Whether errors of a colour count as they show: times alpha.

@@ -3,17 +3,20 @@
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use image_gip::{
-    EncodeError, Encoded, Encoder, Precision, Progress, Shortfall, Source, Target, Tune,
+    EncodeError, Encoded, Encoder, Header, Importance, Limits as ImageLimits,
+    Picture as Gaussians, Precision, Progress, Shortfall, Source, Target, Tune,
 };
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::array::Picture;
-use crate::errors::{encode_error, warn};
+use crate::errors::{encode_error, picture_error, vec_for, warn};
+use crate::given::{self, Given};
 use crate::light::{DisplayFields, LightFields};
 use crate::numbers::{Integer, Real};
 use crate::objects::Limits;
@@ -84,6 +87,13 @@ const NEWS: f64 = 0.002;
 ///         them before, if nothing shall tell how they are turned.
 ///     limits: Those of the decoder that is to read the file: what it would refuse is not encoded.
 ///         Default: Limits(), with which `decode` reads every file that is encoded.
+///     importance: height x width of float32: how much an error counts at each pixel, for pictures of which some part
+///         matters more, with tune="visual". Only ratios count, up to 16 either way. The target is still that of the
+///         whole picture.
+///     fitted: Gaussians that were fitted to the picture by other means, as for `render`, with the quartic kernel.
+///         Nothing is fitted: their codes are chosen for the target, by coordinate descent over rate and distortion.
+///         With precision="entropy" only.
+///     base_color: What `fitted` is added to, as for `render`.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
 ///         or raises an exception, the encoding is cancelled. None goes on.
 ///
@@ -99,7 +109,7 @@ const NEWS: f64 = 0.002;
 ///     CancelledError: `progress` returned False.
 ///     MemoryError: There is no memory to convert float32.
 #[pyfunction]
-#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, first_layer=None, precision="entropy", threads=1, seed=0, keep_invisible=false, cicp=None, mastering_display=None, content_light=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, progress=None))]
+#[pyo3(signature = (array, *, bpp=None, bytes=None, quality=None, psnr=None, gaussians=None, effort=4, tune="visual", texture=50, first_layer=None, precision="entropy", threads=1, seed=0, keep_invisible=false, cicp=None, mastering_display=None, content_light=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None, importance=None, fitted=None, base_color=None, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
@@ -126,6 +136,9 @@ pub(crate) fn encode<'py>(
     texts: Option<&Bound<'py, PyAny>>,
     metadata: &str,
     limits: Option<Limits>,
+    importance: Option<&Bound<'py, PyAny>>,
+    fitted: Option<&Bound<'py, PyAny>>,
+    base_color: Option<&Bound<'py, PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let target = target(bpp, bytes, quality, psnr, gaussians)?;
@@ -148,8 +161,33 @@ pub(crate) fn encode<'py>(
         .with_metadata(stored);
     let picture = Picture::new(array)?;
     let source = picture.source()?;
+    let encoder = match importance {
+        Some(weights) => encoder.with_importance(Some(importance_of(weights, &source)?)),
+        None => encoder,
+    };
+    let given = fitted.map(Given::new).transpose()?;
+    let mut header = Header::new(source.width(), source.height(), source.color());
+    header.depth = source.depth();
+    match (base_color, &given) {
+        (Some(base), Some(given)) => {
+            let channels = given.color.channels();
+            header.color = given.color;
+            header.base_color[..channels].copy_from_slice(&given::base_color(base, channels)?);
+        }
+        (None, Some(given)) => header.color = given.color,
+        (Some(_), None) => {
+            return Err(PyTypeError::new_err("base_color is that of fitted Gaussians"));
+        }
+        (None, None) => (),
+    }
+    let drawn = ImageLimits::none();
+    let fitted = given
+        .as_ref()
+        .map(|given| Gaussians::from_gaussians(&header, &given.gaussians, &drawn))
+        .transpose()
+        .map_err(|error| picture_error(py, &error))?;
     let encoded = py
-        .detach(|| run(&encoder, &source, threads, progress.as_ref()))?
+        .detach(|| run(&encoder, &source, fitted.as_ref(), threads, progress.as_ref()))?
         .map_err(|error| encode_error(py, &error))?;
     if let Some(
         shortfall @ (Shortfall::PsnrBelow { .. }
@@ -161,6 +199,41 @@ pub(crate) fn encode<'py>(
         warn(py, "ShortfallWarning", &shortfall.to_string())?;
     }
     Ok(PyBytes::new(py, &encoded.bytes))
+}
+
+/// The importance of pixels, which is that of the one in the middle of a block.
+#[derive(Debug)]
+struct ImportanceMap {
+    width: usize,
+    values: Vec<f32>,
+}
+
+impl Importance for ImportanceMap {
+    fn at(&self, [x, y]: [f32; 2]) -> f32 {
+        let height = self.values.len() / self.width;
+        let (x, y) = ((x as usize).min(self.width - 1), (y as usize).min(height - 1));
+        self.values[y * self.width + x]
+    }
+}
+
+/// The importance that an array gives to the pixels of a source.
+fn importance_of(
+    array: &Bound<'_, PyAny>,
+    source: &Source<'_>,
+) -> PyResult<Arc<dyn Importance>> {
+    let [width, height] = [source.width(), source.height()].map(|side| side as usize);
+    let wrong = || {
+        let message = format!("importance must be a NumPy array of float32 and shape ({height}, {width})");
+        PyValueError::new_err(message)
+    };
+    let array = array.cast::<PyArrayDyn<f32>>().map_err(|_| wrong())?;
+    let array = array.try_readonly().map_err(|_| wrong())?;
+    if array.shape() != [height, width] {
+        return Err(wrong());
+    }
+    let mut values = vec_for(width * height)?;
+    values.extend(array.as_array().iter());
+    Ok(Arc::new(ImportanceMap { width, values }))
 }
 
 fn checked_effort(effort: &Bound<'_, PyAny>) -> PyResult<u8> {
@@ -315,6 +388,7 @@ impl Drop for Done<'_> {
 fn run(
     encoder: &Encoder,
     source: &Source<'_>,
+    fitted: Option<&Gaussians<'_>>,
     threads: usize,
     callback: Option<&Py<PyAny>>,
 ) -> PyResult<Result<Encoded, EncodeError>> {
@@ -326,7 +400,10 @@ fn run(
                 let _done = Done(&watch);
                 let mut last = None;
                 let report = &mut |progress: &Progress| watch.report(progress, &mut last);
-                encoded = Some(encoder.encode_with(source, report));
+                encoded = Some(match fitted {
+                    Some(fitted) => encoder.encode_fitted_with(source, fitted, report),
+                    None => encoder.encode_with(source, report),
+                });
             });
             watch.attend(callback)
         })

@@ -278,7 +278,7 @@ impl<'py> HeaderFields<'_, 'py> {
 }
 
 /// The base colour of so many channels: one number for all, or one for each.
-fn base_color(object: &Bound<'_, PyAny>, channels: usize) -> PyResult<Vec<u16>> {
+pub(crate) fn base_color(object: &Bound<'_, PyAny>, channels: usize) -> PyResult<Vec<u16>> {
     let within = |number: Integer<'_>| number.within("base_color", 0..=u16::MAX);
     if let Ok(number) = object.extract() {
         return Ok(vec![within(number)?; channels]);

@@ -454,3 +454,23 @@ def test_arguments_that_do_not_fit(file: bytes) -> None:
         image_gip.render(gaussians, width=1 << 17, height=1)
     with pytest.raises(ValueError, match="region"):
         image_gip.render(gaussians, **SIZE, region=(90, 0, 20, 20))
+
+
+def test_fitted_gaussians_get_the_codes_of_the_encoder() -> None:
+    gaussians = some(150)
+    gaussians["color"] *= 0.4
+    picture = image_gip.render(gaussians, **SIZE, base_color=110 * 257)
+    keywords: dict[str, Any] = {"fitted": gaussians, "tune": "psnr"}
+    file = image_gip.encode(picture, **keywords, base_color=110 * 257, psnr=40)
+    error = np.square(image_gip.decode(file).astype(float) - picture).mean()
+    assert 40 <= 10 * np.log10(255**2 / error) < 40.5
+    assert len(file) < len(image_gip.pack(gaussians, **SIZE)) / 4
+    small = image_gip.encode(picture, **keywords, base_color=(110 * 257,) * 3, bytes=800)
+    assert len(small) <= 800
+    for wrong in ({"base_color": 0}, {"fitted": some(9, 1)}, {"fitted": some(9), "precision": "f32"}):
+        with pytest.raises((TypeError, ValueError)):
+            image_gip.encode(picture, **wrong)
+    with pytest.raises(ValueError, match="Gaussian 7"):
+        broken = some(9)
+        broken["center"][7] = np.nan
+        image_gip.encode(picture, fitted=broken)

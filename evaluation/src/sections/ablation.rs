@@ -85,7 +85,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let counts: &[u32] = if bench.quick { &QUICK_CURVE } else { &CURVE };
     let mut text = format!(
         "Compared with: variants of GaussianImage++ (components, intervals) and of our own encoder \
-         (quantizers, bit depths, seeds), tuned for PSNR. {} All figures are means over the pictures that each \
+         (placement, quantizers, bit depths, seeds), tuned for PSNR. {} All figures are means over the pictures that each \
          table names; PSNR is that of the float rendering.\n",
         methods::description(ablation.iterations),
     );
@@ -93,6 +93,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     text.push_str(&ablation.seeds()?);
     ablation.pictures = pictures(FEWER_PICTURES);
     text.push_str(&ablation.intervals()?);
+    text.push_str(&ablation.placements()?);
     text.push_str(&ablation.depths(counts)?);
     let iterations = ablation.own_iterations;
     text.push_str(&quantizers::measure(bench, &ablation.pictures, counts, iterations)?);
@@ -162,6 +163,31 @@ impl Ablation<'_> {
             "\n### Intervals of pruning and growing\n\nCompared with each other: GaussianImage++ \
              with {} Gaussians as floats, grown as often as with the paper's intervals of 5,000 \
              and 10,000 of 50,000 iterations; {}.\n{}{}",
+            self.gaussians,
+            self.bench.pictures_used(self.pictures.len()),
+            table.finish(),
+            better_than(&CRITERIA, &compared[0], &compared[1..]),
+        ))
+    }
+
+    /// Where new Gaussians go.
+    fn placements(&mut self) -> Result<String> {
+        let mut table = Table::new(&["placement", "PSNR in dB", "MS-SSIM"]);
+        let mut compared: Vec<NamedFigures> = Vec::new();
+        for (name, training) in methods::placements(self.own_iterations) {
+            let outcome = self.float(&format!("placement {name}"), training)?;
+            table.row(&[
+                name.to_owned(),
+                format!("{:.2}", outcome.psnr),
+                format!("{:.4}", outcome.ms_ssim),
+            ]);
+            compared.push((name.to_owned(), vec![outcome.psnr, outcome.ms_ssim]));
+        }
+        // The encoder's choice comes first.
+        Ok(format!(
+            "\n### Placement\n\nCompared with each other: our encoder at {} iterations, {} Gaussians as floats; \
+             {}.\n{}{}",
+            self.own_iterations,
             self.gaussians,
             self.bench.pictures_used(self.pictures.len()),
             table.finish(),
@@ -252,7 +278,7 @@ impl Ablation<'_> {
         ))
     }
 
-    /// A published method without quantization.
+    /// A method without quantization.
     fn float(&mut self, variant: &str, training: Training) -> Result<VariantMeans> {
         let iterations = training.iterations;
         let encoder = gip::psnr_encoder(gip::EFFORT).with_training(training);

@@ -1,7 +1,11 @@
 //! The published methods, from the parts of this crate's training.
 
+use std::sync::Arc;
+
 use image_gip::Parameterization;
-use image_gip::training::{GaussianFilter, LearningRateSchedule, Training};
+use image_gip::training::{
+    CustomPlacement, ErrorMap, GaussianFilter, LearningRateSchedule, NewColor, Placement, Training,
+};
 
 /// Iterations of the paper.
 pub(crate) const PAPER_ITERATIONS: u32 = 50_000;
@@ -48,6 +52,45 @@ pub(crate) fn paper(
         training.filter = GAUSSIAN_IMAGE_FILTER;
     }
     training
+}
+
+/// Our training with other places for new Gaussians, as the table of them calls them. A placement of one's own gets
+/// its row here (docs/methods.md).
+pub(crate) fn placements(iterations: u32) -> Vec<(&'static str, Training)> {
+    let placed = |placement, color| {
+        let mut training = Training::fast(iterations);
+        training.densification.placement = placement;
+        training.densification.color = color;
+        training
+    };
+    let usual = Training::fast(iterations);
+    let color = usual.densification.color;
+    let worst = Placement::Custom(Arc::new(WorstOfSquares));
+    vec![
+        ("spread by the error", usual),
+        ("largest errors", placed(Placement::Top, NewColor::Zero)),
+        ("worst of squares", placed(worst, color)),
+    ]
+}
+
+/// The worst pixel of each of as many squares as there are to be new Gaussians.
+#[derive(Debug)]
+struct WorstOfSquares;
+
+impl CustomPlacement for WorstOfSquares {
+    fn pixels(&self, count: usize, map: &ErrorMap) -> Vec<u32> {
+        let side = ((map.errors.len() as f64 / count as f64).sqrt().ceil() as usize).max(1);
+        let columns = map.width.div_ceil(side);
+        let mut worst = vec![(0.0, 0); columns * map.height.div_ceil(side)];
+        for (pixel, &error) in map.errors.iter().enumerate() {
+            let (x, y) = (pixel % map.width, pixel / map.width);
+            let square = &mut worst[y / side * columns + x / side];
+            if error > square.0 {
+                *square = (error, pixel as u32);
+            }
+        }
+        worst.into_iter().filter(|&(error, _)| error > 0.0).map(|(_, pixel)| pixel).collect()
+    }
 }
 
 /// Our training, with bit depths of position, shape and colour.

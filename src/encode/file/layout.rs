@@ -60,6 +60,13 @@ impl<'a> FileLayout<'a> {
         Self::of(header, metadata)
     }
 
+    /// That of Gaussians that come with a header, of which the numbers of another file do not matter.
+    pub(crate) fn of_fitted(header: &Header, metadata: &'a Metadata) -> Self {
+        let &Header { width, height, color, depth, kernel, base_color, .. } = header;
+        let header = Header { depth, kernel, base_color, ..Header::new(width, height, color) };
+        Self::of(header, metadata)
+    }
+
     /// That of pictures with this header.
     pub(crate) fn of(header: Header, metadata: &'a Metadata) -> Self {
         Self { header, metadata, texture: None, first_layer: None }

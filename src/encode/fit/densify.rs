@@ -3,6 +3,7 @@
 //! Gaussian Filters").
 
 use super::components::{Bounds, Components};
+use super::custom_placement::ErrorMap;
 use super::paper;
 use super::pass::{Pass, Scene};
 use super::training::{Densification, GaussianFilter, NewColor, NewShape, Placement};
@@ -34,7 +35,7 @@ struct NewPosition {
     /// nearly all of the error, hundreds of Gaussians with the full variance would overlap
     /// there, take steps in the same direction, and never converge.
     variance_share: f32,
-    /// The negative residual of each channel ([`Pass::residuals`]), with [`Placement::Spread`].
+    /// The negative residual of each channel ([`Pass::residuals`]); 0 with [`Placement::Top`].
     missing: [f32; 4],
 }
 
@@ -78,13 +79,20 @@ impl Densifier<'_> {
         observer: &mut Observer<'_>,
     ) -> Result<Vec<Components>> {
         let tiled = self.scene.tiled;
-        let positions = match self.options.placement {
+        let positions = match &self.options.placement {
             Placement::Top => {
-                let errors = |tile| self.errors(tile).errors;
-                let pixels = paper::top(count, [tiled.width, tiled.height], errors, observer)?;
+                let pixels = paper::largest(count, &self.error_map(observer)?.errors);
                 let position =
                     |pixel| NewPosition { pixel, variance_share: 1.0, missing: [0.0; 4] };
                 pixels.into_iter().map(position).collect()
+            }
+            Placement::Custom(placement) => {
+                let map = self.error_map(observer)?;
+                let position = |pixel: u32| {
+                    let missing = map.missing[pixel as usize];
+                    NewPosition { pixel, variance_share: 1.0, missing }
+                };
+                map.chosen(&**placement, count).into_iter().map(position).collect()
             }
             Placement::Spread => {
                 let (grid, sums) = (self.tile_grid(), self.pass.placement_errors());
@@ -130,6 +138,28 @@ impl Densifier<'_> {
     fn tile_grid(&self) -> [usize; 2] {
         let TiledSource { width, height, .. } = self.scene.tiled;
         [width.div_ceil(TILE_WIDTH), height.div_ceil(TILE_HEIGHT)]
+    }
+
+    /// The errors of all pixels.
+    fn error_map(&self, observer: &mut Observer<'_>) -> Result<ErrorMap> {
+        let TiledSource { width, height, .. } = *self.scene.tiled;
+        let [columns, _] = self.tile_grid();
+        let (mut errors, mut missing) = (vec![0.0; width * height], vec![[0.0; 4]; width * height]);
+        let lines = TILE_HEIGHT * width;
+        let rows = errors.chunks_mut(lines).zip(missing.chunks_mut(lines)).enumerate();
+        observer.map(rows, |(row, (errors, missing))| {
+            for column in 0..columns {
+                let tile = self.errors(row * columns + column);
+                let left = column * TILE_WIDTH;
+                for y in 0..errors.len() / width {
+                    for x in 0..TILE_WIDTH.min(width - left) {
+                        errors[y * width + left + x] = tile.errors[y][x];
+                        missing[y * width + left + x] = tile.missing(x, y);
+                    }
+                }
+            }
+        })?;
+        Ok(ErrorMap { width, height, errors, missing })
     }
 
     /// The error of every pixel of a tile, and the residuals.

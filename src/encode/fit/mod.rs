@@ -5,6 +5,7 @@ mod bins;
 pub(crate) mod budget;
 mod checkpoint;
 mod components;
+mod custom_placement;
 mod densify;
 mod gauss_newton;
 mod growth;
@@ -21,6 +22,7 @@ mod training_loop;
 mod training_tile;
 
 pub(crate) use components::MOST_COLOR;
+pub use custom_placement::{CustomPlacement, ErrorMap};
 pub use paper::VectorQuantizer;
 pub(crate) use paper::quantizers_for;
 pub(crate) use trained::{Fit, Work};

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::components::Components;
+use super::custom_placement::CustomPlacement;
 use super::paper::vector_quantizer::VectorQuantizer;
 use crate::encode::loss::ErrorNorm;
 use crate::gaussian::Parameterization;
@@ -91,7 +92,7 @@ pub enum Portion {
 }
 
 /// How the pixels for new Gaussians are chosen by their errors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Placement {
     /// The pixels of largest error (paper). They form clusters.
@@ -99,6 +100,8 @@ pub enum Placement {
     /// Pixels evenly spread, with a density proportional to the error. The denser the new
     /// Gaussians are, the less variance they have.
     Spread,
+    /// Those that a placement of one's own chooses.
+    Custom(Arc<dyn CustomPlacement>),
 }
 
 /// The initial colour of a new Gaussian.
@@ -107,7 +110,7 @@ pub enum Placement {
 pub enum NewColor {
     /// 0 in all channels (the paper's released code; its text for the first Gaussians).
     Zero,
-    /// This share of source minus rendering at the pixel; with [`Placement::Spread`] only.
+    /// This share of source minus rendering at the pixel; not with [`Placement::Top`].
     Residual(f32),
 }
 
@@ -336,7 +339,7 @@ impl Training {
             ((0.0..1.0).contains(&d.replaced), "densification.replaced must be in [0, 1)"),
             (d.prune_interval >= 1, "densification.prune_interval must be at least 1"),
             (
-                d.placement == Placement::Spread || d.color == NewColor::Zero,
+                d.placement != Placement::Top || d.color == NewColor::Zero,
                 "densification.color must be Zero where densification.placement is Top",
             ),
             (

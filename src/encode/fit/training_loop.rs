@@ -1,6 +1,7 @@
 //! The training loop.
 
 use super::budget::Budget;
+use super::components::Components;
 use super::parameters::Parameters;
 use super::schedule::TrainingSchedule;
 use super::trained::{Fit, Next};
@@ -8,6 +9,7 @@ use super::training::Training;
 use crate::encode::error::Result;
 use crate::encode::progress::Observer;
 use crate::encode::workload::Workload;
+use crate::gaussian::Gaussian;
 
 // Constants: docs/tuning.md, "Growth".
 /// The error after training as a share of the error during growth: training continues to lower the
@@ -80,6 +82,23 @@ impl Fit<'_> {
                 self.cull(surplus / (culls_left as usize + 1), observer)?;
             }
         }
+        self.settle(observer)
+    }
+
+    /// Takes Gaussians from elsewhere, within the bounds of training, for a fit that is not trained.
+    pub(crate) fn adopt(
+        &mut self,
+        gaussians: &[Gaussian],
+        observer: &mut Observer<'_>,
+    ) -> Result<()> {
+        let parameterization = self.bounds.parameterization;
+        let components = |&Gaussian { center, cholesky, color }: &Gaussian| {
+            let shape = parameterization.shape_of(cholesky);
+            self.bounds.clamped(Components { center, shape, color })
+        };
+        let components: Vec<_> = gaussians.iter().map(components).collect();
+        self.parameters.extend(&components);
+        self.parameters.sort(observer)?;
         self.settle(observer)
     }
 

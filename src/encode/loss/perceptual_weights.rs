@@ -8,6 +8,7 @@
 
 use super::activity::{self, BLOCK, Luma, RADII, SCALES};
 use crate::encode::error::Result;
+use crate::encode::importance::within_range;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
 use crate::encode::source::Source;
@@ -85,6 +86,10 @@ impl PerceptualWeights {
             stress(&mut blocks, columns, |x, y| {
                 curve.slope(code(source, &shares[..colors], [x, y])).powi(2)
             });
+        }
+        if let Some(importance) = source.importance() {
+            let middle = |at: usize| at as f32 + 0.5 * BLOCK as f32;
+            stress(&mut blocks, columns, |x, y| within_range(importance([middle(x), middle(y)])));
         }
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
         Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })

@@ -2,6 +2,7 @@ from collections.abc import Callable, Iterable, Mapping
 from os import PathLike
 from typing import Any, Protocol, Self, SupportsIndex, TypeAlias, final
 
+import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 from typing_extensions import Buffer
 
@@ -91,6 +92,9 @@ def encode(
     texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
     metadata: MetadataPolicy = "all",
     limits: Limits | None = None,
+    importance: NDArray[np.float32] | None = None,
+    fitted: _Gaussians | None = None,
+    base_color: SupportsIndex | Iterable[SupportsIndex] | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> bytes: ...
 def gaussians(

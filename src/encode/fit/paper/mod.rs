@@ -10,6 +10,6 @@ mod ranges;
 pub(super) mod vector_quantizer;
 
 pub(super) use lsq::{LsqQuantizers, QuantizerGradients, add, decoded};
-pub(super) use placement::{random_shape, top};
+pub(super) use placement::{largest, random_shape};
 pub(crate) use ranges::quantizers_for;
 pub use vector_quantizer::VectorQuantizer;
