@@ -233,7 +233,6 @@ def test_importance(photo: Picture) -> None:
     importance = np.ones((height, width), np.float32)
     importance[:, : width // 2] = 6
     plain = image_gip.encode(photo, bytes=1500, effort=2)
-    assert image_gip.encode(photo, bytes=1500, effort=2, importance=0 * importance + 3) == plain
     own = image_gip.encode(photo, bytes=1500, effort=2, importance=importance)
     left = np.s_[:, : width // 2]
     before, after = (psnr(photo[left], image_gip.decode(file)[left]) for file in (plain, own))

@@ -467,10 +467,14 @@ def test_fitted_gaussians_get_the_codes_of_the_encoder() -> None:
     assert len(file) < len(image_gip.pack(gaussians, **SIZE)) / 4
     small = image_gip.encode(picture, **keywords, base_color=(110 * 257,) * 3, bytes=800)
     assert len(small) <= 800
-    for wrong in ({"base_color": 0}, {"fitted": some(9, 1)}, {"fitted": some(9), "precision": "f32"}):
+    for wrong in (
+        {"base_color": 0},
+        {"fitted": some(9, 1)},
+        {"fitted": some(9), "precision": "f32"},
+    ):
         with pytest.raises((TypeError, ValueError)):
             image_gip.encode(picture, **wrong)
+    broken = some(9)
+    broken["center"][7] = np.nan
     with pytest.raises(ValueError, match="Gaussian 7"):
-        broken = some(9)
-        broken["center"][7] = np.nan
         image_gip.encode(picture, fitted=broken)
