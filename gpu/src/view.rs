@@ -65,9 +65,8 @@ impl View {
     }
 
     /// Whether the view shows the whole picture, in all pixels of a texture of this size.
-    pub(crate) fn fills(&self, header: &Header, texture: wgpu::Extent3d) -> bool {
-        let size = self.size.unwrap_or((header.width, header.height));
-        self.region.is_none() && size == (texture.width, texture.height)
+    pub(crate) fn fills(&self, header: &Header, texture: (u32, u32)) -> bool {
+        self.region.is_none() && self.size.unwrap_or((header.width, header.height)) == texture
     }
 
     /// The scale, region and Gaussians for a picture.

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use image_gip::{Header, Picture};
-use wgpu::{BindGroupDescriptor, BindGroupEntry, BufferUsages, TextureUsages};
 
-use crate::device::{buffer, check, checked};
-use crate::error::RenderError;
-use crate::picture::GpuPicture;
-use crate::pipelines::{FORMAT, Pipelines};
+use super::device::{buffer, check, checked};
+use super::error::RenderError;
+use super::picture::GpuPicture;
+use super::pipelines::{FORMAT, Pipelines};
+use super::wgpu::{self, BindGroupDescriptor, BindGroupEntry, BufferUsages, TextureUsages};
 use crate::view::{Frame, View};
 use crate::work;
 
@@ -282,8 +282,7 @@ impl GpuRenderer {
         self.wait()?;
         let result = receiver.recv().map_err(|_| wgpu::BufferAsyncError);
         result.and_then(|result| result).map_err(|error| RenderError::Read(Box::new(error)))?;
-        let mapped =
-            buffer.get_mapped_range(..).map_err(|error| RenderError::Read(Box::new(error)))?;
+        let mapped = super::mapped(&buffer)?;
         let rows = mapped.chunks_exact(padded as usize);
         Ok(rows.flat_map(|line| &line[..row]).copied().collect())
     }
@@ -306,7 +305,9 @@ fn check_texture(
         "not a single 2D image"
     } else if texture.width() < frame.region.width || texture.height() < frame.region.height {
         "smaller than the view"
-    } else if texture.mip_level_count() > 1 && !view.fills(header, texture.size()) {
+    } else if texture.mip_level_count() > 1
+        && !view.fills(header, (texture.width(), texture.height()))
+    {
         "with mip levels, and not as large as the whole picture is drawn"
     } else {
         return Ok(());
