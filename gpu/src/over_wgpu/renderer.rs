@@ -127,7 +127,7 @@ impl GpuRenderer {
     /// [`RenderError::OtherRenderer`] for a picture that was uploaded by another renderer,
     /// [`RenderError::View`] when the view is out of range, [`RenderError::Work`] when it takes too
     /// much work at one of the levels, [`RenderError::Texture`] when the texture is too small, not
-    /// `Rgba8Unorm`, or no storage texture, or has mip levels and another size than the picture, and
+    /// `Rgba8Unorm`, or no storage texture, or has mip levels which the view does not fill, and
     /// [`RenderError::Device`] when the device fails. Nothing is drawn then.
     pub fn draw(
         &self,
