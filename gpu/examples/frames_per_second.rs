@@ -39,8 +39,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let picture = decoder.picture().ok_or("there is no header")?;
     let (width, height) = size.unwrap_or((picture.header().width, picture.header().height));
 
-    let (renderer, name) = adapter::renderer()?;
+    let (device, queue, name) = adapter::device()?;
     println!("adapter: {name}");
+    let renderer = GpuRenderer::new(device, queue)?;
     println!("{} Gaussians, {width} x {height} pixels", picture.gaussians().len());
     let uploaded = renderer.upload(&picture)?;
     measure(&renderer, &uploaded, &View::new().with_size(width, height))

@@ -6,13 +6,14 @@
 //!     cargo run --release --example gip_to_png -- photo.gip part.png 30720x20480 640x480 9000,12000
 
 mod adapter;
+mod png_file;
 
 use std::error::Error;
 use std::fs;
 use std::str::FromStr;
 
 use image_gip::{Region, StreamDecoder};
-use image_gip_gpu::View;
+use image_gip_gpu::{GpuRenderer, View};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -44,13 +45,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
 
-    let (renderer, name) = adapter::renderer()?;
+    let (device, queue, name) = adapter::device()?;
     println!("on {name}");
+    let renderer = GpuRenderer::new(device, queue)?;
     let texture = renderer.render(&picture, &view)?;
     let samples = renderer.read(&texture)?;
     let samples = orientation.apply(&samples, texture.width() as usize, 4);
     let (width, height) = orientation.turned_size(texture.width(), texture.height());
-    fs::write(output, png(width, height, &samples)?)?;
+    fs::write(output, png_file::encode(width, height, &samples)?)?;
     println!("{output}: {width} x {height} pixels");
     Ok(())
 }
@@ -59,14 +61,4 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn pair(text: &str, separator: char) -> Result<(u32, u32), Box<dyn Error>> {
     let (a, b) = text.split_once(separator).ok_or_else(|| format!("no `{separator}` in {text}"))?;
     Ok((u32::from_str(a)?, u32::from_str(b)?))
-}
-
-fn png(width: u32, height: u32, rgba: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, width, height);
-    encoder.set_color(png::ColorType::Rgba);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(rgba)?;
-    writer.finish()?;
-    Ok(file)
 }

@@ -50,6 +50,25 @@ impl View {
         self
     }
 
+    /// The view for a mip level of the texture that this one is for, whose sides are halved and rounded
+    /// down. That of level 0 is this one; further levels show the whole picture.
+    pub(crate) fn mip_level(self, header: &Header, level: u32) -> Self {
+        if level == 0 {
+            return self;
+        }
+        let (width, height) = self.size.unwrap_or((header.width, header.height));
+        Self {
+            size: Some(((width >> level).max(1), (height >> level).max(1))),
+            region: None,
+            ..self
+        }
+    }
+
+    /// Whether the view shows the whole picture, in all pixels of a texture of this size.
+    pub(crate) fn fills(&self, header: &Header, texture: (u32, u32)) -> bool {
+        self.region.is_none() && self.size.unwrap_or((header.width, header.height)) == texture
+    }
+
     /// The scale, region and Gaussians for a picture.
     pub(crate) fn resolve(self, header: &Header, gaussians: u32) -> Result<Frame, RequestError> {
         let (width, height) = self.size.unwrap_or((header.width, header.height));

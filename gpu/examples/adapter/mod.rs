@@ -2,17 +2,15 @@
 
 use std::error::Error;
 
-use image_gip_gpu::GpuRenderer;
-
-/// A renderer on the default adapter, or on that whose name contains `WGPU_ADAPTER_NAME`, and a
-/// line that describes the adapter.
-pub(crate) fn renderer() -> Result<(GpuRenderer, String), Box<dyn Error>> {
+/// A device of the default adapter, or of that whose name contains `WGPU_ADAPTER_NAME`, and a line that
+/// describes the adapter.
+pub(crate) fn device() -> Result<(wgpu::Device, wgpu::Queue, String), Box<dyn Error>> {
     let (adapter, name) = adapter()?;
     // All that the hardware allows: large pictures need more than the default.
     let descriptor =
         wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
     let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))?;
-    Ok((GpuRenderer::new(device, queue)?, name))
+    Ok((device, queue, name))
 }
 
 /// The adapter and a line that describes it.

@@ -14,10 +14,10 @@ use image_gip_gpu::{GpuRenderer, View};
 /// The renderer of all tests of a binary; `None` where there is no GPU, not even in software.
 pub(crate) fn renderer() -> Option<&'static GpuRenderer> {
     static RENDERER: OnceLock<Option<GpuRenderer>> = OnceLock::new();
-    let renderer = RENDERER.get_or_init(|| match adapter::renderer() {
-        Ok((renderer, name)) => {
+    let renderer = RENDERER.get_or_init(|| match adapter::device() {
+        Ok((device, queue, name)) => {
             println!("adapter: {name}");
-            Some(renderer)
+            Some(GpuRenderer::new(device, queue).expect("enough for the shader"))
         }
         Err(error) => {
             println!("skipped: no GPU: {error}");
@@ -104,10 +104,16 @@ impl Differences {
     #[track_caller]
     pub(crate) fn of(renderer: &GpuRenderer, picture: &Picture<'_>, request: &Request) -> Self {
         let texture = renderer.render(picture, &request.view()).expect("a sound view");
-        let found = renderer.read(&texture).expect("a texture of the renderer");
-        let options = request.options();
-        let size = options.output_size(picture.header());
+        let size = request.options().output_size(picture.header());
         assert_eq!((texture.width(), texture.height()), size);
+        let found = renderer.read(&texture).expect("a texture of the renderer");
+        Self::from_decoder(found, picture, request)
+    }
+
+    /// Compares samples of the GPU with the decoder's.
+    #[track_caller]
+    pub(crate) fn from_decoder(found: Vec<u8>, picture: &Picture<'_>, request: &Request) -> Self {
+        let options = request.options();
         let mut expected = vec![0; picture.output_len(&options).expect("a sound request")];
         picture.render_u8(&options, &mut expected).expect("a sound request");
         assert_eq!(found.len(), expected.len());

@@ -3,6 +3,8 @@
 use image_gip::{DecodeError, RequestError};
 use thiserror::Error;
 
+use super::wgpu;
+
 /// Why a picture was not rendered.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -21,7 +23,7 @@ pub enum RenderError {
         /// What the device allows.
         allowed: u64,
     },
-    /// Rendering would take more than [`GpuRenderer::with_max_work`](crate::GpuRenderer::with_max_work)
+    /// Rendering would take more than [`GpuRenderer::with_max_work`](super::GpuRenderer::with_max_work)
     /// allows.
     #[error("{wanted} kernel evaluations required, {allowed} allowed")]
     Work {

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use image_gip::Picture;
-use wgpu::{BindGroupDescriptor, BindGroupEntry, BufferUsages, TextureUsages};
+use image_gip::{Header, Picture};
 
-use crate::device::{buffer, check, checked};
-use crate::error::RenderError;
-use crate::picture::GpuPicture;
-use crate::pipelines::{FORMAT, Pipelines};
+use super::device::{buffer, check, checked};
+use super::error::RenderError;
+use super::picture::GpuPicture;
+use super::pipelines::{FORMAT, Pipelines};
+use super::wgpu::{self, BindGroupDescriptor, BindGroupEntry, BufferUsages, TextureUsages};
 use crate::view::{Frame, View};
 use crate::work;
 
@@ -115,7 +115,10 @@ impl GpuRenderer {
     /// Draws a view of a picture to the upper left corner of a texture, which is at least as large
     /// as the view. Submits the work, and does not wait for it.
     ///
-    /// The texture must be one of this device: `wgpu` may panic otherwise.
+    /// The texture must be one of this device: `wgpu` may panic otherwise. It can be the program's own:
+    /// `Rgba8Unorm` with the usage `STORAGE_BINDING`, and with `Rgba8UnormSrgb` among its view formats if
+    /// it is to be sampled as sRGB. If it has mip levels, all are drawn, each from the Gaussians at its own size;
+    /// the view must then be of the whole picture, at the size of the texture.
     ///
     /// Gray is written as red, green and blue, and a picture without alpha is opaque. Alpha is
     /// straight. The samples are those of the file, so in general sRGB-encoded.
@@ -123,8 +126,9 @@ impl GpuRenderer {
     /// # Errors
     /// [`RenderError::OtherRenderer`] for a picture that was uploaded by another renderer,
     /// [`RenderError::View`] when the view is out of range, [`RenderError::Work`] when it takes too
-    /// much work, [`RenderError::Texture`] when the texture is too small, not `Rgba8Unorm`, or no
-    /// storage texture, and [`RenderError::Device`] when the device fails.
+    /// much work at one of the levels, [`RenderError::Texture`] when the texture is too small, not
+    /// `Rgba8Unorm`, or no storage texture, or has mip levels which the view does not fill, and
+    /// [`RenderError::Device`] when the device fails. Nothing is drawn then.
     pub fn draw(
         &self,
         picture: &GpuPicture,
@@ -134,33 +138,46 @@ impl GpuRenderer {
         if !Arc::ptr_eq(&picture.identity, &self.identity) {
             return Err(RenderError::OtherRenderer);
         }
-        let frame = view.resolve(picture.header(), picture.len())?;
-        let uniform = picture.uniform(&frame)?;
-        check_texture(texture, &frame)?;
-        let kernel = picture.header().kernel;
-        let wanted = work::evaluations(picture.drawn(&frame), &frame, kernel);
-        let allowed = work::allowed(&frame, self.max_work);
-        if wanted > allowed {
-            return Err(RenderError::Work { wanted, allowed });
+        let header = picture.header();
+        let levels = 0..texture.mip_level_count();
+        let frames = levels
+            .map(|level| view.mip_level(header, level).resolve(header, picture.len()))
+            .collect::<Result<Vec<_>, _>>()?;
+        check_texture(texture, view, header, &frames[0])?;
+        let uniforms = frames.iter().map(|frame| picture.uniform(frame));
+        let uniforms = uniforms.collect::<Result<Vec<_>, _>>()?;
+        for frame in &frames {
+            let wanted = work::evaluations(picture.drawn(frame), frame, header.kernel);
+            let allowed = work::allowed(frame, self.max_work);
+            if wanted > allowed {
+                return Err(RenderError::Work { wanted, allowed });
+            }
         }
         checked(&self.device, || {
-            let commands = self.record(picture, &frame, &uniform, texture);
-            self.queue.submit([commands]);
+            let frames = (0..).zip(frames.iter().zip(&uniforms));
+            let commands = frames.map(|(level, (frame, uniform))| {
+                self.record(picture, frame, uniform, (texture, level))
+            });
+            self.queue.submit(commands);
         })
     }
 
-    /// The commands that draw a frame.
+    /// The commands that draw a frame to a mip level of a texture.
     fn record(
         &self,
         picture: &GpuPicture,
         frame: &Frame,
         uniform: &[u8],
-        texture: &wgpu::Texture,
+        (texture, level): (&wgpu::Texture, u32),
     ) -> wgpu::CommandBuffer {
         let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
         let view = buffer(&self.device, "gip view", uniform.len() as u64, usage);
         self.queue.write_buffer(&view, 0, uniform);
-        let output = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let output = texture.create_view(&wgpu::TextureViewDescriptor {
+            base_mip_level: level,
+            mip_level_count: Some(1),
+            ..Default::default()
+        });
         let buffers = [&view, &picture.gaussian_buffer, &picture.splat_buffer, &picture.bin_buffer];
         let mut entries: Vec<_> = (0..)
             .zip(buffers)
@@ -205,28 +222,45 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Waits for what was drawn to a texture of [`GpuRenderer::create_texture`], and reads it:
-    /// height x width x 4 interleaved samples, rows from the top, without padding.
+    /// Waits for what was drawn to a texture with the usage `COPY_SRC`, and reads it: height x width x 4
+    /// interleaved samples, rows from the top, without padding.
     ///
     /// # Errors
     /// [`RenderError::Texture`] when the texture cannot be copied, [`RenderError::DeviceLimit`] when
     /// a buffer cannot hold it, [`RenderError::Device`], [`RenderError::Wait`] and [`RenderError::Read`]
     /// when the device fails.
     pub fn read(&self, texture: &wgpu::Texture) -> Result<Vec<u8>, RenderError> {
+        self.read_mip_level(texture, 0)
+    }
+
+    /// As [`GpuRenderer::read`], of a mip level: its sides are those of the texture, halved `level` times and
+    /// rounded down, but at least 1.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::read`], and [`RenderError::Texture`] when there is no such level.
+    pub fn read_mip_level(
+        &self,
+        texture: &wgpu::Texture,
+        level: u32,
+    ) -> Result<Vec<u8>, RenderError> {
         if texture.format() != FORMAT || !texture.usage().contains(TextureUsages::COPY_SRC) {
             return Err(RenderError::Texture("not Rgba8Unorm that can be copied"));
         }
-        let row = texture.width() as usize * 4;
+        if level >= texture.mip_level_count() {
+            return Err(RenderError::Texture("without this mip level"));
+        }
+        let extent = texture.size().mip_level_size(level, texture.dimension());
+        let row = extent.width as usize * 4;
         // The rows of a copy are aligned.
-        let padded = (texture.width() * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let size = u64::from(padded) * u64::from(texture.height());
+        let padded = (extent.width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let size = u64::from(padded) * u64::from(extent.height);
         check("bytes of a buffer for the samples", size, self.device.limits().max_buffer_size)?;
         let buffer = checked(&self.device, || {
             let usage = BufferUsages::COPY_DST | BufferUsages::MAP_READ;
             let buffer = buffer(&self.device, "gip samples", size, usage);
             let mut encoder = self.device.create_command_encoder(&Default::default());
             encoder.copy_texture_to_buffer(
-                texture.as_image_copy(),
+                wgpu::TexelCopyTextureInfo { mip_level: level, ..texture.as_image_copy() },
                 wgpu::TexelCopyBufferInfo {
                     buffer: &buffer,
                     layout: wgpu::TexelCopyBufferLayout {
@@ -235,7 +269,7 @@ impl GpuRenderer {
                         rows_per_image: None,
                     },
                 },
-                texture.size(),
+                extent,
             );
             self.queue.submit([encoder.finish()]);
             buffer
@@ -248,26 +282,33 @@ impl GpuRenderer {
         self.wait()?;
         let result = receiver.recv().map_err(|_| wgpu::BufferAsyncError);
         result.and_then(|result| result).map_err(|error| RenderError::Read(Box::new(error)))?;
-        let mapped =
-            buffer.get_mapped_range(..).map_err(|error| RenderError::Read(Box::new(error)))?;
+        let mapped = super::mapped(&buffer)?;
         let rows = mapped.chunks_exact(padded as usize);
         Ok(rows.flat_map(|line| &line[..row]).copied().collect())
     }
 }
 
-/// Refuses a texture that a frame cannot be drawn to.
-fn check_texture(texture: &wgpu::Texture, frame: &Frame) -> Result<(), RenderError> {
+/// Refuses a texture that a view of a picture, whose frame at level 0 is given, cannot be drawn to.
+fn check_texture(
+    texture: &wgpu::Texture,
+    view: &View,
+    header: &Header,
+    frame: &Frame,
+) -> Result<(), RenderError> {
     let problem = if texture.format() != FORMAT {
         "not Rgba8Unorm"
     } else if !texture.usage().contains(TextureUsages::STORAGE_BINDING) {
         "not a storage texture"
     } else if texture.dimension() != wgpu::TextureDimension::D2
         || texture.depth_or_array_layers() != 1
-        || texture.mip_level_count() != 1
     {
         "not a single 2D image"
     } else if texture.width() < frame.region.width || texture.height() < frame.region.height {
         "smaller than the view"
+    } else if texture.mip_level_count() > 1
+        && !view.fills(header, (texture.width(), texture.height()))
+    {
+        "with mip levels, and not as large as the whole picture is drawn"
     } else {
         return Ok(());
     };

@@ -1,13 +1,12 @@
 //! The shader, compiled for a device.
 
-use wgpu::{
-    BindGroupLayoutEntry, BindingType, BufferBindingType, ShaderStages, StorageTextureAccess,
+use super::device::{check, checked};
+use super::error::RenderError;
+use super::wgpu::{
+    self, BindGroupLayoutEntry, BindingType, BufferBindingType, ShaderStages, StorageTextureAccess,
     TextureFormat, TextureViewDimension,
 };
-
 use crate::SHADER;
-use crate::device::{check, checked};
-use crate::error::RenderError;
 
 /// The format of the textures.
 pub(crate) const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;

@@ -1,8 +1,7 @@
 //! Errors of the device as results: `wgpu` reports them to a handler, which panics by default.
 
-use wgpu::ErrorFilter;
-
-use crate::error::RenderError;
+use super::error::RenderError;
+use super::wgpu::{self, ErrorFilter};
 
 /// Refuses more of something than the device allows.
 pub(crate) fn check(what: &'static str, wanted: u64, allowed: u64) -> Result<(), RenderError> {

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use image_gip::{DecodeError, Gaussian, Header, Kernel, Picture, RenderOptions};
-use wgpu::BufferUsages;
 
-use crate::device::{buffer, check, checked};
-use crate::error::RenderError;
+use super::device::{buffer, check, checked};
+use super::error::RenderError;
+use super::wgpu::{self, BufferUsages};
 use crate::view::{Frame, MAX_BINS};
 
 /// Bytes of a Gaussian in the buffer `gaussians` of the shader: nine binary32.
@@ -15,7 +15,7 @@ const GAUSSIAN_BYTES: u64 = 36;
 const SPLAT_BYTES: u64 = 48;
 
 /// A picture in the memory of the GPU, to be drawn many times: see
-/// [`GpuRenderer::upload`](crate::GpuRenderer::upload). Each Gaussian takes 116 bytes there, and the texture a
+/// [`GpuRenderer::upload`](super::GpuRenderer::upload). Each Gaussian takes 116 bytes there, and the texture a
 /// fifth of a byte for each pixel.
 #[derive(Debug)]
 pub struct GpuPicture {
