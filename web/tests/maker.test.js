@@ -71,6 +71,40 @@ onPage('a picture that is dropped becomes a .gip, with the original beside it', 
   assert.ok(bytes.length <= 1200 && bytes.length > 600, bytes.length);
 });
 
+/** What the texts of an element have been from now on, of which the function gives those that match, as numbers. */
+async function texts(page, selector) {
+  await page.evaluate((selector) => {
+    const place = document.querySelector(selector);
+    globalThis.texts = [];
+    new MutationObserver(() => globalThis.texts.push(place.textContent)).observe(place, { subtree: true, childList: true, characterData: true });
+  }, selector);
+  return async (pattern) => {
+    const all = await page.evaluate(() => globalThis.texts);
+    return all.flatMap((text) => pattern.exec(text)?.slice(1, 2) ?? []).map((text) => Number(text.replaceAll(',', '')));
+  };
+}
+
+onPage('while it is made, its Gaussians and its PSNR are told', {}, async (page) => {
+  const told = await texts(page, '#maker [name="work"] span');
+  await drop(page, await picture(page, { width: 640, height: 480 }));
+  await made(page);
+  const counts = await told(/^([\d,]+) Gaussians · [\d.]+ dB$/);
+  const [most, last] = [Math.max(...counts), counts.at(-1)];
+  assert.ok(new Set(counts).size > 3 && last > 2 * counts[0] && last > 0.9 * most, counts.join());
+});
+
+onPage('the first file arrives layer by layer, if movement is wanted', { reducedMotion: 'no-preference' }, async (page) => {
+  await drop(page, await picture(page, { width: 640, height: 480 }));
+  // The last of the files is the one with all bytes.
+  const told = await texts(page, '#shown');
+  await made(page);
+  const counts = await told(/bytes([\d,]+) Gaussians$/);
+  const start = counts.lastIndexOf(0);
+  const last = [...new Set(counts.slice(start))];
+  assert.ok(last.length > 3, counts.join());
+  assert.deepEqual(last, last.toSorted((a, b) => a - b));
+});
+
 onPage('with more bytes it is made anew, and the window stays where it is', {}, async (page) => {
   await drop(page, await picture(page));
   await made(page);

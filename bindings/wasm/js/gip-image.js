@@ -6,6 +6,7 @@ import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
 import { naturalSize } from './orientation.js';
 import { Painting } from './painting.js';
+import { wantsFewBytes } from './reduced-data.js';
 import { contentSize, layoutOf, newSheet } from './styles.js';
 
 export * from './index.js';
@@ -37,7 +38,7 @@ function bytesOf(placeholder) {
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class GipImageElement extends ImageAttributes {
-  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'texture', ...reloads];
+  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'texture', 'detail', ...reloads];
 
   /** What a file may cost at most. A page may have set it before this script has come. */
   limits = this.limits;
@@ -238,7 +239,8 @@ export class GipImageElement extends ImageAttributes {
 
   /** Whether the file is to be fetched. */
   get #due() {
-    return (this.isConnected && (this.loading === 'eager' || this.#near)) || this.#waiting.length > 0;
+    const isEager = this.loading === 'eager' && !wantsFewBytes(this);
+    return (this.isConnected && (isEager || this.#near)) || this.#waiting.length > 0;
   }
 
   #begin() {
@@ -295,7 +297,8 @@ export class GipImageElement extends ImageAttributes {
     const loader = this.#loader;
     const least = { width: 1, height: 1 };
     // What is to be ready before it is in the page has no size yet but its own.
-    const { width, height } = this.#plan() ?? (this.isConnected ? least : inDevicePixels(this.#size));
+    const whole = this.#plan() ?? (this.isConnected ? least : inDevicePixels(this.#size));
+    const { width, height } = wantsFewBytes(this) ? least : whole;
     if (!equal(this.#asked, [width, height])) {
       this.#asked = [width, height];
       this.#answer = loader.want(width, height).then(
