@@ -77,6 +77,9 @@ export class GipImageElement extends ImageAttributes {
     const root = this.attachShadow({ mode: 'open' });
     root.addEventListener('transitionrun', () => this.#refresh());
     this.addEventListener('transitionrun', () => this.#follow());
+    this.addEventListener('click', () => {
+      if (wantsFewBytes(this)) this.detail = 'full';
+    });
     this.#alternative.part = 'alt';
     root.append(this.#painting.frame);
     this.#describe();
@@ -239,8 +242,9 @@ export class GipImageElement extends ImageAttributes {
 
   /** Whether the file is to be fetched. */
   get #due() {
-    const isEager = this.loading === 'eager' && !wantsFewBytes(this);
-    return (this.isConnected && (isEager || this.#near)) || this.#waiting.length > 0;
+    if (this.#waiting.length > 0) return true;
+    if (!this.isConnected) return false;
+    return wantsFewBytes(this) ? this.#near && !this.placeholder : this.#near || this.loading === 'eager';
   }
 
   #begin() {

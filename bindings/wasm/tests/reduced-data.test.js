@@ -3,6 +3,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
+import { placeholder } from 'image-gip/prefix';
+
 import { file, harness, script, settled, slow, until, withPage } from './harness.js';
 import { makePicture } from './picture.js';
 
@@ -51,5 +53,20 @@ test('what is far from the screen is not fetched, unless the page says so', asyn
     assert.deepEqual(seen.sort(), ['full', 'near']);
     await page.evaluate(() => document.querySelector('[src="/far.gip"]').scrollIntoView());
     await until(() => seen.includes('far'), 'the request');
+  });
+});
+
+test('with a placeholder nothing is fetched before somebody clicks on it', async () => {
+  const { route, log } = slow(large);
+  harness.routes['/clicked.gip'] = route;
+  const text = placeholder(large, 20_000);
+  await withPage(`${saving}${script}<gip-image src="/clicked.gip" placeholder="${text}"></gip-image>`, async (page) => {
+    await page.locator('gip-image canvas').waitFor();
+    await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 200)));
+    assert.deepEqual([log.requests.length, await page.evaluate(() => document.querySelector('gip-image').complete)], [0, false]);
+    await page.locator('gip-image').click();
+    await settled(page);
+    assert.ok(log.sent > large.length / 2, `${log.sent} of ${large.length} bytes`);
+    assert.equal(await page.getAttribute('gip-image', 'detail'), 'full');
   });
 });
