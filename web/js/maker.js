@@ -114,7 +114,8 @@ export class Maker {
         const isLast = size === wanted;
         const effort = isLast ? Number(this.#find('effort').value) : 1;
         const onprogress = ({ fraction, gaussians, psnr }) => {
-          this.#showWork(isLast ? fraction : 0, `${count(gaussians, 'Gaussian')} · ${decimal(psnr, 1)} dB`);
+          const found = gaussians > 0 ? `${count(gaussians, 'Gaussian')} · ${decimal(psnr, 1)} dB` : undefined;
+          this.#showWork(isLast ? fraction : 0, found);
         };
         const { file } = await encode(source.pixels, { bytes: size, effort, signal, onprogress });
         signal.throwIfAborted();

@@ -86,15 +86,14 @@ async function texts(page, selector) {
 
 onPage('while it is made, its Gaussians and its PSNR are told', {}, async (page) => {
   const told = await texts(page, '#maker [name="work"] span');
-  await drop(page, await picture(page, { width: 640, height: 480 }));
+  await drop(page, await picture(page, { width: 320, height: 240 }));
   await made(page);
   const counts = await told(/^([\d,]+) Gaussians · [\d.]+ dB$/);
-  const [most, last] = [Math.max(...counts), counts.at(-1)];
-  assert.ok(new Set(counts).size > 3 && last > 2 * counts[0] && last > 0.9 * most, counts.join());
+  assert.ok(counts[0] > 0 && new Set(counts).size > 3 && counts.at(-1) > 2 * counts[0], counts.join());
 });
 
 onPage('the first file arrives layer by layer, if movement is wanted', { reducedMotion: 'no-preference' }, async (page) => {
-  await drop(page, await picture(page, { width: 640, height: 480 }));
+  await drop(page, await picture(page, { width: 320, height: 240 }));
   // The last of the files is the one with all bytes.
   const told = await texts(page, '#shown');
   await made(page);
