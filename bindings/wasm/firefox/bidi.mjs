@@ -85,12 +85,6 @@ class Page {
     return JSON.parse(result.value);
   }
 
-  /** A PNG file of what is to be seen. */
-  async screenshot() {
-    const { data } = await this.#session.send('browsingContext.captureScreenshot', { context: this.#context });
-    return Buffer.from(data, 'base64');
-  }
-
   /** A PDF file of the page. */
   async print() {
     const { data } = await this.#session.send('browsingContext.print', { context: this.#context });

@@ -15,7 +15,7 @@ const scripts = `${script}<script type="module" src="/dist/img.js"></script>`;
 /** What is in the window of the first element: names, the sizes of the pixels, and the parts. */
 const inside = (page) =>
   page.evaluate(() =>
-    [...document.querySelector('gip-image').shadowRoot.querySelectorAll('canvas, img')].map((node) => [
+    [...(document.querySelector('gip-image').shadowRoot?.querySelectorAll('canvas, img') ?? [])].map((node) => [
       node.localName,
       node.localName === 'img' ? node.naturalWidth : node.width,
       node.part.value,
