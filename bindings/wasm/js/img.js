@@ -48,9 +48,9 @@ class Substitute {
   async make(wait = 0) {
     const edition = (this.#edition += 1);
     await pause(wait);
-    const canvas = this.#element.shadowRoot.querySelector('canvas');
+    const canvas = this.#drawn;
     const isCurrent = () => edition === this.#edition && canvas?.isConnected && this.#element.complete;
-    if (!isAllowed || !isCurrent() || Math.max(canvas.width, canvas.height) < leastSide) return;
+    if (!isAllowed || this.#image || !isCurrent() || Math.max(canvas.width, canvas.height) < leastSide) return;
     const image = await imageOf(canvas);
     if (!image) return;
     if (!isCurrent()) return void URL.revokeObjectURL(image.src);
@@ -65,15 +65,20 @@ class Substitute {
     this.#observer.takeRecords();
   }
 
+  /** The canvas of the element. Others may be beside it, such as one for printing. */
+  get #drawn() {
+    return this.#element.shadowRoot.querySelector('.window canvas');
+  }
+
   #place() {
     this.#image.style.cssText = `position: absolute; display: block; ${this.#canvas.style.cssText}`;
   }
 
   /** The element has drawn something else, or put it elsewhere. This is before anybody sees it. */
   #follow(changes) {
-    const isDrawn = changes.some(({ target, type, attributeName }) =>
-      type === 'childList' || (attributeName === 'width' && target.localName === 'canvas'));
-    if (isDrawn) {
+    const canvas = this.#drawn;
+    const isDrawn = changes.some(({ target, attributeName }) => attributeName === 'width' && target === canvas);
+    if (isDrawn || (this.#image && this.#canvas !== canvas)) {
       this.#remove();
       void this.make(rest);
     } else if (this.#image) {

@@ -91,6 +91,24 @@ test('it follows the size, the place and the source of the element', async () =>
   }, { quiet: true });
 });
 
+test('it is still there after printing', async () => {
+  const html = `${scripts}<script type="module" src="/dist/print.js"></script><gip-image src="/picture.gip"></gip-image>`;
+  await withPage(html, async (page) => {
+    await handedOver(page, 96);
+    const before = await page.evaluate(async () => {
+      await (await import('/dist/print.js')).ready;
+      return document.querySelector('gip-image').shadowRoot.querySelector('img').src;
+    });
+    await page.pdf();
+    const after = await page.evaluate(async () => {
+      // Longer than the pixels have to rest.
+      await new Promise((resolve) => setTimeout(resolve, 300));
+      return [...document.querySelector('gip-image').shadowRoot.querySelectorAll('img')].map(({ src }) => src);
+    });
+    assert.deepEqual(after, [before]);
+  });
+});
+
 test('far from the screen there is no image, and again when it comes close', async () => {
   const html = `${scripts}<gip-image src="/picture.gip"></gip-image><div style="height: 5000px"></div><p>end</p>`;
   await withPage(html, async (page) => {
