@@ -4,8 +4,8 @@
 //     cargo build --release --manifest-path benchmarks/Cargo.toml
 //     node benchmarks/placeholders.mjs FOLDER [COUNT] [FOLDER [COUNT] ...]
 //
-// Each of the first COUNT (30) pictures of each FOLDER is encoded at 0.5 bits per pixel with a first layer of at most 300 bytes by the
-// tool `gip` (the variable GIP, or ../../target/release/gip), whose placeholder is the beginning of that file. WebP and AVIF
+// Each of the first COUNT (30) pictures of each FOLDER is encoded at 0.5 bits per pixel with a first layer of at most 300 bytes
+// by the tool `gip` (the variable GIP, or ../../target/release/gip), whose placeholder is the beginning of that file. WebP and AVIF
 // are the largest copies of the picture that take no more bytes. All are shown at an eighth of the picture's size, the
 // small ones scaled by a cubic filter, and judged there by SSIMULACRA2. The time is that of the first contentful paint of a page
 // with nothing else, in Chromium without a cache, from a server on this machine: what is shown is there at once, so it is
@@ -31,10 +31,15 @@ import { serve } from '../tests/server.js';
 
 /** The pictures of folders, of which each may be followed by how many there are to be. */
 function picturesOf(args) {
-  const picturesIn = (folder) => readdirSync(folder).filter((name) => name.endsWith('.png')).sort().map((name) => join(folder, name));
+  const picturesIn = (folder) => {
+    const names = readdirSync(folder).filter((name) => name.endsWith('.png'));
+    return names.sort().map((name) => join(folder, name));
+  };
   const isCount = (text) => /^\d+$/.test(text ?? '');
-  const folders = args.map((folder, at) => (isCount(folder) ? [] : picturesIn(folder).slice(0, isCount(args[at + 1]) ? args[at + 1] : 30)));
-  return folders.flat();
+  return args.flatMap((folder, at) => {
+    if (isCount(folder)) return [];
+    return picturesIn(folder).slice(0, isCount(args[at + 1]) ? Number(args[at + 1]) : 30);
+  });
 }
 
 const pictures = picturesOf(process.argv.slice(2));
@@ -127,7 +132,8 @@ function pageOf(kind, content, { width, height }) {
   const text = content.toString('base64');
   const attributes = `width="${width}" height="${height}" alt=""`;
   if (kind.startsWith('gip')) {
-    return `<script type="module" src="/dist/gip-image.js"></script><gip-image placeholder="${text}" src="/never" ${attributes}></gip-image>`;
+    const script = '<script type="module" src="/dist/gip-image.js"></script>';
+    return `${script}<gip-image placeholder="${text}" src="/never" ${attributes}></gip-image>`;
   }
   if (!scripts[kind]) return `<img src="data:image/${kind};base64,${text}" ${attributes}>`;
   return `<script type="module">
