@@ -71,36 +71,26 @@ onPage('a picture that is dropped becomes a .gip, with the original beside it', 
   assert.ok(bytes.length <= 1200 && bytes.length > 600, bytes.length);
 });
 
-/** What the texts of an element have been from now on, of which the function gives those that match, as numbers. */
-async function texts(page, selector) {
-  await page.evaluate((selector) => {
-    const place = document.querySelector(selector);
+const animated = { reducedMotion: 'no-preference' };
+
+onPage('while it is made, Gaussians and PSNR are told, and the first file arrives layer by layer', animated, async (page) => {
+  await page.evaluate(() => {
     globalThis.texts = [];
-    new MutationObserver(() => globalThis.texts.push(place.textContent)).observe(place, { subtree: true, childList: true, characterData: true });
-  }, selector);
-  return async (pattern) => {
-    const all = await page.evaluate(() => globalThis.texts);
-    return all.flatMap((text) => pattern.exec(text)?.slice(1, 2) ?? []).map((text) => Number(text.replaceAll(',', '')));
-  };
-}
-
-onPage('while it is made, its Gaussians and its PSNR are told', {}, async (page) => {
-  const told = await texts(page, '#maker [name="work"] span');
+    for (const place of document.querySelectorAll('#maker [name="work"] span, #shown')) {
+      const what = { subtree: true, childList: true, characterData: true };
+      new MutationObserver(() => globalThis.texts.push(place.textContent)).observe(place, what);
+    }
+  });
   await drop(page, await picture(page, { width: 320, height: 240 }));
   await made(page);
-  const counts = await told(/^([\d,]+) Gaussians · [\d.]+ dB$/);
-  assert.ok(counts[0] > 0 && new Set(counts).size > 3 && counts.at(-1) > 2 * counts[0], counts.join());
-});
-
-onPage('the first file arrives layer by layer, if movement is wanted', { reducedMotion: 'no-preference' }, async (page) => {
-  await drop(page, await picture(page, { width: 320, height: 240 }));
+  const texts = await page.evaluate(() => globalThis.texts);
+  const countsOf = (pattern) => texts.flatMap((text) => pattern.exec(text)?.[1] ?? []).map((text) => Number(text.replaceAll(',', '')));
+  const told = countsOf(/^([\d,]+) Gaussians · [\d.]+ dB$/);
+  assert.ok(told[0] > 0 && new Set(told).size > 3 && told.at(-1) > 2 * told[0], told.join());
+  const arrived = countsOf(/bytes([\d,]+) Gaussians$/);
   // The last of the files is the one with all bytes.
-  const told = await texts(page, '#shown');
-  await made(page);
-  const counts = await told(/bytes([\d,]+) Gaussians$/);
-  const start = counts.lastIndexOf(0);
-  const last = [...new Set(counts.slice(start))];
-  assert.ok(last.length > 3, counts.join());
+  const last = [...new Set(arrived.slice(arrived.lastIndexOf(0)))];
+  assert.ok(last.length > 3, arrived.join());
   assert.deepEqual(last, last.toSorted((a, b) => a - b));
 });
 

@@ -232,6 +232,6 @@ for (const [at, row] of rows.entries()) {
 const sheet = join(root, 'target', 'placeholders.jpg');
 mkdirSync(join(root, 'target'), { recursive: true });
 const background = { width: 2 * columns * cell.width, height: half * cell.height, channels: 3, background: '#888' };
-await sharp({ create: background }).composite(parts).jpeg({ quality: 80 }).toFile(sheet);
+await sharp({ create: background }).composite(parts).jpeg({ quality: 70 }).toFile(sheet);
 console.log(`the originals, ${Object.keys(kinds).join(', ')}: ${sheet}`);
 rmSync(scratch, { recursive: true });
