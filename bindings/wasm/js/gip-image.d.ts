@@ -24,7 +24,7 @@ export * from './index.js';
  * In place of a picture of which nothing can be shown there are the elements inside this one, except `<noscript>`, or
  * the alternative text.
  *
- * Parts for styles: `picture`, the canvas; `alt`, the alternative text of a broken picture.
+ * Parts for styles: `picture`, the canvas or the image in its place; `alt`, the alternative text of a broken picture.
  */
 export class GipImageElement extends HTMLElement {
   /** The absolute URL; `''` without one. */
