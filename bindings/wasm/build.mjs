@@ -130,6 +130,16 @@ await bundle(['encoder', 'encoder-core', 'encoder-worker'], { chunkNames: 'encod
 // They are used without the decoder, and share no file with it: a page would load more and smaller ones.
 await bundle(['prefix']);
 await bundle(['transparent']);
+await bundle(['img']);
+// The decoder that it takes is the file of the page.
+const besideCore = {
+  name: 'beside core',
+  setup(build) {
+    build.onResolve({ filter: /^\.\/core\.js$/ }, ({ path }) => ({ path, external: true }));
+  },
+};
+await bundle(['print'], { plugins: [besideCore] });
+await bundle(['print'], { plugins: [besideCore], outdir: join(dist, 'embedded') });
 // A service worker is one script of the old kind, which all browsers take.
 writeFileSync(join(dist, 'service-worker.js'), await workerText('service-worker', 'browser'));
 

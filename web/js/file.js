@@ -9,6 +9,21 @@ export const isGip = (bytes) => START.every((byte, index) => bytes[index] === by
 /** A file of the disk: { name, stream }. */
 export const fromFile = (file) => ({ name: file.name, stream: file.stream() });
 
+/** The bytes of a file as a stream that takes so many milliseconds, so that its layers are seen one after another. */
+export function arriving(bytes, duration) {
+  const count = 20;
+  let piece = 0;
+  return new ReadableStream({
+    async pull(controller) {
+      if (piece > 0) await new Promise((resolve) => setTimeout(resolve, duration / count));
+      const [start, end] = [piece, piece + 1].map((at) => Math.round((bytes.length * at) / count));
+      controller.enqueue(bytes.subarray(start, end));
+      piece += 1;
+      if (piece === count) controller.close();
+    },
+  });
+}
+
 /** The name that a part of an address stands for: itself, if it is not encoded. */
 function decoded(part) {
   try {

@@ -101,7 +101,7 @@ function close() {
 }
 
 /** Shows what has arrived of a file. */
-function show({ name }, { picture, gaussians, edition }) {
+function show({ name }, { picture, gaussians, edition, size }) {
   if (!picture) return;
   if (!stage.hasPicture) {
     document.body.classList.remove('empty');
@@ -111,6 +111,7 @@ function show({ name }, { picture, gaussians, edition }) {
     stageElement.setAttribute('aria-label', `${name}, ${picture.width} by ${picture.height} pixels`);
     stageElement.focus({ preventScroll: true });
   }
+  scrubber.showArrival({ size, gaussians });
   stage.edition = edition;
   stage.showGaussians(gaussians);
 }

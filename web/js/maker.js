@@ -1,7 +1,9 @@
 // Makes a .gip of a picture in this page, and what the browser's own formats make of as many bytes.
 
 import { encode } from '../decoder/encoder.js';
-import { bytes, percent } from './format.js';
+import { arriving } from './file.js';
+import { bytes, count, decimal, percent } from './format.js';
+import { isCalm } from './motion.js';
 import { ofBytes } from './rivals.js';
 
 /** Bits per pixel of the slider's ends, and of the first file. */
@@ -10,6 +12,8 @@ const [LEAST, MOST, FIRST] = [0.02, 6, 0.5];
 const STEPS = [1 / 16, 1 / 4];
 /** The least bytes of such a file. */
 const LEAST_STEP = 600;
+/** How long the layers of the first file of a picture take to appear, in milliseconds. */
+const ARRIVAL = 1200;
 
 export class Maker {
   #section;
@@ -20,6 +24,8 @@ export class Maker {
   /** The picture that files are made of: `{ name, blob, bitmap, pixels }`; `null` for none. */
   #source = null;
   #file = null;
+  /** Whether a file of this picture has been shown. */
+  #isShown = false;
   #making = new AbortController();
 
   /**
@@ -55,6 +61,7 @@ export class Maker {
     context.drawImage(bitmap, 0, 0);
     const pixels = context.getImageData(0, 0, bitmap.width, bitmap.height);
     this.#source = { name: blob.name.replace(/\.[^.]*$/, ''), blob, bitmap, canvas, pixels };
+    this.#isShown = false;
     this.#section.hidden = false;
     this.#find('bytes').value = this.#positionOf(FIRST);
     this.#find('rival').value = 'original';
@@ -100,33 +107,44 @@ export class Maker {
     const wanted = this.#bytes;
     this.#showSize();
     this.#file = null;
-    this.#showWork(0, true);
+    this.#showWork(0);
     const steps = STEPS.map((share) => Math.round(share * wanted)).filter((size) => size >= LEAST_STEP);
     try {
       for (const size of [...steps, wanted]) {
         const isLast = size === wanted;
         const effort = isLast ? Number(this.#find('effort').value) : 1;
-        const onprogress = isLast ? ({ fraction }) => this.#showWork(fraction, true) : undefined;
+        const onprogress = ({ fraction, gaussians, psnr }) => {
+          const found = gaussians > 0 ? `${count(gaussians, 'Gaussian')} · ${decimal(psnr, 1)} dB` : undefined;
+          this.#showWork(isLast ? fraction : 0, found);
+        };
         const { file } = await encode(source.pixels, { bytes: size, effort, signal, onprogress });
         signal.throwIfAborted();
         if (isLast) this.#file = file;
-        await this.#onFile({ name: `${source.name}.gip`, stream: new Blob([file]).stream(), isLast });
+        const isSlow = isLast && !this.#isShown && !isCalm();
+        const stream = isSlow ? arriving(file, ARRIVAL) : new Blob([file]).stream();
+        await this.#onFile({ name: `${source.name}.gip`, stream, isLast });
         signal.throwIfAborted();
       }
+      this.#isShown = true;
       await this.compare();
     } catch (error) {
       if (!signal.aborted) this.#onError(error);
     } finally {
-      if (signal === this.#making.signal) this.#showWork(1, false);
+      if (signal === this.#making.signal) this.#setWorking(false);
     }
   }
 
-  #showWork(fraction, isWorking) {
+  /** Tells the share of the work that is done, and what there is so far. */
+  #showWork(fraction, found = percent(fraction)) {
+    this.#setWorking(true);
+    this.#find('work').querySelector('progress').value = fraction;
+    this.#find('work').querySelector('span').textContent = found;
+  }
+
+  #setWorking(isWorking) {
     this.#section.setAttribute('aria-busy', isWorking);
     this.#find('work').hidden = this.#find('cancel').hidden = !isWorking;
     this.#find('download').disabled = this.#file === null;
-    this.#find('work').querySelector('progress').value = fraction;
-    this.#find('work').querySelector('span').textContent = percent(fraction);
   }
 
   /** Puts what is chosen beside the file. */

@@ -48,6 +48,11 @@ export class Scrubber {
     this.#describe(file.gaussians);
   }
 
+  /** Tells how much there is of a file that is still arriving. */
+  showArrival({ size, gaussians }) {
+    this.#output.replaceChildren(element('b', {}, bytes(size)), element('span', {}, count(gaussians, 'Gaussian')));
+  }
+
   get #value() {
     return Number(this.#slider.value);
   }

@@ -71,6 +71,29 @@ onPage('a picture that is dropped becomes a .gip, with the original beside it', 
   assert.ok(bytes.length <= 1200 && bytes.length > 600, bytes.length);
 });
 
+const animated = { reducedMotion: 'no-preference' };
+
+onPage('while it is made, Gaussians and PSNR are told, and the first file arrives layer by layer', animated, async (page) => {
+  await page.evaluate(() => {
+    globalThis.texts = [];
+    for (const place of document.querySelectorAll('#maker [name="work"] span, #shown')) {
+      const what = { subtree: true, childList: true, characterData: true };
+      new MutationObserver(() => globalThis.texts.push(place.textContent)).observe(place, what);
+    }
+  });
+  await drop(page, await picture(page, { width: 320, height: 240 }));
+  await made(page);
+  const texts = await page.evaluate(() => globalThis.texts);
+  const countsOf = (pattern) => texts.flatMap((text) => pattern.exec(text)?.[1] ?? []).map((text) => Number(text.replaceAll(',', '')));
+  const told = countsOf(/^([\d,]+) Gaussians · [\d.]+ dB$/);
+  assert.ok(told[0] > 0 && new Set(told).size > 3 && told.at(-1) > 2 * told[0], told.join());
+  const arrived = countsOf(/bytes([\d,]+) Gaussians$/);
+  // The last of the files is the one with all bytes.
+  const last = [...new Set(arrived.slice(arrived.lastIndexOf(0)))];
+  assert.ok(last.length > 3, arrived.join());
+  assert.deepEqual(last, last.toSorted((a, b) => a - b));
+});
+
 onPage('with more bytes it is made anew, and the window stays where it is', {}, async (page) => {
   await drop(page, await picture(page));
   await made(page);

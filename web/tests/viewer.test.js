@@ -1,6 +1,8 @@
 // The viewer in the browser: what a person sees after what a person does.
 
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { createRequire } from 'node:module';
 import { after, before, test } from 'node:test';
 
 import { leastChunk, makePicture, texture } from '../../bindings/wasm/tests/picture.js';
@@ -430,4 +432,17 @@ onPage('the page follows the colour scheme', { path: '/', colorScheme: 'dark' },
   const light = await background();
   const brightness = (color) => color.match(/\d+/g).map(Number).reduce((a, b) => a + b) / 3;
   assert.ok(brightness(dark) < 64 && brightness(light) > 192, `${dark} ${light}`);
+});
+
+onPage('no rule of accessibility is broken, by axe', {}, async (page) => {
+  const path = createRequire(new URL('../../bindings/wasm/', import.meta.url)).resolve('axe-core/axe.min.js');
+  // Unlike a script element, the page's policy lets it run.
+  await page.evaluate(await readFile(path, 'utf8'));
+  await page.keyboard.press('o');
+  for (const colorScheme of ['light', 'dark']) {
+    await page.emulateMedia({ colorScheme });
+    const { violations, passes } = await page.evaluate(() => globalThis.axe.run());
+    assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes[0].html]), []);
+    assert.ok(passes.some(({ id }) => id === 'color-contrast'));
+  }
 });

@@ -11,6 +11,7 @@ import { dirname, extname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 import { launch } from '../tests/browser.js';
+import { checks } from './site-checks.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = dirname(here);
@@ -30,6 +31,7 @@ const site = (version) => ({
   needs: { vite: version, sharp: '0.35.5' },
   prepare: ['pictures.mjs'],
   expects: 'shown 11 pictures, layout shift 0',
+  isVisited: true,
 });
 
 const projects = {
@@ -146,7 +148,7 @@ function install(folder, needs, packed) {
 
 async function test(browser, name, packed, scratch) {
   const { files, needs, prepare, build, output, copies, page, base = '/some/where/', server = false } = projects[name];
-  const { develop: start, expects = 'shown 64 x 48' } = projects[name];
+  const { develop: start, expects = 'shown 64 x 48', isVisited = false } = projects[name];
   const folder = join(scratch, name);
   cpSync(join(here, 'projects', files), folder, { recursive: true });
   try {
@@ -170,6 +172,9 @@ async function test(browser, name, packed, scratch) {
   }
   const built = await serve(place, base);
   console.log(`${name}: ${await load(browser, built.url, expects)}`);
+  if (isVisited) {
+    for await (const line of checks(browser, built.url, place)) console.log(`${name}: ${line}`);
+  }
   built.close();
   if (start) {
     const served = await develop(folder, start);

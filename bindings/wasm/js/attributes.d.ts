@@ -12,6 +12,7 @@ export interface GipImageAttributes {
   /** A small `.gip`, or the first bytes of the file, in base64 or as a `data:` URL. */
   placeholder?: string;
   texture?: 'on' | 'off';
+  detail?: 'auto' | 'full';
 }
 
 /** The listeners, as React and Preact take those of custom elements. */

@@ -10,7 +10,8 @@ export * from './index.js';
  * Attributes: `src`, `alt`, `width`, `height`, `loading` (`eager` or `lazy`), `crossorigin`
  * (`use-credentials` sends cookies to other origins), `referrerpolicy`, `fetchpriority`,
  * `placeholder` (a small `.gip`, or the first bytes of the file, in base64 or as a `data:` URL, which is shown before
- * anything is fetched; set it before `src`), `texture` (`on` or `off`: whether the picture's texture is rendered).
+ * anything is fetched; set it before `src`), `texture` (`on` or `off`: whether the picture's texture is rendered),
+ * `detail` (`auto` or `full`: whether all that the size needs is loaded also for those who want few bytes).
  *
  * The picture is upright, as its Exif says, and so are its natural size and the layout that follows from
  * it. With the CSS property `image-orientation: none` it is laid out and shown as stored.
@@ -23,7 +24,7 @@ export * from './index.js';
  * In place of a picture of which nothing can be shown there are the elements inside this one, except `<noscript>`, or
  * the alternative text.
  *
- * Parts for styles: `picture`, the canvas; `alt`, the alternative text of a broken picture.
+ * Parts for styles: `picture`, the canvas or the image in its place; `alt`, the alternative text of a broken picture.
  */
 export class GipImageElement extends HTMLElement {
   /** The absolute URL; `''` without one. */
@@ -36,6 +37,7 @@ export class GipImageElement extends HTMLElement {
   /** A small `.gip`, or the first bytes of the file, in base64 or as a `data:` URL. It counts from the next setting of `src` on. */
   placeholder: string;
   texture: 'on' | 'off';
+  detail: 'auto' | 'full';
   /** The width of the content box in CSS pixels; setting it sets the attribute. */
   width: number;
   /** The height of the content box in CSS pixels; setting it sets the attribute. */

@@ -6,6 +6,7 @@ import { Loader } from './loader.js';
 import { inDevicePixels, observe, pinch, unobserve } from './observers.js';
 import { naturalSize } from './orientation.js';
 import { Painting } from './painting.js';
+import { wantsFewBytes } from './reduced-data.js';
 import { contentSize, layoutOf, newSheet } from './styles.js';
 
 export * from './index.js';
@@ -37,7 +38,7 @@ function bytesOf(placeholder) {
 const equal = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
 export class GipImageElement extends ImageAttributes {
-  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'texture', ...reloads];
+  static observedAttributes = ['src', 'alt', 'width', 'height', 'loading', 'texture', 'detail', ...reloads];
 
   /** What a file may cost at most. A page may have set it before this script has come. */
   limits = this.limits;
@@ -76,6 +77,9 @@ export class GipImageElement extends ImageAttributes {
     const root = this.attachShadow({ mode: 'open' });
     root.addEventListener('transitionrun', () => this.#refresh());
     this.addEventListener('transitionrun', () => this.#follow());
+    this.addEventListener('click', () => {
+      if (wantsFewBytes(this)) this.detail = 'full';
+    });
     this.#alternative.part = 'alt';
     root.append(this.#painting.frame);
     this.#describe();
@@ -238,7 +242,9 @@ export class GipImageElement extends ImageAttributes {
 
   /** Whether the file is to be fetched. */
   get #due() {
-    return (this.isConnected && (this.loading === 'eager' || this.#near)) || this.#waiting.length > 0;
+    if (this.#waiting.length > 0) return true;
+    if (!this.isConnected) return false;
+    return wantsFewBytes(this) ? this.#near && !this.placeholder : this.#near || this.loading === 'eager';
   }
 
   #begin() {
@@ -295,7 +301,8 @@ export class GipImageElement extends ImageAttributes {
     const loader = this.#loader;
     const least = { width: 1, height: 1 };
     // What is to be ready before it is in the page has no size yet but its own.
-    const { width, height } = this.#plan() ?? (this.isConnected ? least : inDevicePixels(this.#size));
+    const whole = this.#plan() ?? (this.isConnected ? least : inDevicePixels(this.#size));
+    const { width, height } = wantsFewBytes(this) ? least : whole;
     if (!equal(this.#asked, [width, height])) {
       this.#asked = [width, height];
       this.#answer = loader.want(width, height).then(

@@ -1,4 +1,4 @@
-// The attributes of `<img>` as properties, and `placeholder` and `texture`.
+// The attributes of `<img>` as properties, and `placeholder`, `texture` and `detail`.
 
 import { contentSize } from './styles.js';
 
@@ -8,6 +8,7 @@ const keywords = {
   crossorigin: ['anonymous', 'use-credentials'],
   fetchpriority: ['auto', 'high', 'low'],
   texture: ['on', 'off'],
+  detail: ['auto', 'full'],
   referrerpolicy: [
     '',
     'no-referrer',
@@ -30,32 +31,21 @@ export function keyword(name, value) {
 // Where there are no elements, as in Node, the module can be imported all the same.
 const Base = globalThis.HTMLElement ?? class {};
 
+/** Defines a property that sets the attribute of the same name. */
+function define(property, get) {
+  const name = property.toLowerCase();
+  Object.defineProperty(ImageAttributes.prototype, property, {
+    get() {
+      return get(this, this.getAttribute(name), name);
+    },
+    set(value) {
+      this.setAttribute(name, value);
+    },
+    configurable: true,
+  });
+}
+
 export class ImageAttributes extends Base {
-  get src() {
-    const src = this.getAttribute('src');
-    return src ? new URL(src, this.baseURI).href : '';
-  }
-
-  set src(value) {
-    this.setAttribute('src', value);
-  }
-
-  get alt() {
-    return this.getAttribute('alt') ?? '';
-  }
-
-  set alt(value) {
-    this.setAttribute('alt', value);
-  }
-
-  get loading() {
-    return keyword('loading', this.getAttribute('loading'));
-  }
-
-  set loading(value) {
-    this.setAttribute('loading', value);
-  }
-
   get crossOrigin() {
     const value = this.getAttribute('crossorigin');
     return value === null ? null : keyword('crossorigin', value);
@@ -65,52 +55,11 @@ export class ImageAttributes extends Base {
     if (value === null) this.removeAttribute('crossorigin');
     else this.setAttribute('crossorigin', value);
   }
+}
 
-  get fetchPriority() {
-    return keyword('fetchpriority', this.getAttribute('fetchpriority'));
-  }
-
-  set fetchPriority(value) {
-    this.setAttribute('fetchpriority', value);
-  }
-
-  get referrerPolicy() {
-    return keyword('referrerpolicy', this.getAttribute('referrerpolicy'));
-  }
-
-  set referrerPolicy(value) {
-    this.setAttribute('referrerpolicy', value);
-  }
-
-  get placeholder() {
-    return this.getAttribute('placeholder') ?? '';
-  }
-
-  set placeholder(value) {
-    this.setAttribute('placeholder', value);
-  }
-
-  get texture() {
-    return keyword('texture', this.getAttribute('texture'));
-  }
-
-  set texture(value) {
-    this.setAttribute('texture', value);
-  }
-
-  get width() {
-    return Math.round(contentSize(this).width);
-  }
-
-  set width(value) {
-    this.setAttribute('width', value);
-  }
-
-  get height() {
-    return Math.round(contentSize(this).height);
-  }
-
-  set height(value) {
-    this.setAttribute('height', value);
-  }
+define('src', (element, value) => (value ? new URL(value, element.baseURI).href : ''));
+for (const side of ['width', 'height']) define(side, (element) => Math.round(contentSize(element)[side]));
+for (const text of ['alt', 'placeholder']) define(text, (_, value) => value ?? '');
+for (const property of ['loading', 'fetchPriority', 'referrerPolicy', 'texture', 'detail']) {
+  define(property, (_, value, name) => keyword(name, value));
 }

@@ -21,7 +21,7 @@ const common = `
     transition-behavior: allow-discrete;
   }
   .window { position: absolute; overflow: hidden; }
-  canvas { position: absolute; display: block; }
+  canvas { position: absolute; }
 `;
 
 /**

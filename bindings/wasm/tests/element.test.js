@@ -221,6 +221,37 @@ test('the download stops when the size has what it needs, and goes on when it gr
   });
 });
 
+/** For those who want few bytes. */
+const saving = `<script>
+  Object.defineProperty(NetworkInformation.prototype, 'saveData', { get: () => true });
+</script>`;
+
+test('with few bytes wanted, the first layers are loaded of what is close to the screen, and the rest when it is asked for', async () => {
+  const { route, log } = slow(large, { piece: 4096, interval: 15 });
+  harness.routes['/few.gip'] = route;
+  const seen = [];
+  for (const name of ['far', 'full']) {
+    harness.routes[`/${name}.gip`] = (request, response) => {
+      seen.push(name);
+      file(picture)(request, response);
+    };
+  }
+  const below = '<gip-image src="/far.gip"></gip-image><gip-image src="/full.gip" detail="full"></gip-image>';
+  const html = `${element('src="/few.gip" width="600"')}<div style="height: 8000px"></div>${below}`;
+  await withPage(saving + html, async (page) => {
+    await settled(page);
+    await until(() => log.open === 0, 'the end of the transfer');
+    const few = log.sent;
+    assert.ok(few >= large.length / 6 && few < large.length / 2, `${few} of ${large.length} bytes`);
+    assert.deepEqual(seen, ['full']);
+    await page.evaluate(() => (document.querySelector('gip-image').detail = 'full'));
+    await until(() => log.requests.length === 2 && log.open === 0, 'the rest');
+    assert.ok(log.sent >= large.length, `${log.sent} of ${large.length} bytes`);
+    await page.evaluate(() => document.querySelector('[src="/far.gip"]').scrollIntoView());
+    await until(() => seen.includes('far'), 'the request');
+  });
+});
+
 test('without ranges it begins again when it grows', async () => {
   const { route, log } = slow(large, { piece: 4096, interval: 15, ranges: false });
   harness.routes['/whole.gip'] = route;

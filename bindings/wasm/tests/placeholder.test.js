@@ -138,6 +138,23 @@ test('that of a lazy picture far below has its place and a few pixels, and no re
   });
 });
 
+test('for those who want few bytes it is enough, until they click on it', async () => {
+  const saving = `<script>
+    Object.defineProperty(NetworkInformation.prototype, 'saveData', { get: () => true });
+  </script>`;
+  await gatedPage({ before: saving }, async (page, { log, open }) => {
+    open();
+    await until(async () => (await canvasOf(page)) !== null, 'the placeholder');
+    await page.evaluate(() => new Promise((resolve) => setTimeout(resolve, 100)));
+    const isComplete = () => page.evaluate(() => document.querySelector('gip-image').complete);
+    assert.deepEqual([log.requests.length, await isComplete()], [0, false]);
+    await page.locator('gip-image').click();
+    await settled(page);
+    assert.deepEqual([log.requests.length, await page.getAttribute('gip-image', 'detail')], [1, 'full']);
+    assert.deepEqual(await canvasOf(page), await decoded(page, picture));
+  });
+});
+
 test('it shows a picture whose file is missing, as the part of it that there is', async () => {
   const html = `${script}<gip-image src="/nowhere.gip" placeholder="${early}" alt="A mountain"></gip-image>`;
   await withPage(html, async (page) => {

@@ -15,8 +15,8 @@ function sizesOf(isPart) {
   return { files, sum: sizes.reduce((sum, [, size]) => sum + size, 0), text: sizes.join(' ') };
 }
 const isOfEncoder = (file) => file.includes('encoder');
-/** What no page loads that shows pictures by the element. */
-const others = ['prefix.js', 'service-worker.js', 'transparent.js'];
+/** What only those pages load that ask for it. */
+const others = ['img.js', 'prefix.js', 'print.js', 'service-worker.js', 'transparent.js'];
 const isOfDecoder = (file) => !isOfEncoder(file) && !others.includes(file);
 
 test('the scripts that show pictures, and the decoder, are at most 107 kB, compressed', () => {

@@ -6,6 +6,8 @@ import { Decoder, load, memorySize } from '../dist/core.js';
 import { encode } from '../dist/encoder.js';
 import { encode as encodeHere, load as loadEncoder } from '../dist/encoder-core.js';
 import { placeholder, prefix, prefixes } from '../dist/prefix.js';
+import { ready } from '../dist/print.js';
+import { watch } from '../dist/img.js';
 import { install } from '../dist/transparent.js';
 import type { GipImageElement } from '../dist/gip-image.js';
 
@@ -30,6 +32,9 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
   const element: GipImageElement = document.createElement('gip-image');
   element.loading = 'lazy';
   element.texture = 'off';
+  element.detail = 'full';
+  await ready;
+  watch(document);
   element.limits = { height: 2 ** 20, work: Infinity };
   await element.decode();
   const png: Blob = await picture.png({ width: 10 });

@@ -1,9 +1,14 @@
-// A page of ten pictures that the plug-in encodes, which measures itself.
+// A page of ten pictures that the plug-in encodes, which measures itself. `?visit` has it as visitors do: nothing is loaded
+// that they do not see. `&canvas` leaves out what is beside the element, and `&original` has the originals in its place.
 
 import 'image-gip/element';
 import large from './picture0.jpg?gip&bpp=0.7';
 
 const pictures = Object.values(import.meta.glob('./picture*.{jpg,png}', { query: '?gip', import: 'default', eager: true }));
+
+const asked = new URLSearchParams(location.search);
+const isPlain = asked.has('canvas') || asked.has('original');
+const extras = isPlain ? [] : [import('image-gip/img'), import('image-gip/print').then(({ ready }) => ready)];
 
 let shift = 0;
 new PerformanceObserver((list) => {
@@ -21,7 +26,14 @@ function problems() {
 
 async function main() {
   const all = pictures.map((picture, at) => picture.markup({ alt: `Hills, number ${at}`, loading: at > 1 ? 'lazy' : null }));
-  document.querySelector('main').innerHTML = [...all, large.markup({ alt: 'Once more, "better" & <larger>' })].join('');
+  const original = ({ fallback, width, height }) => `<img src="${fallback}" width="${width}" height="${height}" alt="Hills">`;
+  const last = large.markup({ alt: 'Once more, "better" & <larger>', loading: asked.has('visit') ? 'lazy' : null });
+  document.querySelector('main').innerHTML = (asked.has('original') ? pictures.map(original) : [...all, last]).join('');
+  await Promise.all(extras);
+  if (asked.has('visit')) {
+    document.title = 'visited';
+    return;
+  }
   const images = [...document.querySelectorAll('gip-image')];
   await Promise.all(images.map((image) => image.decode()));
   const wrong = problems();
