@@ -176,7 +176,8 @@ fn gaussians_of_ones_own_get_the_codes_of_the_encoder() {
     let source = source(&samples);
     let encoder = Encoder::new().with_tune(Tune::Psnr);
     // Better than rounding, at the same size.
-    let writer = Writer::new(header.clone()).with_precision(Precision::Entropy).with_color_step(0.5);
+    let writer =
+        Writer::new(header.clone()).with_precision(Precision::Entropy).with_color_step(0.5);
     let rounded = writer.write(&gaussians).expect("they have codes");
     let psnr_of = |file: &[u8]| metrics::psnr(&decoded(file), &samples, 255.0);
     let size = Target::Bytes(rounded.len() as u64);
@@ -238,4 +239,40 @@ fn gaussians_of_ones_own_must_suit_the_source_and_the_coding() {
     });
     refused(&encoder, &|header| header.kernel = Kernel::PAPER);
     refused(&encoder.with_precision(Precision::Float), &|_| ());
+}
+
+#[test]
+fn far_too_many_gaussians_are_no_worse_than_enough() {
+    // Each of them in twenty parts.
+    let (header, gaussians, samples) = fitted();
+    let parts: Vec<Gaussian> = gaussians
+        .iter()
+        .flat_map(|gaussian| {
+            let color = gaussian.color.map(|value| value / 20.0);
+            [Gaussian { color, ..*gaussian }; 20]
+        })
+        .collect();
+    let limits = Limits::default();
+    let encoder = Encoder::new().with_tune(Tune::Psnr);
+    let encode = |gaussians: &[Gaussian], target| {
+        let picture = Picture::from_gaussians(&header, gaussians, &limits).expect("valid");
+        let encoder = encoder.clone().with_target(target);
+        encoder.encode_fitted(&source(&samples), &picture).expect("it encodes")
+    };
+    let psnr = |gaussians, bytes| encode(gaussians, Target::Bytes(bytes)).report.psnr;
+    assert!(psnr(&gaussians, 1200) > psnr(&gaussians, 600) + 1.0);
+    let encoded = encode(&parts, Target::Bytes(1200));
+    assert!((1100..=1200).contains(&encoded.bytes.len()), "{}", encoded.bytes.len());
+    assert_eq!(decoded(&encoded.bytes).len(), samples.len());
+    for count in [1, 40] {
+        let found = encode(&gaussians, Target::Gaussians(count)).report.gaussians;
+        assert!((1..=count).contains(&found), "{found} of {count}");
+    }
+    // A picture that they do not resemble, and as many at one place.
+    let one = vec![Gaussian { color: [0.01, 0.0, 0.0, 0.0], ..gaussians[0] }; 3000];
+    for target in [Target::Psnr(50.0), Target::Quality(90.0), Target::Bytes(900)] {
+        let encoded = encode(&one, target);
+        assert!(encoded.report.shortfall.is_some() || matches!(target, Target::Bytes(_)));
+        assert_eq!(decoded(&encoded.bytes).len(), samples.len());
+    }
 }

@@ -303,3 +303,20 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn many_equal_gaussians_have_as_many_bytes_as_a_decoder_asks_for() {
+    for (count, size, color) in [(5_000, [16, 16], 0.001), (16_384, [128, 128], 0.002)] {
+        let header = Header::new(size[0], size[1], ColorModel::Rgb);
+        let center = [size[0] as f32 / 2.0, size[1] as f32 / 2.0];
+        let color = [color, color, color, 0.0];
+        let gaussians = vec![Gaussian { center, cholesky: [4.0, 0.0, 4.0], color }; count];
+        for step in [0.02, 0.5, 10.0] {
+            let writer = Writer::new(header.clone()).with_precision(Precision::Entropy);
+            let file = writer.with_color_step(step).write(&gaussians).expect("they have codes");
+            let (_, found) = read(&file);
+            assert_eq!(found.len(), count, "{size:?}, {step}");
+            assert!(found.iter().all(|gaussian| *gaussian == found[0]));
+        }
+    }
+}

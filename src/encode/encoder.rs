@@ -255,8 +255,8 @@ impl Encoder {
     ///
     /// A Gaussian whose colour exceeds 2 full samples, whose centre is far outside of the picture, or one of whose
     /// standard deviations exceeds twice the longer side, begins with the nearest values within. Those that are not
-    /// worth their bytes are left out. For a target of more bytes or quality than the Gaussians have, see
-    /// [`Report::shortfall`]. [`Writer`](crate::Writer) stores Gaussians as they are, without a source.
+    /// worth their bytes are left out, and of those for which a number of Gaussians or bytes has no room, the least
+    /// important ones. For a target of more bytes or quality than the Gaussians have, see [`Report::shortfall`]. [`Writer`](crate::Writer) stores Gaussians as they are, without a source.
     ///
     /// # Errors
     /// Those of [`Encoder::encode`]; and [`EncodeError::Option`] when the precision is not
@@ -346,9 +346,12 @@ impl Encoder {
         let rules = [
             (
                 self.precision == Precision::Entropy,
-                "the precision must be Entropy; a Writer stores them with another one",
+                "only the entropy coding fits their codes to a source",
             ),
-            (is_of_source, "their header must have the source's size, colour model and depth"),
+            (
+                is_of_source,
+                "they must be of a picture of the source's size, channels and bits per sample",
+            ),
             (header.kernel == Kernel::Quartic, "entropy coding needs the quartic kernel"),
         ];
         match rules.into_iter().find(|(holds, _)| !holds) {

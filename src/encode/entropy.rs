@@ -89,6 +89,7 @@ pub(crate) fn code(
 ) -> Result<(Vec<u8>, Work)> {
     let (gaussians, distortion, mut work) =
         (fit.gaussians(), fit.best_error().distortion, fit.work());
+    let is_adopted = fit.is_adopted();
     let of_other = too_good.as_ref().map_or(0, |fitted| size_of_val(&fitted.gaussians[..]));
     let memory = TargetSearch::memory(tiled, &gaussians) + of_other;
     work.peak_memory = work.peak_memory.max(memory);
@@ -110,6 +111,9 @@ pub(crate) fn code(
     };
     let layout = &layout.with_texture(texture.as_deref());
     let mut search = TargetSearch::new(judge, tiled, layout, search_work, observer)?;
+    if is_adopted {
+        search = search.at_any_error();
+    }
     let (mut coded, log_ratio) = search.run(&gaussians, distortion, job.aim, observer)?;
     if let Some(fitted) = too_good.filter(|_| log_ratio > MISSED) {
         observer.expect(SearchWork::new(job, fitted.gaussians.len()).whole());

@@ -102,7 +102,7 @@ pub enum OptionError {
     #[error("texture {0}; it must be 0 to 100")]
     Texture(u8),
     /// Importance is given, but all errors are to count the same.
-    #[error("importance; Tune::Psnr counts all errors the same")]
+    #[error("importance; the tuning for PSNR counts all errors the same")]
     Importance,
     /// The number in a [`Target`](crate::Target) is out of range.
     #[error("{name} {value}; it must be {least} to {most}")]

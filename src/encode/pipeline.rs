@@ -168,6 +168,12 @@ fn with_fewer(
     }
 }
 
+/// How many of the Gaussians that are given are encoded: all, if the number or the size of the file does not say less.
+fn fitted_count(fitted: &Picture<'_>, aim: Aim) -> Option<usize> {
+    let is_limited = matches!(aim, Aim::Count(_) | Aim::File(FileAim::Size(_)));
+    (!is_limited).then(|| fitted.gaussians().len())
+}
+
 /// What is fitted.
 #[derive(Clone, Copy, Debug)]
 enum Form<'a> {
@@ -194,7 +200,7 @@ fn encode_for_target(
     let (sketch, count) = match form {
         Form::Sketch => (Some(Sketch::of(job, observer)?), None),
         Form::Whole(count) => (None, count),
-        Form::Fitted(fitted) => (None, Some(fitted.gaussians().len())),
+        Form::Fitted(fitted) => (None, fitted_count(fitted, job.aim)),
     };
     let tiled = match &sketch {
         Some(sketch) => sketch.tiled(source, observer)?,

@@ -14,7 +14,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::array::Picture;
+use crate::array::{Picture, refuse_masked};
 use crate::errors::{encode_error, picture_error, vec_for, warn};
 use crate::given::{self, Given};
 use crate::light::{DisplayFields, LightFields};
@@ -88,8 +88,8 @@ const NEWS: f64 = 0.002;
 ///     limits: Those of the decoder that is to read the file: what it would refuse is not encoded.
 ///         Default: Limits(), with which `decode` reads every file that is encoded.
 ///     importance: height x width of float32: how much an error counts at each pixel, for pictures of which some part
-///         matters more, with tune="visual". Only ratios count, up to 16 either way. The target is still that of the
-///         whole picture.
+///         matters more, with tune="visual". Only ratios to the mean count, up to 16 either way, in blocks of 4 x 4 pixels.
+///         The target is still that of the whole picture.
 ///     fitted: Gaussians that were fitted to the picture by other means, as for `render`, with the quartic kernel.
 ///         Nothing is fitted: their codes are chosen for the target, by coordinate descent over rate and distortion.
 ///         With precision="entropy" only.
@@ -201,7 +201,7 @@ pub(crate) fn encode<'py>(
     Ok(PyBytes::new(py, &encoded.bytes))
 }
 
-/// The importance of pixels, which is that of the one in the middle of a block.
+/// The importance of pixels.
 #[derive(Debug)]
 struct ImportanceMap {
     width: usize,
@@ -209,10 +209,17 @@ struct ImportanceMap {
 }
 
 impl Importance for ImportanceMap {
+    /// The mean of the pixels of a block.
     fn at(&self, [x, y]: [f32; 2]) -> f32 {
         let height = self.values.len() / self.width;
-        let (x, y) = ((x as usize).min(self.width - 1), (y as usize).min(height - 1));
-        self.values[y * self.width + x]
+        let around = |middle: f32, length: usize| {
+            let first = (middle as usize).saturating_sub(2).min(length - 1);
+            first..(first + 4).min(length)
+        };
+        let (columns, rows) = (around(x, self.width), around(y, height));
+        let count = (columns.len() * rows.len()) as f32;
+        let row = |y: usize| self.values[y * self.width..][columns.clone()].iter().sum::<f32>();
+        rows.map(row).sum::<f32>() / count
     }
 }
 
@@ -227,12 +234,16 @@ fn importance_of(
         PyValueError::new_err(message)
     };
     let array = array.cast::<PyArrayDyn<f32>>().map_err(|_| wrong())?;
+    refuse_masked("importance", array.as_untyped())?;
     let array = array.try_readonly().map_err(|_| wrong())?;
     if array.shape() != [height, width] {
         return Err(wrong());
     }
     let mut values = vec_for(width * height)?;
     values.extend(array.as_array().iter());
+    if !values.iter().all(|value| value.is_finite() && *value >= 0.0) {
+        return Err(PyValueError::new_err("importance must be finite, and not negative"));
+    }
     Ok(Arc::new(ImportanceMap { width, values }))
 }
 

@@ -240,6 +240,11 @@ def test_importance(photo: Picture) -> None:
     for wrong in (importance.astype(float), importance[1:], importance[..., None], [[1.0]]):
         with pytest.raises(ValueError, match=rf"float32 and shape \({height}, {width}\)"):
             image_gip.encode(photo, importance=wrong)  # type: ignore[arg-type]
+    for bad in (np.nan, np.inf, -1):
+        with pytest.raises(ValueError, match="finite, and not negative"):
+            image_gip.encode(photo, importance=importance * np.float32(bad))
+    with pytest.raises(TypeError, match="masked"):
+        image_gip.encode(photo, importance=np.ma.masked_less(importance, 2))
     with pytest.raises(ValueError, match="importance"):
         image_gip.encode(photo, tune="psnr", importance=importance)
 

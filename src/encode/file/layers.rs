@@ -49,7 +49,21 @@ pub(super) fn write_entropy_layers(
     observer: &mut Observer<'_>,
 ) -> Result<Vec<EncodedLayer>> {
     let layers = divide(coder, codes, room, observer)?;
-    observer.map(layers.into_iter(), |codes| coder.write(codes))
+    let layers = observer.map(layers.into_iter(), |codes| written(coder, codes))?;
+    Ok(layers.into_iter().flatten().collect())
+}
+
+/// The layers that codes make: one, unless they take so few bytes, as many equal ones do, that a decoder would
+/// refuse it. The fewer there are, the more bytes each takes.
+fn written(coder: &LayerCoder<'_>, codes: &mut [Code]) -> Vec<EncodedLayer> {
+    let layer = coder.write(codes);
+    if LayerCoder::check_count(layer.count() as u32, &layer.bytes).is_ok() {
+        return vec![layer];
+    }
+    let half = codes.len() / 2;
+    coder.cut(codes, half);
+    let (first, second) = codes.split_at_mut(half);
+    [written(coder, first), written(coder, second)].into_iter().flatten().collect()
 }
 
 /// The payload of `bNDS`: the bounds of every layer (spec, section 5.6). `None` for a file of so

@@ -76,6 +76,8 @@ pub(crate) struct Fit<'a> {
     pub(super) error: RenderingError,
     pub(super) work: Work,
     pub(super) rng: fastrand::Rng,
+    /// Whether the Gaussians are from elsewhere.
+    pub(super) is_adopted: bool,
 }
 
 impl<'a> Fit<'a> {
@@ -109,6 +111,7 @@ impl<'a> Fit<'a> {
             error: RenderingError::default(),
             work,
             rng: fastrand::Rng::with_seed(seed),
+            is_adopted: false,
         }
     }
 
@@ -138,6 +141,11 @@ impl<'a> Fit<'a> {
     /// The error of the best Gaussians so far.
     pub(crate) fn best_error(&self) -> RenderingError {
         self.best.as_ref().map_or(self.error, |best| best.error)
+    }
+
+    /// Whether the Gaussians are from elsewhere, so that their error tells nothing of their number.
+    pub(crate) fn is_adopted(&self) -> bool {
+        self.is_adopted
     }
 
     /// Whether most of the error is that of quantization: fewer Gaussians, which overlap less, may show a

@@ -85,7 +85,8 @@ impl Fit<'_> {
         self.settle(observer)
     }
 
-    /// Takes Gaussians from elsewhere, within the bounds of training, for a fit that is not trained.
+    /// Takes Gaussians from elsewhere, within the bounds of training, for a fit that is not trained; the most important
+    /// ones if the budget has no room for all.
     pub(crate) fn adopt(
         &mut self,
         gaussians: &[Gaussian],
@@ -99,7 +100,14 @@ impl Fit<'_> {
         let components: Vec<_> = gaussians.iter().map(components).collect();
         self.parameters.extend(&components);
         self.parameters.sort(observer)?;
-        self.settle(observer)
+        self.is_adopted = true;
+        self.settle(observer)?;
+        let surplus = self.len().saturating_sub(self.wanted(1.0));
+        if surplus > 0 {
+            self.cull(surplus, observer)?;
+            self.settle(observer)?;
+        }
+        Ok(())
     }
 
     /// Trains from nothing again, with this many Gaussians.

@@ -8,7 +8,7 @@
 
 use super::activity::{self, BLOCK, Luma, RADII, SCALES};
 use crate::encode::error::Result;
-use crate::encode::importance::within_range;
+use crate::encode::importance;
 use crate::encode::progress::Observer;
 use crate::encode::quality::Gradients;
 use crate::encode::source::Source;
@@ -87,9 +87,12 @@ impl PerceptualWeights {
                 curve.slope(code(source, &shares[..colors], [x, y])).powi(2)
             });
         }
-        if let Some(importance) = source.importance() {
-            let middle = |at: usize| at as f32 + 0.5 * BLOCK as f32;
-            stress(&mut blocks, columns, |x, y| within_range(importance([middle(x), middle(y)])));
+        if let Some(importance_at) = source.importance() {
+            let middle = |at: usize| (at as f32 + 0.5) * BLOCK as f32;
+            let of_blocks = (0..columns * rows)
+                .map(|at| importance_at([middle(at % columns), middle(at / columns)]));
+            let of_blocks = importance::normalized(of_blocks.collect());
+            stress(&mut blocks, columns, |x, y| of_blocks[y / BLOCK * columns + x / BLOCK]);
         }
         let [red, green, blue] = shares.map(|share| share * (colors as f32).sqrt());
         Ok(Self { columns, blocks, luma: [red, green, blue, 0.0], colors, means })

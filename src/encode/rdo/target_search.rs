@@ -53,6 +53,8 @@ const FINER: [f64; 4] = [0.5, 0.5, 1.0, 2.0];
 /// error. There, rounding adds a 256th of the error that it adds with that step: a finer one would only
 /// make the file larger.
 const FINEST: f64 = -4.0;
+/// The same for Gaussians whose error is that of a fit from elsewhere, which may be any.
+const FINEST_AT_ANY_ERROR: f64 = -12.0;
 /// Bytes that one of the least useful Gaussians takes, about.
 const BYTES_OF_LEAST_USEFUL: f64 = 2.3;
 /// How often a file that is too small gets some of them back.
@@ -88,6 +90,8 @@ pub(crate) struct TargetSearch<'a> {
     layout: &'a FileLayout<'a>,
     /// How many passes there shall be, and what they cost; for a target there may be a few more.
     work: SearchWork,
+    /// The finest step that is tried, relative to that which suits the fit's error.
+    finest: f64,
     codes: CodeOptimizer<'a>,
 }
 
@@ -100,12 +104,17 @@ impl<'a> TargetSearch<'a> {
         observer: &mut Observer<'_>,
     ) -> Result<Self> {
         let codes = CodeOptimizer::new(tiled, layout, observer)?;
-        Ok(Self { judge, layout, work, codes })
+        Ok(Self { judge, layout, work, finest: FINEST, codes })
     }
 
     /// The same for a file whose time to decode is no matter, as it has few Gaussians.
     pub(crate) fn at_any_decoding_time(self) -> Self {
         Self { codes: self.codes.at_any_decoding_time(), ..self }
+    }
+
+    /// The same for Gaussians whose error tells nothing of the step that suits them.
+    pub(crate) fn at_any_error(self) -> Self {
+        Self { finest: FINEST_AT_ANY_ERROR, ..self }
     }
 
     /// The most memory of a search for codes of some Gaussians, in bytes, with that of the source.
@@ -139,7 +148,7 @@ impl<'a> TargetSearch<'a> {
             let coded = self.keeping(kept.ceil() as usize, gaussians, step, least, observer)?;
             return Ok((coded, 0.0));
         };
-        let finest = (step + FINEST).max(least);
+        let finest = (step + self.finest).max(least);
         let step = self.first_step(gaussians, step, finest, aim, observer)?;
         let (mut coded, mut log_ratio, step) =
             self.aimed(gaussians, step, finest, aim, observer)?;
