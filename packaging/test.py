@@ -149,6 +149,9 @@ class Published(unittest.TestCase):
         gpu = manifest("gpu/Cargo.toml")
         for kind in ("dependencies", "dev-dependencies"):
             self.assertEqual(gpu[kind]["image-gip"]["version"], version, kind)
+        for path in ("bindings/wasm", "bindings/wasm/encoder"):
+            crate = manifest(f"{path}/Cargo.toml")["dependencies"]["image-gip"]
+            self.assertEqual(crate["version"], version, path)
         package = json.loads((ROOT / "bindings/wasm/package.json").read_text())
         self.assertEqual(package["version"], version)
         news = (ROOT / "packaging/debian/changelog").read_text()

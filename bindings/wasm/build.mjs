@@ -5,7 +5,8 @@
 // Cargo.lock has.
 
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+import { homedir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { deflateSync } from 'node:zlib';
@@ -34,6 +35,22 @@ function wasmBindgen() {
   return program;
 }
 
+/**
+ * What makes the files the same wherever the package is built. By the place of a crate outside of this workspace Cargo names its
+ * functions, which then are in another order, so it is found by a link inside; and the compiler calls folders by other names.
+ */
+const source = join(target, 'source');
+mkdirSync(target, { recursive: true });
+rmSync(source, { force: true });
+// Windows links folders without special rights only this way.
+symlinkSync(join(root, '../..'), source, 'junction');
+const folders = { [root]: 'image-gip', [process.env.CARGO_HOME ?? join(homedir(), '.cargo')]: 'cargo' };
+const renamed = Object.entries(folders).map(([folder, name]) => `--remap-path-prefix=${folder}=${name}`);
+const settings = [
+  `patch.crates-io.image-gip.path=${JSON.stringify(source)}`,
+  `target.wasm32-unknown-unknown.rustflags=${JSON.stringify(renamed)}`,
+].flatMap((setting) => ['--config', setting]);
+
 const bindgen = wasmBindgen();
 // The scripts beside those of wasm-bindgen, from where they are bundled.
 const scripts = join(target, 'scripts');
@@ -49,7 +66,7 @@ mkdirSync(dist);
 function buildModule(crate, name, rounds, ...optimizations) {
   const place = ['--target', 'wasm32-unknown-unknown', '--target-dir', target];
   // One crate at a time, so that none has what only another one needs.
-  run('cargo', 'build', '--release', '--locked', '--package', crate, ...place);
+  run('cargo', 'build', '--release', '--locked', ...settings, '--package', crate, ...place);
   const module = join(target, 'wasm32-unknown-unknown', 'release', `${name}.wasm`);
   run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', scripts, module);
   for (let round = 1; round <= rounds; round += 1) {
@@ -168,5 +185,8 @@ for (const file of readdirSync(scripts)) {
 }
 // npm packs no links.
 for (const file of ['LICENSE-APACHE', 'LICENSE-MIT']) copyFileSync(join(root, file), join(dist, file));
+// What else the files depend on, besides the source and the versions that are locked.
+const rustc = execFileSync('rustc', ['--version'], { cwd: root }).toString().trim();
+writeFileSync(join(dist, 'built-with.json'), `${JSON.stringify({ rustc, node: process.version })}\n`);
 const crates = ['--locked', '--target', 'wasm32-unknown-unknown'];
 run('python3', '../../packaging/notices', join(dist, 'LICENSE-THIRD-PARTY'), ...crates);

@@ -1,6 +1,6 @@
 //! Multiplication and addition with a single rounding, so that all machines get the same bits, but WebAssembly.
 
-use fearless_simd::{Simd, SimdInto, f32x16, prelude::*};
+use fearless_simd::{Simd, SimdFloat, SimdInto};
 
 /// [`MulAdd::fused_mul_add`] for vectors.
 pub(crate) trait MulAdd<S: Simd>: Sized {
@@ -15,10 +15,10 @@ pub(crate) trait MulAdd<S: Simd>: Sized {
     fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: Self) -> Self;
 }
 
-impl<S: Simd> MulAdd<S> for f32x16<S> {
+impl<S: Simd, V: SimdFloat<S, Element = f32>> MulAdd<S> for V {
     #[inline(always)]
     fn fused_mul_add(self, factor: impl SimdInto<Self, S>, summand: Self) -> Self {
-        let simd = self.simd;
+        let simd = self.token();
         let factor = factor.simd_into(simd);
         if cfg!(target_arch = "wasm32") {
             return self * factor + summand;
@@ -33,12 +33,12 @@ impl<S: Simd> MulAdd<S> for f32x16<S> {
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
 #[inline(never)]
-fn emulated<S: Simd>(
+fn emulated<S: Simd, V: SimdFloat<S, Element = f32>>(
     simd: S,
-    value: f32x16<S>,
-    factor: f32x16<S>,
-    summand: f32x16<S>,
-) -> f32x16<S> {
+    value: V,
+    factor: V,
+    summand: V,
+) -> V {
     simd.vectorize(
         #[inline(always)]
         || value.mul_add_precise(factor, summand),

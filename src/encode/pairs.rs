@@ -4,7 +4,7 @@ use fearless_simd::{Simd, f32x4, f32x8, f32x16, prelude::*};
 
 /// The sums of pairs: those of `a` in the low half, of `b` in the high half.
 #[inline(always)]
-pub(crate) fn folded<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+pub(crate) fn folded<S: Simd, V: SimdFloat<S, Element = f32>>(a: V, b: V) -> V {
     a.unzip_low(b) + a.unzip_high(b)
 }
 

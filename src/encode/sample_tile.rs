@@ -1,6 +1,6 @@
 //! The samples of a tile of the training pass.
 
-use fearless_simd::{Simd, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*, u8x16, u16x16};
 
 use crate::render::tile_grid::TILE_HEIGHT;
 
@@ -47,11 +47,19 @@ impl SampleLine<'_> {
     pub(crate) fn load<S: Simd>(self, simd: S) -> f32x16<S> {
         match self {
             Self::Eight(samples) => {
-                f32x16::from_fn(simd, |x| f32::from(samples[x])) * f32::from(OF_EIGHT)
+                let (low, high) = u8x16::load_array_ref(simd, samples).widen();
+                floats(low.combine(high)) * f32::from(OF_EIGHT)
             }
-            Self::Sixteen(samples) => f32x16::from_fn(simd, |x| f32::from(samples[x])),
+            Self::Sixteen(samples) => floats(u16x16::load_array_ref(simd, samples)),
         }
     }
+}
+
+#[inline(always)]
+fn floats<S: Simd>(samples: u16x16<S>) -> f32x16<S> {
+    let (low, high) = samples.widen();
+    // Most machines convert signed integers only.
+    low.combine(high).bitcast::<i32x16<S>>().to_float()
 }
 
 /// 1 in so many of the sixteen columns, which are inside the picture, and 0 in the others.
@@ -64,5 +72,5 @@ pub(crate) fn inside<S: Simd>(simd: S, columns: usize) -> f32x16<S> {
 /// The pixel centres of the sixteen columns from `x` on.
 #[inline(always)]
 pub(crate) fn centers<S: Simd>(simd: S, x: u32) -> f32x16<S> {
-    f32x16::from_fn(simd, |column| (x as usize + column) as f32 + 0.5)
+    f32x16::from_fn(simd, |column| column as f32 + 0.5) + x as f32
 }

@@ -1,6 +1,6 @@
 //! The weights of [`Kernel`](crate::kernel::Kernel), sixteen at a time and with the same bits.
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, SimdFloat, f32x16, prelude::*};
 
 #[cfg(feature = "encode")]
 use crate::kernel::QUARTIC_CUTOFF;
@@ -8,20 +8,24 @@ use crate::math::{EXP2_POLYNOMIAL, LOG2_E, ROUND_MAGIC};
 
 /// The larger of each value and a limit; the limit for NaN.
 #[inline(always)]
-pub(crate) fn larger<S: Simd>(simd: S, values: f32x16<S>, limit: f32) -> f32x16<S> {
+pub(crate) fn larger<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, values: V, limit: f32) -> V {
     // The maximum of WebAssembly passes NaN on and orders zeros, for which x86 takes eight
     // instructions.
     if cfg!(target_arch = "wasm32") {
-        return values.simd_gt(limit).select(values, f32x16::splat(simd, limit));
+        return values.simd_gt(limit).select(values, V::splat(simd, limit));
     }
     values.max(limit)
 }
 
 /// The smaller of each value and a limit; the limit for NaN.
 #[inline(always)]
-pub(crate) fn smaller<S: Simd>(simd: S, values: f32x16<S>, limit: f32) -> f32x16<S> {
+pub(crate) fn smaller<S: Simd, V: SimdFloat<S, Element = f32>>(
+    simd: S,
+    values: V,
+    limit: f32,
+) -> V {
     if cfg!(target_arch = "wasm32") {
-        return values.simd_lt(limit).select(values, f32x16::splat(simd, limit));
+        return values.simd_lt(limit).select(values, V::splat(simd, limit));
     }
     values.min(limit)
 }
@@ -64,7 +68,7 @@ impl Quartic {
     #[cfg(feature = "encode")]
     #[inline(always)]
     pub(crate) fn root<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
-        (f32x16::splat(simd, 1.0) - q * (1.0 / QUARTIC_CUTOFF)).max(0.0)
+        larger(simd, f32x16::splat(simd, 1.0) - q * (1.0 / QUARTIC_CUTOFF), 0.0)
     }
 }
 
@@ -83,24 +87,23 @@ impl Weight for Exponential {
 impl Exponential {
     /// The weights at squared Mahalanobis distances.
     #[inline(always)]
-    pub(crate) fn at<S: Simd>(self, simd: S, q: f32x16<S>) -> f32x16<S> {
-        let zero = f32x16::splat(simd, 0.0);
+    pub(crate) fn at<S: Simd, V: SimdFloat<S, Element = f32>>(self, simd: S, q: V) -> V {
+        let zero = V::splat(simd, 0.0);
         q.simd_le(self.cutoff).select(exp(simd, q * -0.5), zero)
     }
 }
 
 /// [`math::exp`](crate::math::exp), sixteen at a time.
 #[inline(always)]
-pub(crate) fn exp<S: Simd>(simd: S, x: f32x16<S>) -> f32x16<S> {
+pub(crate) fn exp<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
     let y = smaller(simd, larger(simd, x * LOG2_E, -126.0), 126.0);
     let shifted = y + ROUND_MAGIC;
     let f = y - (shifted - ROUND_MAGIC);
-    let mut p = f32x16::splat(simd, EXP2_POLYNOMIAL[0]);
+    let mut p = V::splat(simd, EXP2_POLYNOMIAL[0]);
     for &coefficient in &EXP2_POLYNOMIAL[1..] {
         p = p * f + coefficient;
     }
     // The low bits of `shifted` are y, rounded to an integer.
-    let exponent: u32x16<S> = shifted.bitcast();
-    let power = (exponent - (ROUND_MAGIC.to_bits() - 127)) << 23;
-    p * power.bitcast::<f32x16<S>>()
+    let power = (shifted.to_bits() - (ROUND_MAGIC.to_bits() - 127)) << 23;
+    p * V::from_bits(power)
 }

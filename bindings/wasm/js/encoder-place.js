@@ -2,6 +2,8 @@
 
 import { startsOf } from './files.js';
 
+export { mostWorkers } from './most-workers.js';
+
 /** The WebAssembly; `undefined` for that which its script fetches by itself. */
 export const source = () => undefined;
 

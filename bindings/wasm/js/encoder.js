@@ -1,14 +1,12 @@
 // The encoder for scripts. It works in workers of its own, and never blocks the page.
 
-import { source, starts } from './encoder-place.js';
+import { mostWorkers, source, starts } from './encoder-place.js';
 import { GipError, unpack } from './errors.js';
 import { pixelsOf } from './pictures.js';
 import { firstOf } from './start.js';
 
 export { GipError, LimitError } from './errors.js';
 
-/** Most workers; each takes some ten megabytes, and more for large pictures. */
-const mostWorkers = Math.max(1, Math.min(4, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1));
 /** After so many milliseconds without work a worker ends: the memory of WebAssembly never shrinks. */
 const mostIdle = 10_000;
 

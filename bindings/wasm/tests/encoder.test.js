@@ -1,6 +1,7 @@
 // The encoder, in Node and in a browser.
 
 import assert from 'node:assert/strict';
+import { availableParallelism } from 'node:os';
 import { test } from 'node:test';
 
 import { encode } from 'image-gip/encoder';
@@ -132,6 +133,19 @@ test('more pictures than workers are all encoded', async () => {
     assert.equal(picture.header.width, pictures[at].width);
     picture.close();
   }
+});
+
+const alone = availableParallelism() < 2 && 'there is one core';
+test('several pictures are encoded at the same time, to the files that they have alone', { skip: alone }, async () => {
+  const options = { bytes: 6000, effort: 3 };
+  const pictures = [320, 321].map((width) => sample({ width, height: 200, channels: 3 }));
+  const events = [];
+  const encoded = (picture, at) =>
+    encode(picture, { ...options, onprogress: () => events.push(at) }).then(({ file }) => (events.push('end'), file));
+  const files = await Promise.all(pictures.map(encoded));
+  assert.deepEqual(new Set(events.slice(0, events.indexOf('end'))), new Set([0, 1]));
+  await core.load();
+  for (const [at, picture] of pictures.entries()) assert.deepEqual(core.encode(picture, options).file, files[at]);
 });
 
 test('a browser encodes what it can draw, and keeps Display P3', async () => {

@@ -2,6 +2,8 @@
 //! section "Distortion Driven Densification"; the variance of their shapes: section "Content Aware
 //! Gaussian Filters").
 
+use fearless_simd::Level;
+
 use super::components::{Bounds, Components};
 use super::custom_placement::ErrorMap;
 use super::paper;
@@ -168,7 +170,8 @@ impl Densifier<'_> {
         let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
         let residuals = self.pass.residuals(&self.scene, tile);
         let loss = &self.scene.tiled.loss;
-        let errors = loss.placement_errors(corner, &residuals, self.options.error_norm);
+        let errors =
+            loss.placement_errors(Level::new(), corner, &residuals, self.options.error_norm);
         TileErrors { errors, residuals }
     }
 }

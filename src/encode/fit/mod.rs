@@ -16,6 +16,7 @@ mod pass;
 mod rate_term;
 mod schedule;
 mod state;
+mod tile_block;
 mod trained;
 pub(crate) mod training;
 mod training_loop;

@@ -210,7 +210,7 @@ impl Pass {
                 *error = *error + of_tile;
                 if let (Some(norm), Some(sum)) = (norm, placement_errors.get_mut(column)) {
                     let corner = [column * TILE_WIDTH, row * TILE_HEIGHT];
-                    let plane = tiled.loss.placement_errors(corner, &planes, norm);
+                    let plane = tiled.loss.placement_errors(level, corner, &planes, norm);
                     *sum = plane.as_flattened().iter().sum();
                 }
             }

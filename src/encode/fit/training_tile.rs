@@ -1,15 +1,17 @@
 //! One tile of the training pass, in SIMD code: rendering, residuals and gradient sums.
 //!
-//! The rendering of a tile stays in registers where there are 32 of them. Products are added with a
+//! The rendering of a block stays in registers where there are 32 of them. Products are added with a
 //! single rounding, so that all machines get the same bits; those without such an instruction (x86
 //! before 2013) emulate it, and take longer. Loops are over indices: closures and the functions of some
 //! iterators would be called, not inlined, and compiled for the least SIMD level.
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x4, prelude::*};
 
+use super::tile_block::{
+    ACROSS, BLOCK_HEIGHT, BLOCK_WIDTH, BLOCKS, BlockPlane, DOWN, Line, lane_sums, next_block, place,
+};
 use crate::encode::loss::{PictureLoss, RenderingError};
 use crate::encode::mul_add::MulAdd;
-use crate::encode::pairs::folded;
 use crate::encode::sample_tile::{SampleTile, TILE_WIDTH, TilePlane, centers};
 use crate::encode::tiled_source::TiledSource;
 use crate::gaussian::component_count;
@@ -27,43 +29,59 @@ pub(super) const fn slots_per_span(channels: usize) -> usize {
     component_count(channels).div_ceil(size_of::<Slot>() / size_of::<f32>())
 }
 
-/// What the backward pass needs to know of a splat at each pixel of a tile.
+/// How much further a splat is taken to reach, as a part of the square of its reach: more than rounding.
+const MARGIN: f32 = 1e-3;
+
+/// What the backward pass needs to know of a splat in a tile.
 #[repr(align(64))]
 #[derive(Clone, Copy)]
-pub(super) struct TileState(TilePlane);
+pub(super) struct TileState {
+    /// The state of the kernel at each pixel, in the blocks that the splat reaches.
+    of_blocks: [BlockPlane; BLOCKS],
+    /// These blocks, one bit each.
+    reached: u32,
+}
 
 impl TileState {
-    pub(super) const ZERO: Self = Self([[0.0; TILE_WIDTH]; TILE_HEIGHT]);
+    pub(super) const ZERO: Self =
+        Self { of_blocks: [[[0.0; BLOCK_WIDTH]; BLOCK_HEIGHT]; BLOCKS], reached: 0 };
 }
 
 /// A kernel and its derivative.
 trait TrainingKernel: Copy {
     /// The factor on distances that makes the kernel's formula short.
     const SCALE: f32;
+    /// The square of the distance at which it ends, times the square of that factor.
+    fn squared_reach(self) -> f32;
     /// The part of the kernel that depends on u only, which all points of a column share.
-    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S>;
+    fn column<S: Simd>(self, simd: S, u: Line<S>) -> Line<S>;
     /// The state to keep per pixel for the backward pass, and the weight.
-    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>);
+    fn forward<S: Simd>(self, simd: S, column: Line<S>, v: Line<S>) -> (Line<S>, Line<S>);
     /// The weight and the slope, -2 dweight/dq, from the state.
-    fn backward<S: Simd>(self, state: f32x16<S>) -> (f32x16<S>, f32x16<S>);
+    fn backward<S: Simd>(self, state: Line<S>) -> (Line<S>, Line<S>);
 }
 
 impl TrainingKernel for simd_kernel::Exponential {
     const SCALE: f32 = 1.0;
 
     #[inline(always)]
-    fn column<S: Simd>(self, _: S, u: f32x16<S>) -> f32x16<S> {
+    fn squared_reach(self) -> f32 {
+        self.cutoff
+    }
+
+    #[inline(always)]
+    fn column<S: Simd>(self, _: S, u: Line<S>) -> Line<S> {
         u * u
     }
 
     #[inline(always)]
-    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    fn forward<S: Simd>(self, simd: S, column: Line<S>, v: Line<S>) -> (Line<S>, Line<S>) {
         let weight = self.at(simd, v.fused_mul_add(v, column));
         (weight, weight)
     }
 
     #[inline(always)]
-    fn backward<S: Simd>(self, weight: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    fn backward<S: Simd>(self, weight: Line<S>) -> (Line<S>, Line<S>) {
         (weight, weight)
     }
 }
@@ -73,18 +91,23 @@ impl TrainingKernel for simd_kernel::Quartic {
     const SCALE: f32 = 1.0 / QUARTIC_RADIUS;
 
     #[inline(always)]
-    fn column<S: Simd>(self, simd: S, u: f32x16<S>) -> f32x16<S> {
-        (-u).fused_mul_add(u, f32x16::splat(simd, 1.0))
+    fn squared_reach(self) -> f32 {
+        1.0
     }
 
     #[inline(always)]
-    fn forward<S: Simd>(self, simd: S, column: f32x16<S>, v: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    fn column<S: Simd>(self, simd: S, u: Line<S>) -> Line<S> {
+        (-u).fused_mul_add(u, Line::splat(simd, 1.0))
+    }
+
+    #[inline(always)]
+    fn forward<S: Simd>(self, simd: S, column: Line<S>, v: Line<S>) -> (Line<S>, Line<S>) {
         let root = simd_kernel::larger(simd, (-v).fused_mul_add(v, column), 0.0);
         (root, root * root)
     }
 
     #[inline(always)]
-    fn backward<S: Simd>(self, root: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    fn backward<S: Simd>(self, root: Line<S>) -> (Line<S>, Line<S>) {
         (root * root, root)
     }
 }
@@ -134,6 +157,9 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
     /// `states` is scratch memory with one plane for each splat of the tile. The gradient sums are
     /// added to `slots`, which has [`slots_per_span`] slots for each of `splats`. `planes` receives
     /// half the gradient of the distortion by the samples of the rendering.
+    ///
+    /// It is compiled once for all that call it.
+    #[inline(never)]
     pub(super) fn run(
         &self,
         level: Level,
@@ -142,30 +168,73 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         slots: Option<&mut [Slot]>,
         planes: &mut [TilePlane; CHANNELS],
     ) -> RenderingError {
-        match kernel {
-            Kernel::Exponential { cutoff } => {
-                let kernel = simd_kernel::Exponential { cutoff };
-                self.run_with(level, kernel, states, slots, planes)
-            }
-            Kernel::Quartic => self.run_with(level, simd_kernel::Quartic, states, slots, planes),
-        }
-    }
-
-    fn run_with<K: TrainingKernel>(
-        &self,
-        level: Level,
-        kernel: K,
-        states: &mut [TileState],
-        slots: Option<&mut [Slot]>,
-        planes: &mut [TilePlane; CHANNELS],
-    ) -> RenderingError {
         dispatch!(level, simd => {
-            let error = self.forward(simd, kernel, states, planes);
-            if let Some(slots) = slots {
-                self.backward(simd, kernel, states, slots, planes);
+            match kernel {
+                Kernel::Exponential { cutoff } => {
+                    self.forward(simd, simd_kernel::Exponential { cutoff }, states, planes);
+                }
+                Kernel::Quartic => self.forward(simd, simd_kernel::Quartic, states, planes),
+            }
+            let corner = [self.x as usize, self.y as usize];
+            let size = [self.columns, self.rows];
+            let error = self.loss.of_tile(simd, self.target, corner, size, planes);
+            match (kernel, slots) {
+                (_, None) => {}
+                (Kernel::Exponential { cutoff }, Some(slots)) => {
+                    self.backward(simd, simd_kernel::Exponential { cutoff }, states, slots, planes);
+                }
+                (Kernel::Quartic, Some(slots)) => {
+                    self.backward(simd, simd_kernel::Quartic, states, slots, planes);
+                }
             }
             error
         })
+    }
+
+    /// The pixel centres of the columns of blocks side by side.
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see the top of the file")]
+    fn columns<S: Simd>(&self, simd: S) -> [Line<S>; ACROSS] {
+        let centers = centers(simd, self.x).to_array();
+        let mut columns = [Line::splat(simd, 0.0); ACROSS];
+        for across in 0..ACROSS {
+            columns[across] = Line::load_array_ref(simd, block_line(&centers, across));
+        }
+        columns
+    }
+
+    /// The pixel centre of the first row of a block with so many above it.
+    #[inline(always)]
+    fn top(&self, down: usize) -> f32 {
+        (self.y as usize + down * BLOCK_HEIGHT) as f32 + 0.5
+    }
+
+    /// The blocks in which a splat may have weights over 0, one bit each.
+    #[inline(always)]
+    fn reached<S: Simd, K: TrainingKernel>(&self, simd: S, kernel: K, splat: &Splat) -> u32 {
+        if BLOCKS == 1 {
+            // Tiles that it does not reach do not have it.
+            return 1;
+        }
+        let [i11, w, i22] = [splat.i11, splat.w, splat.i22].map(|entry| entry * K::SCALE);
+        // From the centre of a block to those of the pixels at its corners, and to what they are in the
+        // splat's own frame.
+        let [half_width, half_height] =
+            [BLOCK_WIDTH, BLOCK_HEIGHT].map(|side| (side - 1) as f32 / 2.0);
+        let [by_u, by_v] = [half_width * i11, half_width * w.abs() + half_height * i22];
+        let middle = f32x4::from_fn(simd, |across| (across * BLOCK_WIDTH) as f32);
+        let dx = middle + (self.x as f32 + 0.5 + half_width - splat.x);
+        let least_u = simd_kernel::larger(simd, (dx * i11).abs() - by_u, 0.0);
+        let mut reached = 0;
+        for down in 0..DOWN {
+            let dy = self.top(down) + half_height - splat.y;
+            let v = dx * w + dy * i22;
+            let least_v = simd_kernel::larger(simd, v.abs() - by_v, 0.0);
+            let squared = least_u * least_u + least_v * least_v;
+            let within = squared.simd_le(kernel.squared_reach() * (1.0 + MARGIN));
+            reached |= (within.to_bitmask() as u32) << (down * ACROSS);
+        }
+        reached
     }
 
     #[inline(always)]
@@ -176,33 +245,47 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         kernel: K,
         states: &mut [TileState],
         planes: &mut [TilePlane; CHANNELS],
-    ) -> RenderingError {
-        let px = centers(simd, self.x);
-        let top = self.y as f32 + 0.5;
-        let zero = f32x16::splat(simd, 0.0);
-        let mut rendering = [[zero; TILE_HEIGHT]; CHANNELS];
-        for channel in 0..CHANNELS {
-            rendering[channel] = [f32x16::splat(simd, self.base[channel]); TILE_HEIGHT];
+    ) {
+        let columns = self.columns(simd);
+        let zero = Line::splat(simd, 0.0);
+        let mut rendering = [[[zero; BLOCK_HEIGHT]; CHANNELS]; BLOCKS];
+        for block in 0..BLOCKS {
+            for channel in 0..CHANNELS {
+                rendering[block][channel] = [Line::splat(simd, self.base[channel]); BLOCK_HEIGHT];
+            }
         }
         for (entry, state) in states.iter_mut().enumerate() {
             let splat = &self.splats[self.indices[entry] as usize];
-            let dx = px - splat.x;
-            let column = kernel.column(simd, dx * (splat.i11 * K::SCALE));
-            let rise = f32x16::splat(simd, splat.i22 * K::SCALE);
-            let mut v = dx * (splat.w * K::SCALE) + rise * (top - splat.y);
-            for row in 0..TILE_HEIGHT {
-                let (kept, weight) = kernel.forward(simd, column, v);
-                kept.store_array(&mut state.0[row]);
-                for channel in 0..CHANNELS {
-                    let sum = &mut rendering[channel][row];
-                    *sum = weight.fused_mul_add(splat.color[channel], *sum);
+            state.reached = self.reached(simd, kernel, splat);
+            let rise = Line::splat(simd, splat.i22 * K::SCALE);
+            let mut left = state.reached;
+            while left != 0 {
+                let block = next_block(&mut left);
+                let [across, down] = place(block);
+                let (dx, dy) = (columns[across] - splat.x, self.top(down) - splat.y);
+                let column = kernel.column(simd, dx * (splat.i11 * K::SCALE));
+                let mut v = dx * (splat.w * K::SCALE) + rise * dy;
+                for row in 0..BLOCK_HEIGHT {
+                    let (kept, weight) = kernel.forward(simd, column, v);
+                    kept.store_array(&mut state.of_blocks[block][row]);
+                    for channel in 0..CHANNELS {
+                        let sum = &mut rendering[block][channel][row];
+                        *sum = weight.fused_mul_add(splat.color[channel], *sum);
+                    }
+                    v += rise;
                 }
-                v += rise;
             }
         }
-        let corner = [self.x as usize, self.y as usize];
-        let size = [self.columns, self.rows];
-        self.loss.of_tile(simd, &rendering, self.target, corner, size, planes)
+        for block in 0..BLOCKS {
+            let [across, down] = place(block);
+            for channel in 0..CHANNELS {
+                for row in 0..BLOCK_HEIGHT {
+                    let line = &mut planes[channel][down * BLOCK_HEIGHT + row];
+                    let line = &mut line.as_chunks_mut().0[across];
+                    rendering[block][channel][row].store_array(line);
+                }
+            }
+        }
     }
 
     #[inline(always)]
@@ -215,42 +298,57 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
         slots: &mut [Slot],
         planes: &[TilePlane; CHANNELS],
     ) {
-        let px = centers(simd, self.x);
-        let top = self.y as f32 + 0.5;
-        let zero = f32x16::splat(simd, 0.0);
-        let mut residuals = [[zero; TILE_HEIGHT]; CHANNELS];
-        for channel in 0..CHANNELS {
-            for row in 0..TILE_HEIGHT {
-                residuals[channel][row] = f32x16::load_array_ref(simd, &planes[channel][row]);
+        let columns = self.columns(simd);
+        let zero = Line::splat(simd, 0.0);
+        let mut residuals = [[[zero; BLOCK_HEIGHT]; CHANNELS]; BLOCKS];
+        for block in 0..BLOCKS {
+            let [across, down] = place(block);
+            for channel in 0..CHANNELS {
+                for row in 0..BLOCK_HEIGHT {
+                    let line = block_line(&planes[channel][down * BLOCK_HEIGHT + row], across);
+                    residuals[block][channel][row] = Line::load_array_ref(simd, line);
+                }
             }
         }
         for (entry, state) in states.iter().enumerate() {
             let index = self.indices[entry] as usize;
             let splat = &self.splats[index];
-            let (mut s0, mut s1, mut s2) = (zero, zero, zero);
-            let mut by_color = [zero; 4];
-            for row in 0..TILE_HEIGHT {
-                let (weight, slope) = kernel.backward(f32x16::load_array_ref(simd, &state.0[row]));
-                let mut along = zero;
-                for channel in 0..CHANNELS {
-                    let residual = residuals[channel][row];
-                    by_color[channel] = residual.fused_mul_add(weight, by_color[channel]);
-                    along = residual.fused_mul_add(splat.color[channel], along);
+            let (mut by_point, mut by_color) = ([zero; 5], [zero; 4]);
+            let mut left = state.reached;
+            while left != 0 {
+                let block = next_block(&mut left);
+                let (mut s0, mut s1, mut s2) = (zero, zero, zero);
+                for row in 0..BLOCK_HEIGHT {
+                    let kept = Line::load_array_ref(simd, &state.of_blocks[block][row]);
+                    let (weight, slope) = kernel.backward(kept);
+                    let mut along = residuals[block][0][row] * splat.color[0];
+                    for channel in 0..CHANNELS {
+                        let residual = residuals[block][channel][row];
+                        by_color[channel] = residual.fused_mul_add(weight, by_color[channel]);
+                        if channel > 0 {
+                            along = residual.fused_mul_add(splat.color[channel], along);
+                        }
+                    }
+                    let s = along * slope;
+                    let y = row as f32;
+                    s0 += s;
+                    s1 = s.fused_mul_add(y, s1);
+                    s2 = s.fused_mul_add(y * y, s2);
                 }
-                let s = along * slope;
-                let y = row as f32;
-                s0 += s;
-                s1 = s.fused_mul_add(y, s1);
-                s2 = s.fused_mul_add(y * y, s2);
+                // From the distance to the first row to that from the centre.
+                let [across, down] = place(block);
+                let (dx, dy) = (columns[across] - splat.x, self.top(down) - splat.y);
+                let (t1, t2) = (s1 + s0 * dy, s2 + (s1 * 2.0 + s0 * dy) * dy);
+                let x0 = dx * s0;
+                by_point[0] += x0;
+                by_point[1] += t1;
+                by_point[2] = dx.fused_mul_add(x0, by_point[2]);
+                by_point[3] = dx.fused_mul_add(t1, by_point[3]);
+                by_point[4] += t2;
             }
-            // From the distance to the first row to that from the centre.
-            let dy = top - splat.y;
-            let (t1, t2) = (s1 + s0 * dy, s2 + (s1 * 2.0 + s0 * dy) * dy);
-            let dx = px - splat.x;
-            let x0 = dx * s0;
-            let [c0, c1, c2, c3] = by_color;
+            let ([x, y, xx, xy, yy], [c0, c1, c2, c3]) = (by_point, by_color);
             let first = index * slots_per_span(CHANNELS);
-            add(&mut slots[first], lane_sums([x0, t1, dx * x0, dx * t1, t2, c0, c1, c2]));
+            add(&mut slots[first], lane_sums([x, y, xx, xy, yy, c0, c1, c2]));
             if CHANNELS == 4 {
                 add(
                     &mut slots[first + 1],
@@ -261,20 +359,15 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
     }
 }
 
+/// The part of a row of a tile that a block has.
+#[inline(always)]
+fn block_line(line: &[f32; TILE_WIDTH], across: usize) -> &[f32; BLOCK_WIDTH] {
+    &line.as_chunks().0[across]
+}
+
 #[inline(always)]
 fn add(slot: &mut Slot, sums: Slot) {
     for lane in 0..sums.len() {
         slot[lane] += sums[lane];
     }
-}
-
-/// The sums of the lanes of each of eight vectors. The order of the additions is a tree that is the
-/// same at every SIMD level.
-#[inline(always)]
-fn lane_sums<S: Simd>([a, b, c, d, e, f, g, h]: [f32x16<S>; 8]) -> Slot {
-    let abcd = folded(folded(a, b), folded(c, d));
-    let efgh = folded(folded(e, f), folded(g, h));
-    let all = folded(abcd, efgh);
-    let (low, _) = folded(all, all).split();
-    low.to_array()
 }

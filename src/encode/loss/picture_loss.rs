@@ -136,16 +136,16 @@ impl PictureLoss {
         (near(0.0, 1.0) + left + right) / 3.0
     }
 
-    /// The error of a rendering in the tile whose first pixel is `corner`. `size` is the number of columns
-    /// and rows inside the picture. `planes` becomes half the gradient of the distortion by the samples of
-    /// the rendering: where all errors count the same, the residuals.
+    /// The error of a rendering, `planes`, in the tile whose first pixel is `corner`. `size` is the number of
+    /// columns and rows inside the picture. `planes` becomes half the gradient of the distortion by the
+    /// samples of the rendering: where all errors count the same, the residuals.
     ///
     /// Loops are over indices, as in `fit/training_tile.rs`.
     #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "see `fit/training_tile.rs`")]
     pub(crate) fn of_tile<S: Simd, const CHANNELS: usize>(
         &self,
         simd: S,
-        rendering: &[[f32x16<S>; TILE_HEIGHT]; CHANNELS],
         target: SampleTile<'_, CHANNELS>,
         corner: [usize; 2],
         size: [usize; 2],
@@ -159,7 +159,7 @@ impl PictureLoss {
                 let inside = if row < size[1] { inside } else { zero };
                 let sample = target.line(channel, row).load(simd);
                 let target = sample * (1.0 / FULL_SCALE);
-                let value = rendering[channel][row];
+                let value = f32x16::load_array_ref(simd, &planes[channel][row]);
                 let residual = residual(simd, (value - target) * inside, sample);
                 residual.store_array(&mut planes[channel][row]);
                 let clamped = smaller(simd, larger(simd, value, 0.0), 1.0);

@@ -3,7 +3,7 @@
 
 use core::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, i16x16, prelude::*};
 use rayon::prelude::*;
 
 use super::kernel_weights::{KernelWeights, Lanes};
@@ -341,8 +341,8 @@ fn vector<T>(values: &[T]) -> &[T; LANES] {
 
 #[inline(always)]
 pub(crate) fn load<S: Simd>(simd: S, stored: &[i16]) -> f32x16<S> {
-    let stored = vector(stored);
-    f32x16::from_fn(simd, |lane| f32::from(stored[lane])) * (1.0 / UNIT)
+    let (low, high) = i16x16::load_array_ref(simd, vector(stored)).widen();
+    low.combine(high).to_float::<f32x16<S>>() * (1.0 / UNIT)
 }
 
 #[inline(always)]

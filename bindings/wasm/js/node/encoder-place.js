@@ -1,5 +1,6 @@
 // Where the encoder is in Node: in this script, with workers of Node's own kind.
 
+import { availableParallelism } from 'node:os';
 import { Worker } from 'node:worker_threads';
 
 import script from 'embedded:encoder-worker.js';
@@ -39,3 +40,6 @@ class NodeWorker {
 
 /** The ways to start a worker. */
 export const starts = [() => new NodeWorker()];
+
+/** Most workers: one for each core. Each takes some ten megabytes, and more for large pictures. */
+export const mostWorkers = availableParallelism();

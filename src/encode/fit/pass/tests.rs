@@ -249,7 +249,7 @@ fn measured_placement_errors_are_those_of_the_tiles_rendered_again() {
             for (tile, &expected) in expected.iter().enumerate() {
                 let corner = [tile % columns * TILE_WIDTH, tile / columns * TILE_HEIGHT];
                 let planes = pass.residuals(&scene, tile);
-                let found = tiled.loss.placement_errors(corner, &planes, norm);
+                let found = tiled.loss.placement_errors(pass.level, corner, &planes, norm);
                 assert!(expected > 0.0);
                 assert_eq!(found.as_flattened().iter().sum::<f32>(), expected);
             }
