@@ -42,9 +42,7 @@ impl ErrorMap {
     pub(super) fn chosen(&self, placement: &dyn CustomPlacement, count: usize) -> Vec<u32> {
         let mut is_new = vec![true; self.errors.len()];
         let mut pixels = placement.pixels(count, self);
-        pixels.retain(|&pixel| {
-            is_new.get_mut(pixel as usize).is_some_and(|is_new| core::mem::take(is_new))
-        });
+        pixels.retain(|&pixel| is_new.get_mut(pixel as usize).is_some_and(core::mem::take));
         pixels.truncate(count);
         pixels
     }

@@ -45,6 +45,12 @@ pub(super) struct TileState {
 impl TileState {
     pub(super) const ZERO: Self =
         Self { of_blocks: [[[0.0; BLOCK_WIDTH]; BLOCK_HEIGHT]; BLOCKS], reached: 0 };
+
+    /// The blocks that the splat reaches, one bit each. Where there is one, it is known when this is compiled.
+    #[inline(always)]
+    fn reached(&self) -> u32 {
+        if BLOCKS == 1 { 1 } else { self.reached }
+    }
 }
 
 /// A kernel and its derivative.
@@ -258,7 +264,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
             let splat = &self.splats[self.indices[entry] as usize];
             state.reached = self.reached(simd, kernel, splat);
             let rise = Line::splat(simd, splat.i22 * K::SCALE);
-            let mut left = state.reached;
+            let mut left = state.reached();
             while left != 0 {
                 let block = next_block(&mut left);
                 let [across, down] = place(block);
@@ -314,7 +320,7 @@ impl<'a, const CHANNELS: usize> TrainingTile<'a, CHANNELS> {
             let index = self.indices[entry] as usize;
             let splat = &self.splats[index];
             let (mut by_point, mut by_color) = ([zero; 5], [zero; 4]);
-            let mut left = state.reached;
+            let mut left = state.reached();
             while left != 0 {
                 let block = next_block(&mut left);
                 let (mut s0, mut s1, mut s2) = (zero, zero, zero);
