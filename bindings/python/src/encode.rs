@@ -6,8 +6,8 @@ use core::time::Duration;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 use image_gip::{
-    EncodeError, Encoded, Encoder, Header, Importance, Limits as ImageLimits,
-    Picture as Gaussians, Precision, Progress, Shortfall, Source, Target, Tune,
+    EncodeError, Encoded, Encoder, Header, Importance, Limits as ImageLimits, Picture as Gaussians,
+    Precision, Progress, Shortfall, Source, Target, Tune,
 };
 use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -224,13 +224,11 @@ impl Importance for ImportanceMap {
 }
 
 /// The importance that an array gives to the pixels of a source.
-fn importance_of(
-    array: &Bound<'_, PyAny>,
-    source: &Source<'_>,
-) -> PyResult<Arc<dyn Importance>> {
+fn importance_of(array: &Bound<'_, PyAny>, source: &Source<'_>) -> PyResult<Arc<dyn Importance>> {
     let [width, height] = [source.width(), source.height()].map(|side| side as usize);
     let wrong = || {
-        let message = format!("importance must be a NumPy array of float32 and shape ({height}, {width})");
+        let message =
+            format!("importance must be a NumPy array of float32 and shape ({height}, {width})");
         PyValueError::new_err(message)
     };
     let array = array.cast::<PyArrayDyn<f32>>().map_err(|_| wrong())?;
