@@ -237,7 +237,7 @@ fn importance_of(array: &Bound<'_, PyAny>, source: &Source<'_>) -> PyResult<Arc<
     if array.shape() != [height, width] {
         return Err(wrong());
     }
-    let mut values = vec_for(width * height)?;
+    let mut values: Vec<f32> = vec_for(width * height)?;
     values.extend(array.as_array().iter());
     if !values.iter().all(|value| value.is_finite() && *value >= 0.0) {
         return Err(PyValueError::new_err("importance must be finite, and not negative"));
