@@ -2,8 +2,6 @@
 //! section "Distortion Driven Densification"; the variance of their shapes: section "Content Aware
 //! Gaussian Filters").
 
-use fearless_simd::Level;
-
 use super::components::{Bounds, Components};
 use super::custom_placement::ErrorMap;
 use super::paper;
@@ -171,7 +169,7 @@ impl Densifier<'_> {
         let residuals = self.pass.residuals(&self.scene, tile);
         let loss = &self.scene.tiled.loss;
         let errors =
-            loss.placement_errors(Level::new(), corner, &residuals, self.options.error_norm);
+            loss.placement_errors(self.pass.level, corner, &residuals, self.options.error_norm);
         TileErrors { errors, residuals }
     }
 }

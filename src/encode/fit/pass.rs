@@ -45,7 +45,7 @@ pub(crate) struct Scene<'a> {
 /// The bins, results and scratch memory of passes, reused from one pass to the next.
 #[derive(Debug)]
 pub(crate) struct Pass {
-    level: Level,
+    pub(super) level: Level,
     bins: RowBins,
     /// The slots of all spans, in the order of the bins: row by row, then splat by splat.
     slots: Vec<Slot>,
