@@ -1,17 +1,16 @@
 //! A game without a window, which loads files from a folder.
 
+mod turned;
+
 use std::fs;
 use std::time::{Duration, Instant};
 
 use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::{AssetApp, AssetPlugin, AssetServer, Assets, Handle, LoadState};
 use bevy_image::Image;
-use image_gip::{ColorModel, Decoder, RenderOptions};
 use image_gip_bevy::{GipPlugin, GipSettings};
+use turned::{FILE, decoded};
 use wgpu_types::TextureFormat;
-
-/// The test vector `rgb8`, of 40 x 24 pixels, with Exif by which it is to be turned by 90 degrees.
-const FILE: &[u8] = include_bytes!("turned.gip");
 
 /// Loads a file as a game does; an error as the message that it logs.
 fn load(file: &[u8], settings: &GipSettings) -> Result<Image, String> {
@@ -39,18 +38,6 @@ fn load(file: &[u8], settings: &GipSettings) -> Result<Image, String> {
         }
     }
     panic!("not loaded in a minute");
-}
-
-/// What the decoder gives, upright and of this upright size.
-fn decoded(width: u32, height: u32) -> Vec<u8> {
-    let mut decoder = Decoder::new(FILE).expect("a valid file");
-    let orientation = decoder.metadata().orientation();
-    let (width, height) = orientation.turned_size(width, height);
-    let options = RenderOptions::new().with_size(width, height);
-    decoder.set_options(options.with_color(ColorModel::Rgba));
-    let mut samples = vec![0; decoder.output_len().expect("a sound size")];
-    decoder.decode_into(&mut samples).expect("a valid file");
-    orientation.apply(&samples, width as usize, 4)
 }
 
 #[test]

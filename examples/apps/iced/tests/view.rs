@@ -1,14 +1,15 @@
 //! A window in memory, drawn by the software renderer of iced.
 
+#[path = "../../bevy/tests/turned/mod.rs"]
+mod turned;
+
 use iced_core::renderer::{Headless, Style};
 use iced_core::{Color, Font, Pixels, Size, Theme, mouse};
 use iced_runtime::user_interface::{Cache, UserInterface};
 use iced_tiny_skia::Renderer;
-use image_gip::{ColorModel, Decoder, RenderOptions};
 use image_gip_iced::GipPicture;
+use turned::{FILE, decoded};
 
-/// A picture of 40 x 24 pixels, with Exif by which it is to be turned by 90 degrees.
-const FILE: &[u8] = include_bytes!("../../bevy/tests/turned.gip");
 const BACKGROUND: [u8; 4] = [255, 255, 255, 255];
 
 /// The pixels of a window of this size in pixels of the screen.
@@ -20,18 +21,6 @@ fn shown(picture: &GipPicture, size: Size<u32>, scale_factor: f32) -> Vec<u8> {
     let style = Style { text_color: Color::BLACK };
     window.draw(&mut renderer, &Theme::Light, &style, mouse::Cursor::Unavailable);
     renderer.screenshot(size, scale_factor, Color::WHITE)
-}
-
-/// What the decoder gives, upright and of this upright size.
-fn decoded(width: u32, height: u32) -> Vec<u8> {
-    let mut decoder = Decoder::new(FILE).expect("a valid file");
-    let orientation = decoder.metadata().orientation();
-    let (width, height) = orientation.turned_size(width, height);
-    let options = RenderOptions::new().with_size(width, height);
-    decoder.set_options(options.with_color(ColorModel::Rgba));
-    let mut samples = vec![0; decoder.output_len().expect("a sound size")];
-    decoder.decode_into(&mut samples).expect("a valid file");
-    orientation.apply(&samples, width as usize, 4)
 }
 
 #[test]
