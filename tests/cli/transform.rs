@@ -1,6 +1,6 @@
 //! `gip transform`.
 
-use image::{DynamicImage, ImageReader, imageops};
+use image::{DynamicImage, ImageReader, Rgb, RgbImage, imageops};
 use image_gip::{Metadata, Orientation, StreamDecoder};
 
 use super::room::{Room, text};
@@ -75,6 +75,25 @@ fn what_stays_on_the_grid_is_exact() {
         let sizes = ["coded.gip", "turned.gip"].map(|file| room.read(file).len());
         assert!(sizes[1] < sizes[0] + sizes[0] / 20, "{sizes:?}");
         transform(&room, &[&["turned.gip", "back.gip"][..], &options].concat());
+        assert_eq!(gaussians(&room, "back.gip"), gaussians(&room, "coded.gip"), "{options:?}");
+    }
+}
+
+/// The encoder's large Gaussians lie in cells that are smaller than their position intervals.
+#[test]
+fn an_encoded_file_stays_as_it_is() {
+    let room = room();
+    let picture = RgbImage::from_fn(160, 128, |x, y| {
+        let (x, y) = (x as f32, y as f32);
+        let waves = [x / 9.0 + y / 31.0, x * y / 600.0, (x - 70.0).hypot(y - 50.0) / 5.0];
+        Rgb(waves.map(|wave| (127.5 + 120.0 * wave.sin()) as u8))
+    });
+    room.save_picture("in.png", &picture.into());
+    room.ok(&["encode", "in.png", "coded.gip", "--gaussians", "300", "--effort", "1"]);
+    for options in [&[][..], &["--flip", "horizontal"], &["--rotate", "180"]] {
+        let said = transform(&room, &[&["coded.gip", "turned.gip"], options].concat());
+        assert!(said.starts_with("all of ") && said.ends_with(" Gaussians exact"), "{said}");
+        transform(&room, &[&["turned.gip", "back.gip"], options].concat());
         assert_eq!(gaussians(&room, "back.gip"), gaussians(&room, "coded.gip"), "{options:?}");
     }
 }
@@ -209,4 +228,38 @@ fn texture_goes_along() {
     assert!((turned / before - 1.0).abs() < 0.2, "{turned} {before}");
     let smooth = roughness("turned.gip", 16, 152);
     assert!(smooth < 0.2 * before, "{smooth} {before}");
+}
+
+#[test]
+fn streaks_turn_with_the_picture() {
+    let room = Room::new();
+    let mut rng = fastrand::Rng::with_seed(4);
+    let mut grains = image::GrayImage::from_fn(256, 192, |_, _| image::Luma([rng.u8(60..190)]));
+    for row in grains.chunks_exact_mut(256) {
+        // Every sample is the mean of those after it, with twice the contrast.
+        let sums = row.windows(10).map(|after| after.iter().map(|&sample| i32::from(sample)).sum());
+        let sums: Vec<i32> = sums.collect();
+        for (sample, sum) in row.iter_mut().zip(sums) {
+            *sample = (125 + 2 * (sum - 1250) / 10).clamp(0, 255) as u8;
+        }
+    }
+    room.save_picture("a.png", &DynamicImage::from(grains));
+    room.ok(&["encode", "a.png", "a.gip", "--effort", "1", "--gaussians", "20"]);
+    // How much more the neighbours below differ than those to the right.
+    let slope = |file: &str| {
+        let picture = picture(&room, file).to_luma8();
+        let places = (8..180).flat_map(|y| (8..180).map(move |x| (x, y)));
+        let at = |x, y| f64::from(picture.get_pixel(x, y).0[0]);
+        let both =
+            places.map(|(x, y)| [(at(x, y + 1) - at(x, y)).abs(), (at(x + 1, y) - at(x, y)).abs()]);
+        let [below, right] = both.fold([0.0, 0.0], |sums, both| [0, 1].map(|i| sums[i] + both[i]));
+        f64::ln(below / right)
+    };
+    let before = slope("a.gip");
+    assert!(before > 0.3, "{before}");
+    for (option, expected) in [(["--rotate", "90"], -before), (["--flip", "vertical"], before)] {
+        room.ok(&[&["transform", "a.gip", "turned.gip"][..], &option].concat());
+        let found = slope("turned.gip");
+        assert!((found - expected).abs() < 0.3 * before, "{option:?}: {found} {before}");
+    }
 }

@@ -299,17 +299,28 @@ impl Quantization {
         code
     }
 
-    /// The code that stands for exactly this Gaussian, if there is one.
+    /// The code that stands for exactly this Gaussian, if there is one. Its centre may lie between the position
+    /// intervals: files have it in the middle of a cell that is smaller than these.
     pub(crate) fn exact_code(
         &self,
         gaussian: &Gaussian,
         grid: &CenterGrid,
         model: ColorModel,
     ) -> Option<Code> {
-        let mut codes =
-            (0..=MAX_EXPONENT).map(|exponent| self.code(gaussian, exponent, grid, model));
+        let codes = (0..=MAX_EXPONENT).map(|exponent| self.code(gaussian, exponent, grid, model));
+        let center = grid.units(gaussian.center);
+        // With a higher exponent than its own, an interval would be smaller than the cell; with a lower one, an axis whose
+        // interval is not the larger of both would be rounded to it.
+        let in_small_cell = codes.clone().rev().map(|code| Code { center, ..code });
+        let in_small_cell = in_small_cell.filter(|code| {
+            let fraction_bits = self.fraction_bits(code.exponent, &self.shape(code));
+            let is_smaller = |axis: usize| {
+                center[axis].trailing_zeros() < grid.interval_bits(fraction_bits[axis])
+            };
+            (0..2).all(is_smaller)
+        });
         let is_it = |code: &Code| self.gaussian(code, &self.shape(code), grid, model) == *gaussian;
-        codes.find(is_it)
+        codes.chain(in_small_cell).find(is_it)
     }
 
     /// The coordinates, in units and with the precision of a code, that are nearest to a centre in
