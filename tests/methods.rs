@@ -1,5 +1,6 @@
 //! Methods of one's own in place of parts of the encoder.
 
+use core::ops::ControlFlow;
 use std::sync::{Arc, Mutex};
 
 use image_gip::training::{CustomPlacement, ErrorMap, NewColor, Placement, Training};
@@ -187,6 +188,18 @@ fn gaussians_of_ones_own_get_the_codes_of_the_encoder() {
     let (own, of_rounded) = (psnr_of(&encoded.bytes), psnr_of(&rounded));
     assert!(own > of_rounded + 1.0, "{own} dB, {of_rounded} dB by rounding");
     assert!((encoded.report.psnr - own).abs() < 1e-6);
+    // Nothing is trained, but there are Gaussians from the beginning.
+    let mut last = None;
+    let told =
+        encoder.clone().with_target(size).encode_fitted_with(&source, &picture, &mut |progress| {
+            assert_eq!(progress.iteration, 0);
+            last = Some(*progress);
+            ControlFlow::Continue(())
+        });
+    assert_eq!(told.expect("it encodes").bytes, encoded.bytes);
+    let last = last.expect("there are reports");
+    assert!(last.gaussians >= encoded.report.gaussians && last.iterations == 0, "{last:?}");
+    assert!(last.fraction > 0.9 && last.psnr > 20.0, "{last:?}");
     // Every kind of target.
     let encode = |target| {
         let encoded = encoder.clone().with_target(target).encode_fitted(&source, &picture);

@@ -107,7 +107,7 @@ impl Fit<'_> {
             self.cull(surplus, observer)?;
             self.settle(observer)?;
         }
-        Ok(())
+        observer.report(0, 0, self.len(), self.psnr())
     }
 
     /// Trains from nothing again, with this many Gaussians.
