@@ -1,23 +1,25 @@
 """Measures random crops for training, from .gip and from other formats at equal quality.
 
-    pip install image-gip pillow simplejpeg ssimulacra2
+    pip install image-gip --requirement benchmarks/requirements.txt
     python benchmarks/crops.py --pictures FOLDER [FOLDER...] --files CACHE
 
-Every PNG of the folders becomes a .gip of about the quality asked for, without texture, whose
-SSIMULACRA2 the others then meet: JPEG (Pillow's default), WebP (method 6) and AVIF (speed 6), each
-with the quality that comes nearest. The files are kept in the cache. Then crops of 224 x 224 pixels
-are made of all files, the same ones for each format, with areas and aspects as torchvision's
-``RandomResizedCrop`` draws them. What is not rendered at the size of the result is resampled by
-Pillow with the bilinear filter, which averages where it reduces.
+Every PNG that is named or in one of the folders becomes a .gip of about the quality asked for,
+without texture, whose SSIMULACRA2 the others then meet: JPEG (Pillow's default), WebP (method 6)
+and AVIF (speed 6), each with the quality that comes nearest. The files are kept in the cache. Then
+crops of 224 x 224 pixels are made of all files, the same ones for each format, with areas and
+aspects as torchvision's ``RandomResizedCrop`` draws them. What is not rendered at the size of the
+result is resampled by Pillow with the bilinear filter, which averages where it reduces.
 
 Formats are measured in turns, and figures are medians, so that other work on the machine slows all
 of them down alike. With two processes, each makes all crops.
 """
 
 import argparse
+import csv
 import io
 import json
 import statistics
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -168,17 +170,19 @@ def make_crops(name: str, paths: list[Path], crops: list[list[Crop]]) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--pictures", type=Path, nargs="+", required=True, help="folders of PNG")
+    parser.add_argument(
+        "--pictures", type=Path, nargs="+", required=True, help="PNG files, or folders of them"
+    )
     parser.add_argument("--files", type=Path, required=True, help="the folder of the cache")
     parser.add_argument("--every", type=int, default=1, help="take one of so many pictures")
     parser.add_argument("--quality", type=float, default=70, help="SSIMULACRA2")
     parser.add_argument("--crops", type=int, default=8, help="crops of each picture in a round")
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--csv", action="store_true", help="print CSV in place of a table")
     args = parser.parse_args()
     args.files.mkdir(parents=True, exist_ok=True)
-    pictures = [
-        path for folder in args.pictures for path in sorted(folder.glob("*.png"))[:: args.every]
-    ]
+    found = [sorted(path.glob("*.png")) if path.is_dir() else [path] for path in args.pictures]
+    pictures = [path for paths in found for path in paths[:: args.every]]
     scores = [make_files(picture, args.quality, args.files) for picture in pictures]
     paths = {
         name: [args.files / f"{picture.stem}.{suffix}" for picture in pictures]
@@ -196,14 +200,20 @@ def main() -> None:
                 list(pool.map(make_crops, [name] * 2, [paths[name]] * 2, [crops] * 2))
                 seconds[name, 2].append(time.perf_counter() - start)
     count = len(pictures) * args.crops
-    print(f"{len(pictures)} pictures, {args.crops} crops of each\n")
-    print("| | SSIMULACRA2 | bytes read | crops a second | with two processes |")
-    print("| --- | ---: | ---: | ---: | ---: |")
+    rows = []
     for name, (suffix, _) in READERS.items():
         size = statistics.mean(path.stat().st_size for path in paths[name])
         quality = statistics.mean(of_picture[suffix] for of_picture in scores)
         rates = [count * p / statistics.median(seconds[name, p]) for p in (1, 2)]
-        print(f"| {name} | {quality:.1f} | {size:,.0f} | {rates[0]:.0f} | {rates[1]:.0f} |")
+        rows.append((name, quality, size, *rates))
+    if args.csv:
+        csv.writer(sys.stdout).writerows(rows)
+        return
+    print(f"{len(pictures)} pictures, {args.crops} crops of each\n")
+    print("| | SSIMULACRA2 | bytes read | crops a second | with two processes |")
+    print("| --- | ---: | ---: | ---: | ---: |")
+    for name, quality, size, one, two in rows:
+        print(f"| {name} | {quality:.1f} | {size:,.0f} | {one:.0f} | {two:.0f} |")
 
 
 if __name__ == "__main__":

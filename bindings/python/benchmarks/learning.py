@@ -1,6 +1,6 @@
 """Whether a network learns as well from .gip as from JPEG of the same bytes.
 
-    pip install image-gip pillow scikit-learn torch
+    pip install image-gip --requirement benchmarks/requirements.txt
     python benchmarks/learning.py
 
 The pictures are made of what scikit-learn ships: each of its 1,797 handwritten digits, enlarged and
@@ -11,8 +11,10 @@ seeds, and is tested on pictures in the same format: the last third, which it ha
 """
 
 import argparse
+import csv
 import io
 import statistics
+import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
@@ -123,24 +125,35 @@ def learn(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--quality", type=int, nargs="+", default=[10, 30], help="of JPEG")
+    parser.add_argument("--pictures", type=int, help="take only so many")
     parser.add_argument("--epochs", type=int, default=15)
     parser.add_argument("--seeds", type=int, default=3)
+    parser.add_argument("--csv", action="store_true", help="print CSV in place of a table")
     args = parser.parse_args()
     pictures, labels = draw_pictures()
-    print("| bytes | learned from | accuracy | of each seed |")
-    print("| ---: | --- | ---: | --- |")
+    pictures, labels = pictures[: args.pictures], labels[: args.pictures]
+    rows = []
     for quality in args.quality:
         with ProcessPoolExecutor(2) as pool:
             files = list(pool.map(encode, pictures, [quality] * len(pictures), chunksize=32))
         size = statistics.mean(len(jpeg) for _, jpeg in files)
         for kind in FORMATS if quality == args.quality[0] else FORMATS[1:]:
-            found = [
+            accuracies = [
                 learn(kind, pictures, files, labels, seed, args.epochs)
                 for seed in range(args.seeds)
             ]
-            each = ", ".join(f"{accuracy:.1f}" for accuracy in found)
-            shown = "-" if kind == FORMATS[0] else f"{size:,.0f}"
-            print(f"| {shown} | {kind} | {statistics.mean(found):.1f} % | {each} |", flush=True)
+            rows.append((0 if kind == FORMATS[0] else size, kind, accuracies))
+    if args.csv:
+        for size, kind, accuracies in rows:
+            mean = statistics.mean(accuracies)
+            csv.writer(sys.stdout).writerow((kind, size, mean, min(accuracies), max(accuracies)))
+        return
+    print("| bytes | learned from | accuracy | of each seed |")
+    print("| ---: | --- | ---: | --- |")
+    for size, kind, accuracies in rows:
+        each = ", ".join(f"{accuracy:.1f}" for accuracy in accuracies)
+        shown = f"{size:,.0f}" if size else "-"
+        print(f"| {shown} | {kind} | {statistics.mean(accuracies):.1f} % | {each} |")
 
 
 if __name__ == "__main__":

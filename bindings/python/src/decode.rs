@@ -131,7 +131,8 @@ fn read_whole(
 /// Args:
 ///     src: The file, as for `decode`.
 ///     cholesky: Whether the result has Cholesky factors in place of covariances. They are what the decoder computes
-///         with, so that `render` and `pack` give the same picture bit for bit; covariances are rounded once more.
+///         with, so that `render` gives the same picture bit for bit, and `pack` stores the same numbers; covariances are
+///         rounded once more.
 ///     limits: What the file may cost at most. Default: Limits().
 ///
 /// Returns:

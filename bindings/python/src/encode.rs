@@ -1,5 +1,6 @@
 //! `encode`.
 
+use core::fmt::Display;
 use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -92,8 +93,8 @@ const NEWS: f64 = 0.002;
 ///         The target is still that of the whole picture.
 ///     fitted: Gaussians that were fitted to the picture by other means, as for `render`, with the quartic kernel.
 ///         Nothing is fitted: their codes are chosen for the target, by coordinate descent over rate and distortion.
-///         With precision="entropy" only.
-///     base_color: What `fitted` is added to, as for `render`.
+///         With precision="entropy" only. What a mapping has of a header, as for `render`, must be that of the picture.
+///     base_color: What `fitted` is added to, as for `render`; by default that of the mapping, or 0.
 ///     progress: Called with a `Progress` again and again, on the calling thread. If it returns False,
 ///         or raises an exception, the encoding is cancelled. None goes on.
 ///
@@ -168,17 +169,19 @@ pub(crate) fn encode<'py>(
     let given = fitted.map(Given::new).transpose()?;
     let mut header = Header::new(source.width(), source.height(), source.color());
     header.depth = source.depth();
-    match (base_color, &given) {
-        (Some(base), Some(given)) => {
+    if let (Some(fitted), Some(given)) = (fitted, &given) {
+        header.color = given.color;
+        check_header_of(fitted, &header)?;
+        let base = match base_color {
+            Some(base) => Some(base.clone()),
+            None => given::header_field(fitted, "base_color")?,
+        };
+        if let Some(base) = base {
             let channels = given.color.channels();
-            header.color = given.color;
-            header.base_color[..channels].copy_from_slice(&given::base_color(base, channels)?);
+            header.base_color[..channels].copy_from_slice(&given::base_color(&base, channels)?);
         }
-        (None, Some(given)) => header.color = given.color,
-        (Some(_), None) => {
-            return Err(PyTypeError::new_err("base_color is that of fitted Gaussians"));
-        }
-        (None, None) => (),
+    } else if base_color.is_some() {
+        return Err(PyTypeError::new_err("base_color is that of fitted Gaussians"));
     }
     let drawn = ImageLimits::none();
     let fitted = given
@@ -199,6 +202,26 @@ pub(crate) fn encode<'py>(
         warn(py, "ShortfallWarning", &shortfall.to_string())?;
     }
     Ok(PyBytes::new(py, &encoded.bytes))
+}
+
+/// Refuses a mapping of Gaussians that says it is of another size or kernel, as an exported .npz may.
+fn check_header_of(fitted: &Bound<'_, PyAny>, header: &Header) -> PyResult<()> {
+    let differs = |name: &str, found: &Bound<'_, PyAny>, wanted: &dyn Display| {
+        Err(PyValueError::new_err(format!(
+            "the Gaussians have the {name} {found}; it must be {wanted}"
+        )))
+    };
+    for (name, wanted) in [("width", header.width), ("height", header.height)] {
+        if let Some(found) = given::header_field(fitted, name)?
+            && !found.eq(wanted)?
+        {
+            return differs(name, &found, &wanted);
+        }
+    }
+    match given::header_field(fitted, "kernel")? {
+        Some(found) if !found.eq("quartic")? => differs("kernel", &found, &"quartic"),
+        _ => Ok(()),
+    }
 }
 
 /// The importance of pixels.

@@ -1,5 +1,8 @@
 //! Gaussians and headers that the caller gives.
 
+use core::fmt::Display;
+use core::ops::RangeInclusive;
+
 use image_gip::{
     ColorModel, Gaussian, Header, Kernel, Limits, Parameterization, Picture, PictureError,
     SampleDepth,
@@ -186,10 +189,11 @@ impl<'a, 'py> Fields<'a, 'py> {
     }
 }
 
-/// What the caller gives of a header: the keywords that `render` and `pack` share. `like` is an `Info`, for what else
-/// is not given.
+/// What the caller gives of a header: the keywords that `render` and `pack` share. What is not given is that of `like`,
+/// an `Info`; without that, what the mapping of the Gaussians has of it, as an exported .npz does.
 #[derive(Debug)]
 pub(crate) struct HeaderFields<'a, 'py> {
+    pub(crate) gaussians: &'a Bound<'py, PyAny>,
     pub(crate) like: Option<&'a Bound<'py, PyAny>>,
     pub(crate) width: Option<Integer<'py>>,
     pub(crate) height: Option<Integer<'py>>,
@@ -214,23 +218,21 @@ impl<'py> HeaderFields<'_, 'py> {
         let (width, height) =
             (self.side("width", &self.width)?, self.side("height", &self.height)?);
         let mut header = Header::new(width, height, color);
-        let eight = match (&self.depth, self.like) {
-            (Some(depth), _) => depth.within("depth", 8..=16)?,
-            (None, Some(like)) => like.getattr("depth")?.extract()?,
-            (None, None) => 8,
+        let depth = match &self.depth {
+            Some(depth) => depth.within("depth", 8..=16)?,
+            None => self.integer("depth", 8..=16)?.unwrap_or(8_u8),
         };
-        header.depth = match eight {
-            8_u8 => SampleDepth::Eight,
+        header.depth = match depth {
+            8 => SampleDepth::Eight,
             16 => SampleDepth::Sixteen,
             depth => {
                 return Err(PyValueError::new_err(format!("depth {depth}; it must be 8 or 16")));
             }
         };
         header.kernel = self.kernel()?;
-        let base = match (self.base_color, self.like) {
-            (Some(base), _) => Some(base.clone()),
-            (None, Some(like)) => Some(like.getattr("base_color")?),
-            (None, None) => None,
+        let base = match self.base_color {
+            Some(base) => Some(base.clone()),
+            None => self.otherwise("base_color")?,
         };
         if let Some(base) = base {
             let channels = color.channels();
@@ -239,23 +241,42 @@ impl<'py> HeaderFields<'_, 'py> {
         Ok(header)
     }
 
-    fn side(&self, name: &str, given: &Option<Integer<'py>>) -> PyResult<u32> {
-        match (given, self.like) {
-            (Some(side), _) => side.within(name, 1..=MAX_SIDE),
-            (None, Some(like)) => like.getattr(name)?.extract(),
-            (None, None) => Err(PyTypeError::new_err(
-                "width and height of the picture must be given, or like, which has them",
-            )),
+    /// What stands for a keyword that is not given.
+    fn otherwise(&self, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        match self.like {
+            Some(like) => like.getattr(name).map(Some),
+            None => header_field(self.gaussians, name),
         }
     }
 
+    /// The whole number that stands for a keyword.
+    fn integer<T>(&self, name: &str, range: RangeInclusive<T>) -> PyResult<Option<T>>
+    where
+        T: for<'a> FromPyObject<'a, 'py> + PartialOrd + Display,
+    {
+        let number = self.otherwise(name)?;
+        number.map(|number| number.extract::<Integer<'_>>()?.within(name, range)).transpose()
+    }
+
+    fn side(&self, name: &str, given: &Option<Integer<'py>>) -> PyResult<u32> {
+        if let Some(side) = given {
+            return side.within(name, 1..=MAX_SIDE);
+        }
+        self.integer(name, 1..=MAX_SIDE)?.ok_or_else(|| {
+            PyTypeError::new_err(
+                "width and height of the picture must be given, or like, which has them",
+            )
+        })
+    }
+
     fn kernel(&self) -> PyResult<Kernel> {
-        let of_like = self.like.filter(|_| self.kernel.is_none());
-        let (name, mut cutoff) = match of_like {
-            Some(like) => {
-                (like.getattr("kernel")?.extract()?, Some(like.getattr("cutoff")?.extract()?))
+        let (name, mut cutoff) = match (&self.kernel, self.otherwise("kernel")?) {
+            (Some(name), _) => (name.clone(), None),
+            (None, Some(name)) => {
+                let cutoff = self.otherwise("cutoff")?.map(|cutoff| cutoff.extract());
+                (name.extract()?, cutoff.transpose()?)
             }
-            None => (self.kernel.clone().unwrap_or_else(|| "quartic".into()), None),
+            (None, None) => ("quartic".into(), None),
         };
         if let Some(Real(given)) = self.cutoff {
             cutoff = Some(given);
@@ -275,6 +296,20 @@ impl<'py> HeaderFields<'_, 'py> {
             ))),
         }
     }
+}
+
+/// What a mapping of Gaussians says of their header under this name, in objects of Python: numbers of NumPy's become some.
+pub(crate) fn header_field<'py>(
+    gaussians: &Bound<'py, PyAny>,
+    name: &str,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let Ok(mapping) = gaussians.cast::<PyMapping>() else { return Ok(None) };
+    if !mapping.contains(name)? {
+        return Ok(None);
+    }
+    let array =
+        gaussians.py().import("numpy")?.call_method1("asarray", (mapping.get_item(name)?,))?;
+    array.call_method0("tolist").map(Some)
 }
 
 /// The base colour of so many channels: one number for all, or one for each.

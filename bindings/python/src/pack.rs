@@ -20,7 +20,7 @@ use crate::{metadata, threads};
 /// Args:
 ///     gaussians, like, width, height, depth, kernel, cutoff, base_color: As for `render`. What a file has beside
 ///         Gaussians and header, such as texture, is not taken from `like`.
-///     precision: How the Gaussians are stored: "f32", floats, which lose nothing; "packed", codes of fixed bit
+///     precision: How the Gaussians are stored: "f32", floats, which are not rounded; "packed", codes of fixed bit
 ///         depths; or "entropy", rounded to a grid, for the smallest files, with the quartic kernel only.
 ///     parameterization: What is stored of a shape with "f32" and "packed": "cholesky" (l11, l21, l22 in pixels),
 ///         "covariance" (xx, xy, yy in square pixels), or "rotation-scale" (two standard deviations in pixels,
@@ -94,7 +94,7 @@ pub(crate) fn pack<'py>(
         warn(py, "MetadataWarning", &loss.to_string())?;
     }
     let given = Given::new(gaussians)?;
-    let fields = HeaderFields { like, width, height, depth, kernel, cutoff, base_color };
+    let fields = HeaderFields { gaussians, like, width, height, depth, kernel, cutoff, base_color };
     let mut header = fields.header(given.color)?;
     if let Some(name) = parameterization {
         header.parameterization = parameterization_of(name)?;

@@ -31,7 +31,7 @@ use crate::threads;
 ///           negative; within +-65536. The channels are gray; gray, alpha; red, green, blue; or red, green, blue,
 ///           alpha.
 ///     like: An `Info`, of which what follows is taken where it is not given: width, height, depth, kernel with
-///         cutoff, base_color.
+///         cutoff, base_color. Without `like`, a mapping may have these, too, as the .npz of `gip export` does.
 ///     width, height: The stored size, 1 to 2**20: the pixels in which centres and covariances are.
 ///     depth: Bits per sample, 8 or 16, which sets the default dtype. Default: 8.
 ///     kernel: "quartic" or "exponential". Default: "quartic".
@@ -92,7 +92,7 @@ pub(crate) fn render<'py>(
     };
     let rendering = request.check()?;
     let given = Given::new(gaussians)?;
-    let fields = HeaderFields { like, width, height, depth, kernel, cutoff, base_color };
+    let fields = HeaderFields { gaussians, like, width, height, depth, kernel, cutoff, base_color };
     let header = fields.header(given.color)?;
     let limits = Limits::of(limits);
     let picture = Picture::from_gaussians(&header, &given.gaussians, &limits)

@@ -306,9 +306,14 @@ def test_arrays_of_the_tool(textured: bytes, tool: Path, tmp_path: Path) -> None
         assert header["kernel"] == info.kernel
         shown = image_gip.render(arrays, **header)
         np.testing.assert_array_equal(shown, image_gip.decode(path, texture=False))
+        # They say these things themselves.
+        np.testing.assert_array_equal(image_gip.render(arrays), shown)
+        darker = image_gip.render(arrays, base_color=0)
+        np.testing.assert_array_equal(darker, image_gip.render(expected, like=info, base_color=0))
         assert arrays["texture_center"].shape[1:] == (2,)
         assert (arrays["texture_size"] > 1).all()
         file = image_gip.pack(arrays, **header)
+        assert image_gip.pack(arrays) == file
         gip("import", "a.npz", "b.gip")
         assert (tmp_path / "b.gip").read_bytes() == file
         fields = {name: arrays[name] for name in ("center", "cholesky", "color", *header)}
@@ -478,3 +483,13 @@ def test_fitted_gaussians_get_the_codes_of_the_encoder() -> None:
     broken["center"][7] = np.nan
     with pytest.raises(ValueError, match="Gaussian 7"):
         image_gip.encode(picture, fitted=broken)
+    # What a mapping says of the picture holds.
+    fields: dict[str, Any] = {name: gaussians[name] for name in ("center", "covariance", "color")}
+    fields |= {**SIZE, "base_color": np.full(3, 110 * 257), "kernel": np.array("quartic")}
+    assert image_gip.encode(picture, fitted=fields, tune="psnr", bytes=800) == small
+    for name, value in {"width": 5, "height": np.int32(7), "kernel": "exponential"}.items():
+        with pytest.raises(ValueError, match=f"have the {name} {value}; it must be"):
+            image_gip.encode(picture, fitted=fields | {name: value})
+    del fields["width"]
+    with pytest.raises(TypeError, match="must be given"):
+        image_gip.render(fields)
