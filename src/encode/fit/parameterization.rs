@@ -316,32 +316,6 @@ mod tests {
         }
     }
 
-    proptest! {
-        #![proptest_config(config(128))]
-
-        /// So that files do not depend on the release of glam: each product is rounded, and they are
-        /// added in the order of the axes.
-        #[test]
-        fn glam_rounds_as_written_out(
-            m in prop::array::uniform9(-1e3_f32..1e3),
-            n in prop::array::uniform4(-1e3_f32..1e3),
-            v in prop::array::uniform3(-1e3_f32..1e3),
-        ) {
-            let [a, b, c, d, ..] = m;
-            let (first, second) = (Mat2::from_cols_array(&[a, b, c, d]), Mat2::from_cols_array(&n));
-            let by_first = |[x, y]: [f32; 2]| [a * x + c * y, b * x + d * y];
-            let [column1, column2] = [by_first([n[0], n[1]]), by_first([n[2], n[3]])];
-            prop_assert_eq!((first * second).to_cols_array_2d(), [column1, column2]);
-            prop_assert_eq!((first * Vec2::new(v[0], v[1])).to_array(), by_first([v[0], v[1]]));
-            prop_assert_eq!(Vec2::new(a, b).dot(Vec2::new(c, d)), a * c + b * d);
-            prop_assert_eq!(first.determinant(), a * d - b * c);
-
-            let row = |index: usize| m[index] * v[0] + m[index + 3] * v[1] + m[index + 6] * v[2];
-            let product = Mat3::from_cols_array(&m) * Vec3::from(v);
-            prop_assert_eq!(product.to_array(), [row(0), row(1), row(2)]);
-        }
-    }
-
     #[test]
     fn clamping_keeps_ordinary_shapes() {
         for parameterization in PARAMETERIZATIONS {
