@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::pictures::TestPicture;
 use crate::provenance::FOLDER;
+use crate::python;
 
 /// A codec with the settings to sweep.
 #[derive(Debug)]
@@ -102,7 +103,8 @@ pub(crate) struct Worker {
 impl Worker {
     /// Installs what is missing, and starts. `scratch` is a folder for passing files.
     pub(crate) fn start(scratch: &Path) -> Result<Self> {
-        let python = environment()?;
+        let packages = Path::new(FOLDER).join("baselines/requirements.txt");
+        let python = python::environment("baselines", &packages, None)?;
         let mut child = Command::new(python)
             .arg(Path::new(FOLDER).join("baselines/worker.py"))
             .stdin(Stdio::piped())
@@ -168,31 +170,4 @@ impl Drop for Worker {
         let _ = self.child.wait();
         let _ = fs::remove_file(&self.decoded);
     }
-}
-
-/// The Python of a virtual environment that has the codecs, which is made where it is missing.
-fn environment() -> Result<PathBuf> {
-    let folder = Path::new(FOLDER).join("target/baselines");
-    let requirements = Path::new(FOLDER).join("baselines/requirements.txt");
-    let wanted = fs::read_to_string(&requirements)?;
-    let installed = folder.join("installed.txt");
-    let python = folder.join("bin/python");
-    if fs::read_to_string(&installed).is_ok_and(|text| text == wanted) {
-        return Ok(python);
-    }
-    eprintln!("setting up the baselines in {}", folder.display());
-    run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder))?;
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"];
-    run(Command::new(&python).args(pip).arg(&requirements))?;
-    fs::write(installed, wanted)?;
-    Ok(python)
-}
-
-fn run(command: &mut Command) -> Result<()> {
-    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
-    ensure!(
-        status.success(),
-        "{command:?} failed; Python 3.11 or later and the network are needed"
-    );
-    Ok(())
 }

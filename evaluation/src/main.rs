@@ -15,6 +15,7 @@ mod metric;
 mod pictures;
 mod plot;
 mod provenance;
+mod python;
 mod report;
 mod sections;
 mod store;
@@ -34,7 +35,7 @@ use blind::{choices, triplets};
 use report::Section;
 use sections::{
     ablation, content, decode, monotony, placeholders, printed, quality, rate, representation,
-    sheet, speed, stability, texture,
+    sheet, speed, stability, texture, training,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -130,6 +131,7 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
         Section::Stability => stability::measure(bench),
         Section::Content => content::measure(bench),
         Section::Monotony => monotony::measure(bench),
+        Section::Training => training::measure(bench),
     }
 }
 

@@ -43,11 +43,13 @@ pub(crate) enum Section {
     Content,
     /// Whether more bits and more effort give no worse picture
     Monotony,
+    /// Random crops for training against other formats, and what a network learns from them
+    Training,
 }
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Representation,
         Self::Ablation,
         Self::Rate,
@@ -61,6 +63,7 @@ impl Section {
         Self::Stability,
         Self::Content,
         Self::Monotony,
+        Self::Training,
     ];
 
     fn title(self) -> &'static str {
@@ -78,6 +81,7 @@ impl Section {
             Self::Stability => "Numerical stability",
             Self::Content => "Only what a scene needs",
             Self::Monotony => "More bits, more effort",
+            Self::Training => "For training",
         }
     }
 }

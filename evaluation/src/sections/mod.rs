@@ -28,4 +28,5 @@ pub(crate) mod sheet;
 pub(crate) mod speed;
 pub(crate) mod stability;
 pub(crate) mod texture;
+pub(crate) mod training;
 mod two_level;
