@@ -144,12 +144,13 @@ class Notices(unittest.TestCase):
 class Published(unittest.TestCase):
     def test_one_version(self) -> None:
         version = manifest("Cargo.toml")["package"]["version"]
-        for path in ("gpu", "bindings/c", "bindings/python", "bindings/wasm", "bindings/wasm/encoder"):
+        web = ("bindings/wasm", "bindings/wasm/encoder", "bindings/wasm/encoder/threads")
+        for path in ("gpu", "bindings/c", "bindings/python", *web):
             self.assertEqual(manifest(f"{path}/Cargo.toml")["package"]["version"], version, path)
         gpu = manifest("gpu/Cargo.toml")
         for kind in ("dependencies", "dev-dependencies"):
             self.assertEqual(gpu[kind]["image-gip"]["version"], version, kind)
-        for path in ("bindings/wasm", "bindings/wasm/encoder"):
+        for path in web:
             crate = manifest(f"{path}/Cargo.toml")["dependencies"]["image-gip"]
             self.assertEqual(crate["version"], version, path)
         package = json.loads((ROOT / "bindings/wasm/package.json").read_text())

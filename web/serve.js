@@ -19,6 +19,9 @@ const types = {
   '.wgsl': 'text/plain; charset=utf-8',
 };
 
+/** With these, pages are cross-origin isolated, and pictures are encoded with threads. The page needs nothing else of them. */
+const isolation = { 'Cross-Origin-Opener-Policy': 'same-origin', 'Cross-Origin-Embedder-Policy': 'require-corp' };
+
 /**
  * Serves a folder on 127.0.0.1, on any free port by default. `routes` maps further paths to
  * `(request, response) => ...`.
@@ -36,7 +39,7 @@ export async function serve(site, { port = 0, routes = {} } = {}) {
       const content = await readFile(file);
       // A new build is seen at once.
       const type = types[extname(file)] ?? 'application/octet-stream';
-      response.writeHead(200, { 'Content-Type': type, 'Cache-Control': 'no-cache' }).end(content);
+      response.writeHead(200, { 'Content-Type': type, 'Cache-Control': 'no-cache', ...isolation }).end(content);
     } catch {
       response.writeHead(404, { 'Content-Type': 'text/plain' }).end('not found');
     }

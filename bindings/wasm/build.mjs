@@ -1,8 +1,8 @@
-// Builds the package into `dist/`: `npm run build`.
+// Builds the package into `dist/`: `npm run build`. To test all the rest, `npm run build -- --without-threads` leaves out the
+// encoder with threads, which takes more time than everything else; such a package is not published.
 //
-// It needs a Rust toolchain with the target wasm32-unknown-unknown, Python, and the npm packages of
-// `npm ci`. The command line tool of wasm-bindgen comes from crates.io, in exactly the version that
-// Cargo.lock has.
+// It needs a Rust toolchain with the target wasm32-unknown-unknown and the component rust-src, Python, and the npm packages
+// of `npm ci`. The command line tool of wasm-bindgen comes from crates.io, in exactly the version that Cargo.lock has.
 
 import { execFileSync } from 'node:child_process';
 import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
@@ -18,6 +18,15 @@ const target = join(root, 'target');
 const dist = join(root, 'dist');
 const { version } = JSON.parse(readFileSync(join(root, 'package.json'), 'utf8'));
 const run = (program, ...args) => execFileSync(program, args, { cwd: root, stdio: 'inherit' });
+const told = (program, ...args) => execFileSync(program, args, { cwd: root, encoding: 'utf8' });
+
+const hasThreads = !process.argv.includes('--without-threads');
+/** The standard library's source, of which one is made for threads: that which comes with the compiler has none. */
+const rust = join(told('rustc', '--print', 'sysroot').trim(), 'lib/rustlib/src/rust');
+if (hasThreads && !existsSync(join(rust, 'library'))) {
+  console.error('The encoder with threads needs the source of the standard library: rustup component add rust-src');
+  process.exit(1);
+}
 
 /** The command line tool of wasm-bindgen. It is installed if it is not there. */
 function wasmBindgen() {
@@ -39,17 +48,23 @@ function wasmBindgen() {
  * What makes the files the same wherever the package is built. By the place of a crate outside of this workspace Cargo names its
  * functions, which then are in another order, so it is found by a link inside; and the compiler calls folders by other names.
  */
-const source = join(target, 'source');
+function linked(name, folder) {
+  const link = join(target, name);
+  rmSync(link, { force: true });
+  // Windows links folders without special rights only this way.
+  symlinkSync(folder, link, 'junction');
+  return link;
+}
 mkdirSync(target, { recursive: true });
-rmSync(source, { force: true });
-// Windows links folders without special rights only this way.
-symlinkSync(join(root, '../..'), source, 'junction');
-const folders = { [root]: 'image-gip', [process.env.CARGO_HOME ?? join(homedir(), '.cargo')]: 'cargo' };
+const source = linked('source', join(root, '../..'));
+const folders = {
+  [root]: 'image-gip',
+  [process.env.CARGO_HOME ?? join(homedir(), '.cargo')]: 'cargo',
+  // By this name the compiler calls it where it is not installed.
+  [rust]: `/rustc/${told('rustc', '--version', '--verbose').match(/^commit-hash: (.*)$/m)[1]}`,
+};
 const renamed = Object.entries(folders).map(([folder, name]) => `--remap-path-prefix=${folder}=${name}`);
-const settings = [
-  `patch.crates-io.image-gip.path=${JSON.stringify(source)}`,
-  `target.wasm32-unknown-unknown.rustflags=${JSON.stringify(renamed)}`,
-].flatMap((setting) => ['--config', setting]);
+const configured = (settings) => Object.entries(settings).flatMap(([name, value]) => ['--config', `${name}=${JSON.stringify(value)}`]);
 
 const bindgen = wasmBindgen();
 // The scripts beside those of wasm-bindgen, from where they are bundled.
@@ -61,13 +76,18 @@ mkdirSync(dist);
 
 /**
  * Builds a crate to a module of WebAssembly in `dist/`, and its script to those that are bundled. The module is optimized
- * in so many rounds.
+ * in so many rounds. `flags` are for the compiler, `options` for Cargo, which builds in `folder`.
  */
-function buildModule(crate, name, rounds, ...optimizations) {
-  const place = ['--target', 'wasm32-unknown-unknown', '--target-dir', target];
+function buildModule(crate, name, rounds, optimizations, { flags = [], options = [], env = {}, folder = target } = {}) {
+  const place = ['--target', 'wasm32-unknown-unknown', '--target-dir', folder];
+  const settings = configured({
+    'patch.crates-io.image-gip.path': source,
+    'target.wasm32-unknown-unknown.rustflags': [...renamed, ...flags],
+  });
   // One crate at a time, so that none has what only another one needs.
-  run('cargo', 'build', '--release', '--locked', ...settings, '--package', crate, ...place);
-  const module = join(target, 'wasm32-unknown-unknown', 'release', `${name}.wasm`);
+  const args = ['build', '--release', '--locked', ...settings, '--package', crate, ...place, ...options];
+  execFileSync('cargo', args, { cwd: root, stdio: 'inherit', env: { ...process.env, ...env } });
+  const module = join(folder, 'wasm32-unknown-unknown', 'release', `${name}.wasm`);
   run(bindgen, '--target', 'web', '--no-typescript', '--out-dir', scripts, module);
   for (let round = 1; round <= rounds; round += 1) {
     const [from, to] = [round === 1 ? scripts : dist, dist].map((place) => join(place, `${name}_bg.wasm`));
@@ -86,18 +106,36 @@ function buildModule(crate, name, rounds, ...optimizations) {
     );
   }
 }
-buildModule(
-  'image-gip-wasm',
-  'image_gip',
-  1,
+buildModule('image-gip-wasm', 'image_gip', 1, [
   // With `-O3`, it is as fast and 16 kB larger; without the second, 0.2 kB.
   '-O2',
   '--shrink-level=1',
   // Once more while the module shrinks: it is 2 kB smaller when compressed.
   '--converge',
-);
+]);
 // All of the above takes a minute; a second round takes seconds, and the module is 2.5 kB smaller.
-buildModule('image-gip-wasm-encoder', 'image_gip_encoder', 2, '-O1');
+buildModule('image-gip-wasm-encoder', 'image_gip_encoder', 2, ['-O1']);
+/** Memory that is imported and shared, and of what wasm-bindgen makes the stack and the variables of each thread. */
+const shared = [
+  '--shared-memory',
+  '--import-memory',
+  ...['__wasm_init_tls', '__tls_size', '__tls_align', '__tls_base'].map((name) => `--export=${name}`),
+];
+if (hasThreads) {
+  buildModule('image-gip-wasm-encoder-threads', 'image_gip_encoder_threads', 2, ['-O1'], {
+    flags: ['-Ctarget-feature=+atomics,+bulk-memory,+mutable-globals', ...shared.map((option) => `-Clink-arg=${option}`)],
+    // With the features of the standard library, it would have what prints a backtrace.
+    options: ['-Zbuild-std=std,panic_abort', '-Zbuild-std-features='],
+    env: {
+      // So the compiler takes what is for nightly ones only, and all modules are made by the same one.
+      RUSTC_BOOTSTRAP: '1',
+      // The place of the standard library, for what is said above.
+      __CARGO_TESTS_ONLY_SRC_ROOT: linked('library', join(rust, 'library')),
+    },
+    // Crates that find out what the compiler takes are not the same as for the other modules.
+    folder: join(target, 'threads'),
+  });
+}
 
 const minified = { bundle: true, target: 'es2022', minify: true, legalComments: 'none' };
 const paths = (names) => names.map((name) => join(scripts, `${name}.js`));
@@ -112,6 +150,18 @@ const instead = (folder) => ({
     });
   },
 });
+
+/** Takes the encoder with threads in place of the one without. */
+const withThreads = {
+  name: 'with threads',
+  setup(build) {
+    const path = join(scripts, 'image_gip_encoder_threads.js');
+    build.onResolve({ filter: /^\.\/image_gip_encoder\.js$/ }, () => ({ path }));
+  },
+};
+
+/** What leaves out the threads, if they are. */
+const chosen = hasThreads ? [] : [instead('without-threads')];
 
 /** A script in one piece, which needs no other file: what a worker runs. */
 async function workerText(name, platform, ...plugins) {
@@ -143,7 +193,9 @@ const embedded = (workers) => ({
 const bundle = (names, options = {}) =>
   build({ ...minified, entryPoints: paths(names), outdir: dist, splitting: true, format: 'esm', ...options });
 await bundle(['index', 'core', 'gip-image', 'worker']);
-await bundle(['encoder', 'encoder-core', 'encoder-worker'], { chunkNames: 'encoder-[hash]' });
+const threads = hasThreads ? ['encoder-threads'] : [];
+await bundle(['encoder', 'encoder-core', 'encoder-worker', ...threads], { chunkNames: 'encoder-[hash]', plugins: chosen });
+if (hasThreads) await bundle(['encoder-threads-worker'], { plugins: [withThreads] });
 // They are used without the decoder, and share no file with it: a page would load more and smaller ones.
 await bundle(['prefix']);
 await bundle(['transparent']);
@@ -166,8 +218,13 @@ await bundle(['index', 'core', 'gip-image', 'encoder', 'encoder-core'], {
   outdir: join(dist, 'embedded'),
   define: noFiles,
   plugins: [
+    ...chosen,
     instead('embedded'),
-    embedded({ 'worker.js': worker, 'encoder-worker.js': await workerText('encoder-worker', 'browser') }),
+    embedded({
+      'worker.js': worker,
+      'encoder-worker.js': await workerText('encoder-worker', 'browser'),
+      ...(hasThreads && { 'encoder-threads-worker.js': await workerText('encoder-threads-worker', 'browser', withThreads) }),
+    }),
   ],
 });
 await bundle(['encoder', 'vite'], {
@@ -175,8 +232,14 @@ await bundle(['encoder', 'vite'], {
   platform: 'node',
   define: { ...noFiles, PACKAGE_VERSION: JSON.stringify(version) },
   plugins: [
+    ...chosen,
     instead('node'),
-    embedded({ 'encoder-worker.js': await workerText('encoder-worker', 'node', instead('node')) }),
+    embedded({
+      'encoder-worker.js': await workerText('encoder-worker', 'node', instead('node')),
+      ...(hasThreads && {
+        'encoder-threads-worker.js': await workerText('encoder-threads-worker', 'node', withThreads, instead('node')),
+      }),
+    }),
   ],
 });
 
@@ -186,7 +249,7 @@ for (const file of readdirSync(scripts)) {
 // npm packs no links.
 for (const file of ['LICENSE-APACHE', 'LICENSE-MIT']) copyFileSync(join(root, file), join(dist, file));
 // What else the files depend on, besides the source and the versions that are locked.
-const rustc = execFileSync('rustc', ['--version'], { cwd: root }).toString().trim();
+const rustc = told('rustc', '--version').trim();
 writeFileSync(join(dist, 'built-with.json'), `${JSON.stringify({ rustc, node: process.version })}\n`);
 const crates = ['--locked', '--target', 'wasm32-unknown-unknown'];
 run('python3', '../../packaging/notices', join(dist, 'LICENSE-THIRD-PARTY'), ...crates);

@@ -1,6 +1,7 @@
 // A picture that the page makes a .gip of.
 
 import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
 
@@ -144,4 +145,24 @@ onPage('it fits on a phone', { viewport: { width: 360, height: 740 }, hasTouch: 
   assert.ok(wide <= 360, wide);
   const { height } = await page.locator('#stage').boundingBox();
   assert.ok(height > 300, height);
+});
+
+const threads = new URL('../../bindings/wasm/dist/encoder-threads.js', import.meta.url);
+const skip = missing || (!existsSync(threads) && 'the package was built without threads');
+test('with the headers for it, a picture is encoded with threads', { skip, timeout: 90_000 }, async () => {
+  const { page, problems, close } = await openViewer(viewer, '/', { reducedMotion: 'reduce' });
+  try {
+    // Two of them for the encoder.
+    await page.addInitScript(() => Object.defineProperty(navigator, 'hardwareConcurrency', { value: 3 }));
+    const requests = [];
+    page.on('request', (request) => requests.push(request.url()));
+    await page.reload();
+    await drop(page, await picture(page));
+    await made(page);
+    assert.deepEqual(problems, []);
+    assert.ok(requests.some((url) => url.endsWith('image_gip_encoder_threads_bg.wasm')), requests);
+    assert.ok(!requests.some((url) => url.endsWith('image_gip_encoder_bg.wasm')), requests);
+  } finally {
+    await close();
+  }
 });

@@ -24,6 +24,9 @@ const vite = (version) => ({
   develop: ['vite', '--host', '127.0.0.1', '--port', '0', '--strictPort'],
 });
 
+/** Whether the package was built with threads. */
+const hasThreads = existsSync(join(root, 'dist', 'encoder-threads.js'));
+
 /** Ten pictures that the plug-in for Vite encodes. */
 const site = (version) => ({
   ...vite(version),
@@ -90,13 +93,16 @@ const projects = {
 
 const types = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm' };
 
-/** Serves a folder at a path. */
+/** Serves a folder at a path. With `?isolated`, pages may have threads. */
 async function serve(folder, base) {
   const server = createServer((request, response) => {
-    const { pathname } = new URL(request.url, 'http://localhost');
+    const { pathname, search } = new URL(request.url, 'http://localhost');
     const path = pathname.startsWith(base) ? pathname.slice(base.length) || 'index.html' : null;
     if (pathname === '/favicon.ico') return void response.writeHead(204).end();
     if (path === null || !existsSync(join(folder, path))) return void response.writeHead(404).end();
+    const isPage = extname(path) === '.html';
+    if (!isPage || search === '?isolated') response.setHeader('Cross-Origin-Embedder-Policy', 'require-corp');
+    if (isPage && search === '?isolated') response.setHeader('Cross-Origin-Opener-Policy', 'same-origin');
     response.writeHead(200, { 'Content-Type': types[extname(path)] ?? 'application/octet-stream' });
     response.end(readFileSync(join(folder, path)));
   });
@@ -120,8 +126,8 @@ async function develop(folder, [program, ...args]) {
   return { url, close: () => child.kill() };
 }
 
-/** Loads a page, and waits for its title. Throws if it does not show the picture, or logs an error. */
-async function load(browser, url, expects) {
+/** Loads a page, and waits for its title. Throws if it does not show the picture, logs an error, or has too few workers. */
+async function load(browser, url, expects, least = 1) {
   const page = await browser.newPage();
   const errors = [];
   page.on('pageerror', (error) => errors.push(error.message));
@@ -131,7 +137,7 @@ async function load(browser, url, expects) {
     await page.waitForFunction(() => /^(shown|failed)/.test(document.title), null, { timeout: 60_000 });
     const [title, workers] = [await page.title(), page.workers().length];
     if (!title.startsWith(expects)) errors.push(title);
-    if (workers === 0) errors.push('there is no worker');
+    if (workers < least) errors.push(`there are ${workers} workers`);
     if (errors.length > 0) throw new Error(errors.join('; '));
     return `${title}, with ${workers} workers`;
   } finally {
@@ -149,6 +155,7 @@ function install(folder, needs, packed) {
 async function test(browser, name, packed, scratch) {
   const { files, needs, prepare, build, output, copies, page, base = '/some/where/', server = false } = projects[name];
   const { develop: start, expects = 'shown 64 x 48', isVisited = false } = projects[name];
+  const encodes = expects === 'shown 64 x 48';
   const folder = join(scratch, name);
   cpSync(join(here, 'projects', files), folder, { recursive: true });
   try {
@@ -172,6 +179,8 @@ async function test(browser, name, packed, scratch) {
   }
   const built = await serve(place, base);
   console.log(`${name}: ${await load(browser, built.url, expects)}`);
+  // One decodes, and two are threads of the encoder.
+  if (encodes && hasThreads) console.log(`${name}, isolated: ${await load(browser, `${built.url}?isolated`, expects, 3)}`);
   if (isVisited) {
     for await (const line of checks(browser, built.url, place)) console.log(`${name}: ${line}`);
   }

@@ -27,10 +27,14 @@ const script = '<script type="module" src="/dist/gip-image.js"></script>';
 const pages = {
   '/': script,
   '/policy': script,
+  '/isolated': '',
   '/embedded': script.replace('/dist/', '/dist/embedded/'),
   '/extras': ['gip-image', 'img', 'print'].map((name) => script.replace('gip-image', name)).join(''),
 };
-const policy = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'";
+const headersOf = {
+  '/policy': { 'Content-Security-Policy': "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'" },
+  '/isolated': { 'Cross-Origin-Opener-Policy': 'same-origin', 'Cross-Origin-Embedder-Policy': 'require-corp' },
+};
 
 /** What becomes of an element with this source: the size of its canvas, and its mean difference from the decoder's samples. */
 const show = async (src) => {
@@ -127,6 +131,29 @@ const checks = {
     assert.ok(width === 96 && bytes <= 800, `${width}, ${bytes}`);
   },
 
+  async 'an isolated page encodes with threads, to the same file'(open) {
+    const page = await open('/isolated');
+    const [same, workers] = await page.evaluate(async () => {
+      let workers = 0;
+      globalThis.Worker = class extends Worker {
+        constructor(...args) {
+          super(...args);
+          workers += 1;
+        }
+      };
+      const data = new Uint8Array(96 * 72).map((_, at) => (at * at) % 251);
+      const files = [];
+      for (const script of ['/dist/encoder.js', '/dist/embedded/encoder.js']) {
+        const { encode } = await import(script);
+        for (const threads of [1, 3]) {
+          files.push(String((await encode({ width: 96, height: 72, channels: 1, data }, { bytes: 800, effort: 1, threads })).file));
+        }
+      }
+      return [new Set(files).size, workers];
+    });
+    assert.deepEqual([same, workers], [1, 8]);
+  },
+
   async 'the viewer opens its sample, and makes a file'(_, openViewer) {
     let page = await openViewer('/?src=sample/sumac.gip');
     const settled = async () => {
@@ -168,7 +195,7 @@ for (const [path, bytes] of Object.entries(pictures)) {
   routes[path] = (_, response) => response.writeHead(200, { 'Content-Type': 'image/vnd.gip' }).end(bytes);
 }
 for (const [path, html] of Object.entries(pages)) {
-  const headers = path === '/policy' ? { 'Content-Security-Policy': policy } : {};
+  const headers = headersOf[path] ?? {};
   routes[path] = (_, response) =>
     response.writeHead(200, { 'Content-Type': 'text/html; charset=utf-8', ...headers }).end(`<!doctype html><title>test</title>${html}`);
 }

@@ -4,6 +4,7 @@ import init, { Encoder } from './image_gip_encoder.js';
 import { listening } from './encoder-calls.js';
 import { source as here } from './encoder-place.js';
 import { GipError } from './errors.js';
+import { number } from './numbers.js';
 import { samplesOf } from './pixels.js';
 
 /** How a file can be asked for, and the least and the most of each. */
@@ -31,15 +32,6 @@ export function load(source = undefined) {
   return loading.then(() => {
     loaded = true;
   });
-}
-
-function number(value, name, least, most, isInteger = true) {
-  const fits = typeof value === 'number' && value >= least && value <= most;
-  if (!fits || (isInteger && !Number.isInteger(value))) {
-    const kind = isInteger ? 'an integer' : 'a number';
-    throw new RangeError(`${name} is ${String(value)}; it must be ${kind} from ${least} to ${most}`);
-  }
-  return value;
 }
 
 /** The one target that is given. */

@@ -2,7 +2,7 @@
 
 import { startsOf } from './files.js';
 
-export { mostWorkers } from './most-workers.js';
+export { canShare, cores, mostPictures } from './cores.js';
 
 /** The WebAssembly; `undefined` for that which its script fetches by itself. */
 export const source = () => undefined;

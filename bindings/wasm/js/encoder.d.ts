@@ -1,4 +1,4 @@
-/** The encoder, in workers of its own. It is loaded when it is used first. */
+/** The encoder, in workers of its own, with threads where there can be some. It is loaded when it is used first. */
 
 import type { EncodeOptions, Encoded, Pixels, Progress } from './encoder-types.js';
 
@@ -26,7 +26,13 @@ export type Drawable =
 export function encode(
   picture: Pixels | ImageData | Drawable,
   options?: EncodeOptions & {
-    /** Aborting it ends the worker at once. */
+    /**
+     * Threads that share the work on this picture, 1 to 64. The file does not depend on them. There is only one where memory
+     * cannot be shared: in pages that are not cross-origin isolated. Default: the cores, in a page all but one, divided by the
+     * pictures that are encoded at the same time, and at most 16.
+     */
+    threads?: number;
+    /** Aborting it ends the workers at once. */
     signal?: AbortSignal;
     /** Called on this thread, at most every 50 ms. */
     onprogress?: (progress: Progress) => void;

@@ -1,64 +1,88 @@
 // The encoder for scripts. It works in workers of its own, and never blocks the page.
 
-import { mostWorkers, source, starts } from './encoder-place.js';
-import { GipError, unpack } from './errors.js';
+import { canShare, cores, mostPictures, source, starts } from './encoder-place.js';
+import { unpack } from './errors.js';
+import { number } from './numbers.js';
 import { pixelsOf } from './pictures.js';
 import { firstOf } from './start.js';
 
 export { GipError, LimitError } from './errors.js';
 
-/** After so many milliseconds without work a worker ends: the memory of WebAssembly never shrinks. */
+/** After so many milliseconds without work workers end: the memory of WebAssembly never shrinks. */
 const mostIdle = 10_000;
+/** Most threads of a picture, if nobody asks for more. */
+const usualThreads = 16;
 
-/** A worker that encodes, one picture at a time. */
-class EncoderThread {
-  #worker;
+/** Workers that share the work on one picture at a time. The first one encodes, the others are its threads. */
+class Team {
+  #workers;
   #idle = 0;
+  #settle = null;
+  #onprogress = null;
 
-  constructor(worker) {
-    this.#worker = worker;
+  constructor(workers) {
+    this.#workers = workers;
+    for (const worker of workers) {
+      worker.onmessage = ({ data }) => this.#hear(data);
+      worker.onerror = (event) => {
+        event.preventDefault();
+        this.#hear({ error: { kind: 'failed', message: `the worker has ended: ${event.message}` } });
+      };
+    }
   }
 
-  /** Encodes. When the signal is aborted, the worker ends. */
+  get threads() {
+    return this.#workers.length;
+  }
+
+  /** Encodes. When the signal is aborted, the workers end. */
   async run(message, transfer, onprogress, signal) {
     clearTimeout(this.#idle);
     if (signal?.aborted) this.#rest();
     signal?.throwIfAborted();
-    this.#worker.hold?.(true);
+    this.#hold(true);
     return new Promise((resolve, reject) => {
-      const abort = () => (this.#end(), reject(signal.reason));
-      const settle = (act) => {
-        signal?.removeEventListener('abort', abort);
-        this.#rest();
-        act();
-      };
+      const abort = () => (this.end(), reject(signal.reason));
       signal?.addEventListener('abort', abort, { once: true });
-      this.#worker.onmessage = ({ data: { progress, result, error } }) => {
-        if (progress) onprogress?.(progress);
-        else settle(() => (error ? reject(unpack(error)) : resolve(result)));
-      };
-      this.#worker.onerror = (event) => {
-        event.preventDefault();
+      this.#onprogress = onprogress;
+      this.#settle = (error, result) => {
         signal?.removeEventListener('abort', abort);
-        this.#end();
-        reject(new GipError(`the worker has ended: ${event.message}`));
+        if (error) reject(unpack(error));
+        else resolve(result);
       };
-      this.#worker.postMessage(message, transfer);
+      this.#workers[0].postMessage(message, transfer);
     });
+  }
+
+  #hear({ progress, result, error }) {
+    if (progress) return this.#onprogress?.(progress);
+    const settle = this.#settle;
+    this.#settle = null;
+    // After a trap, there is no telling what is in the memory.
+    if (error?.kind === 'failed') this.end();
+    else this.#rest();
+    settle?.(error, result);
+  }
+
+  /** Whether the program waits for it. */
+  #hold(holds) {
+    for (const worker of this.#workers) worker.hold?.(holds);
   }
 
   /** Waits for more work. */
   #rest() {
-    this.#worker.hold?.(false);
+    this.#hold(false);
     idle.add(this);
-    this.#idle = setTimeout(() => this.#end(), mostIdle);
+    this.#idle = setTimeout(() => this.end(), mostIdle);
     this.#idle.unref?.();
   }
 
-  #end() {
-    this.#worker.terminate();
+  end() {
+    if (this.threads > 0) count -= 1;
+    for (const worker of this.#workers) worker.terminate();
+    this.#workers = [];
+    clearTimeout(this.#idle);
     idle.delete(this);
-    count -= 1;
   }
 }
 
@@ -74,28 +98,45 @@ const ownThread = {
 };
 
 const idle = new Set();
-let count = 0;
-let canStart = true;
-/** Those who wait for a thread. */
+/** Teams, and pictures that are not done. */
+let [count, pictures] = [0, 0];
+let [canStart, canHaveThreads] = [true, canShare];
+/** Those who wait for a team. */
 const waiting = [];
 
-/** A thread for a picture: one that waits for work, a new one, or the first that has done its work. */
-async function nextThread() {
+/** The workers of a new team; `null` if there can be none of so many threads. */
+async function startedFor(threads) {
+  if (threads > 1) {
+    // A module of its own, which is loaded only where there can be threads.
+    const workers = await import('./encoder-threads.js').then(({ teamOf }) => teamOf(threads), () => null);
+    canHaveThreads &&= workers !== null;
+    return workers;
+  }
+  const worker = await firstOf(starts, source);
+  canStart &&= worker !== null;
+  return worker && [worker];
+}
+
+/** A team for a picture: one that waits for work, a new one, or the first that has done its work. */
+async function nextTeam(asked) {
   for (;;) {
-    const [thread] = idle;
-    if (thread) {
-      idle.delete(thread);
-      return thread;
+    const share = Math.floor(cores / Math.min(pictures, mostPictures));
+    const threads = canHaveThreads ? (asked ?? Math.min(share, usualThreads)) : 1;
+    const [team = null] = [...idle].filter((team) => team.threads === threads);
+    if (team) {
+      idle.delete(team);
+      return team;
     }
     if (!canStart) return ownThread;
-    if (count < mostWorkers) {
-      count += 1;
-      const worker = await firstOf(starts, source);
-      if (worker) return new EncoderThread(worker);
-      count -= 1;
-      canStart = false;
+    if (count >= mostPictures) {
+      const [other] = idle;
+      if (!other) await new Promise((resolve) => waiting.push(resolve));
+      other?.end();
     } else {
-      await new Promise((resolve) => waiting.push(resolve));
+      count += 1;
+      const workers = await startedFor(threads);
+      if (workers) return new Team(workers);
+      count -= 1;
     }
   }
 }
@@ -104,16 +145,22 @@ async function nextThread() {
 const buffersOf = (image, mayTake) => (mayTake && image?.data ? [image.data.buffer] : []);
 
 /** Encodes a picture; see the declarations. */
-export async function encode(picture, { signal, onprogress, transfer = false, colorSpace, ...options } = {}) {
+export async function encode(picture, { signal, onprogress, transfer = false, colorSpace, threads, ...options } = {}) {
   signal?.throwIfAborted();
-  const pixels = await pixelsOf(picture, colorSpace);
-  signal?.throwIfAborted();
-  const { width, height, channels, data, colorSpace: space } = pixels ?? {};
-  const image = { width, height, channels, data, colorSpace: space };
-  const thread = await nextThread();
+  if (threads !== undefined) number(threads, 'threads', 1, 64);
+  pictures += 1;
   try {
-    return await thread.run({ image, options }, buffersOf(image, transfer || pixels !== picture), onprogress, signal);
+    const pixels = await pixelsOf(picture, colorSpace);
+    signal?.throwIfAborted();
+    const { width, height, channels, data, colorSpace: space } = pixels ?? {};
+    const image = { width, height, channels, data, colorSpace: space };
+    const team = await nextTeam(threads);
+    try {
+      return await team.run({ image, options }, buffersOf(image, transfer || pixels !== picture), onprogress, signal);
+    } finally {
+      waiting.shift()?.();
+    }
   } finally {
-    waiting.shift()?.();
+    pictures -= 1;
   }
 }

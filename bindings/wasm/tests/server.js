@@ -30,7 +30,9 @@ export async function serve(routes = {}) {
     try {
       const content = await readFile(file);
       const type = types[extname(file)] ?? 'text/plain';
-      response.writeHead(200, { 'Content-Type': type, 'Access-Control-Allow-Origin': '*' });
+      // Isolated pages start workers of scripts that ask for it as well.
+      const isolation = { 'Cross-Origin-Embedder-Policy': 'require-corp' };
+      response.writeHead(200, { 'Content-Type': type, 'Access-Control-Allow-Origin': '*', ...isolation });
       response.end(content);
     } catch {
       response.writeHead(404).end();

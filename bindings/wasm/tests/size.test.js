@@ -1,7 +1,7 @@
 // What a page loads, and what a program loads that cuts files.
 
 import assert from 'node:assert/strict';
-import { readFileSync, readdirSync } from 'node:fs';
+import { existsSync, readFileSync, readdirSync } from 'node:fs';
 import { test } from 'node:test';
 import { gzipSync } from 'node:zlib';
 
@@ -14,10 +14,11 @@ function sizesOf(isPart) {
   const sizes = files.map((file) => [file, compressed(file)]);
   return { files, sum: sizes.reduce((sum, [, size]) => sum + size, 0), text: sizes.join(' ') };
 }
-const isOfEncoder = (file) => file.includes('encoder');
+const isOfThreads = (file) => /encoder.threads/.test(file);
+const isOfEncoder = (file) => file.includes('encoder') && !isOfThreads(file);
 /** What only those pages load that ask for it. */
 const others = ['img.js', 'prefix.js', 'print.js', 'service-worker.js', 'transparent.js'];
-const isOfDecoder = (file) => !isOfEncoder(file) && !others.includes(file);
+const isOfDecoder = (file) => !isOfEncoder(file) && !isOfThreads(file) && !others.includes(file);
 
 test('the scripts that show pictures, and the decoder, are at most 107 kB, compressed', () => {
   const { files, sum, text } = sizesOf(isOfDecoder);
@@ -28,6 +29,13 @@ test('the scripts that show pictures, and the decoder, are at most 107 kB, compr
 test('what makes pictures is at most 450 kB, compressed', () => {
   const { files, sum, text } = sizesOf(isOfEncoder);
   assert.ok(files.includes('image_gip_encoder_bg.wasm') && files.includes('encoder.js'));
+  assert.ok(sum <= 450_000, `${sum}: ${text}`);
+});
+
+const skip = !existsSync(new URL('encoder-threads.js', dist)) && 'the package was built without threads';
+test('what pages take in its place that have threads is at most 450 kB, compressed', { skip }, () => {
+  const { files, sum, text } = sizesOf(isOfThreads);
+  assert.ok(files.includes('image_gip_encoder_threads_bg.wasm') && files.includes('encoder-threads-worker.js'));
   assert.ok(sum <= 450_000, `${sum}: ${text}`);
 });
 

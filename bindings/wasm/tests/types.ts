@@ -52,7 +52,7 @@ export async function everything(source: Source, signal: AbortSignal): Promise<v
 
 export async function encoding(image: ImageData, signal: AbortSignal): Promise<string> {
   const onprogress = ({ fraction }: { fraction: number }) => void fraction;
-  const { file, report } = await encode(new Blob(), { quality: 60, effort: 2, signal, onprogress, colorSpace: 'display-p3' });
+  const { file, report } = await encode(new Blob(), { quality: 60, effort: 2, threads: 2, signal, onprogress, colorSpace: 'display-p3' });
   const shortfall: string | null = report.shortfall;
   await loadEncoder();
   const other: Uint8Array = encodeHere({ ...image, channels: 4 }, { bytes: 300, metadata: { cicp: [12, 13] } }).file;

@@ -6,7 +6,7 @@ import module from 'embedded:image_gip_encoder_bg.wasm';
 import { workerOfText } from '../files.js';
 import { compiledOnce } from './compile.js';
 
-export { mostWorkers } from '../most-workers.js';
+export { canShare, cores, mostPictures } from '../cores.js';
 
 /** The WebAssembly, which is compiled once for all threads. */
 export const source = compiledOnce(module);

@@ -9,7 +9,8 @@ const data = new Uint8Array(width * height * 3).map((_, at) => (at * 7 + (at >> 
 
 /** Sets the title to what came out, for the test. */
 async function main() {
-  const { file } = await encode({ width, height, channels: 3, data }, { bytes: 2000, effort: 1, firstLayer: 300 });
+  const options = { bytes: 2000, effort: 1, firstLayer: 300, threads: 2 };
+  const { file } = await encode({ width, height, channels: 3, data }, options);
   const image = document.createElement('gip-image');
   image.placeholder = placeholder(file, 500);
   image.src = URL.createObjectURL(new Blob([file], { type: 'image/vnd.gip' }));

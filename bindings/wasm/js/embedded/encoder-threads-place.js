@@ -1,0 +1,13 @@
+// Where the encoder with threads is: in this script.
+
+import script from 'embedded:encoder-threads-worker.js';
+import module from 'embedded:image_gip_encoder_threads_bg.wasm';
+
+import { workerOfText } from '../files.js';
+import { compiledOnce } from './compile.js';
+
+/** The WebAssembly, which is compiled once for all threads. */
+export const source = compiledOnce(module);
+
+/** The ways to start a worker. */
+export const starts = [() => workerOfText(script, { name: 'image-gip' })];
