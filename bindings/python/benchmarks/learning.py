@@ -135,6 +135,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--csv", action="store_true", help="print CSV in place of a table")
     args = parser.parse_args()
+    if args.pictures is not None and args.pictures < 48:
+        parser.error(
+            "--pictures must be at least 48, for one batch of the two thirds to learn from"
+        )
     pictures, labels = draw_pictures()
     pictures, labels = pictures[: args.pictures], labels[: args.pictures]
     rows = []

@@ -112,6 +112,24 @@ def test_errors_of_each_picture(files: list[bytes]) -> None:
     with pytest.raises(image_gip.UnexpectedEndError) as error:
         decode_batch(bad, Part((32, 48)))
     assert error.value.__notes__ == ["picture 1 of 4"]
+    # What is no fault of a file.
+    for wrong, kind in ((None, TypeError), (3, TypeError), ("\0", ValueError)):
+        with pytest.raises(kind) as other:
+            decode_batch([files[0], wrong], Part((32, 48)), errors="return")
+        assert other.value.__notes__ == ["picture 1 of 2"]
+    with pytest.raises(TypeError, match="must be several"):
+        decode_batch("a.gip", Part((32, 48)))
+
+
+def test_sizes_are_whole_numbers_of_any_type(files: list[bytes]) -> None:
+    sizes: list[Any] = [np.int64(24), (np.int32(24), 24), [24, 24]]
+    for size in sizes:
+        assert torch.equal(CenterCrop(size)(files[0]), CenterCrop(24)(files[0]))
+    assert torch.equal(Resize(np.int64(24))(files[0]), Resize(24)(files[0]))
+    wrong: list[Any] = [0, (24, 24, 24), 24.5, (24.5, 3)]
+    for size in wrong:
+        with pytest.raises((TypeError, ValueError)):
+            CenterCrop(size)
 
 
 def test_random_crops_follow_the_seed(files: list[bytes]) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Sequence
+from operator import index
 from os import PathLike, fspath
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, SupportsIndex, TypeAlias
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -48,16 +49,16 @@ class Rendering(NamedTuple):
     limits: Limits | None
 
 
-def check_size(size: int | Sequence[int]) -> Size:
+def check_size(size: SupportsIndex | Sequence[SupportsIndex]) -> Size:
     """Height and width; one number is both.
 
     Raises:
         ValueError: It is not one or two whole numbers of at least 1.
     """
-    sides = (size, size) if isinstance(size, int) else tuple(size)
-    if len(sides) != 2 or not all(isinstance(side, int) and side >= 1 for side in sides):
+    sides = (size, size) if isinstance(size, SupportsIndex) else tuple(size)
+    if len(sides) != 2 or not all(isinstance(s, SupportsIndex) and index(s) >= 1 for s in sides):
         raise ValueError(f"size is {size}; it must be one or two whole numbers of at least 1")
-    return sides[0], sides[1]
+    return index(sides[0]), index(sides[1])
 
 
 def check_range(name: str, values: Sequence[float], most: float = math.inf) -> tuple[float, float]:
@@ -111,11 +112,22 @@ def centered(stored: Size, size: Size, resize: int) -> Crop:
 
 
 def read(src: Source) -> Any:
-    """The bytes of a file: of a path or a file object, or the buffer itself."""
+    """The bytes of a file: of a path or a file object, or the buffer itself.
+
+    Raises:
+        TypeError: It is none of these.
+    """
     if isinstance(src, str | PathLike):
         with open(fspath(src), "rb") as file:  # noqa: PTH123
             return file.read()
-    return src.read() if hasattr(src, "read") else src
+    contents = src.read() if hasattr(src, "read") else src
+    try:
+        memoryview(contents)
+    except TypeError:
+        found = type(src).__name__
+        message = f"a file must be bytes, a path or a binary file object, not {found}"
+        raise TypeError(message) from None
+    return contents
 
 
 def stored_size(file: Any, limits: Limits | None) -> Size:

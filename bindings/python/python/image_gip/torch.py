@@ -19,7 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from operator import index
+from os import PathLike
+from typing import Any, Literal, NamedTuple, SupportsIndex
 
 import torch
 
@@ -65,7 +67,7 @@ class Transform:
 
     def __init__(
         self,
-        size: int | Sequence[int],
+        size: SupportsIndex | Sequence[SupportsIndex],
         *,
         mode: Mode = "RGB",
         background: float | Sequence[float] | None = None,
@@ -133,7 +135,8 @@ class RandomResizedCrop(Transform):
         scale: The least and the greatest share of the picture's area.
         ratio: The least and the greatest aspect of the part, width by height.
         flip: The probability that the result is mirrored, left to right: 0 to 1.
-        generator: What makes the random numbers. Default: torch's own.
+        generator: What makes the random numbers. Default: torch's own. The workers of a
+            ``DataLoader`` have copies of it, which all make the same ones.
         **options: Those of `Transform`.
 
     Raises:
@@ -142,7 +145,7 @@ class RandomResizedCrop(Transform):
 
     def __init__(
         self,
-        size: int | Sequence[int],
+        size: SupportsIndex | Sequence[SupportsIndex],
         scale: Sequence[float] = (0.08, 1.0),
         ratio: Sequence[float] = (3 / 4, 4 / 3),
         *,
@@ -179,7 +182,10 @@ class CenterCrop(Transform):
     """
 
     def __init__(
-        self, size: int | Sequence[int], resize: int | None = None, **options: Any
+        self,
+        size: SupportsIndex | Sequence[SupportsIndex],
+        resize: int | None = None,
+        **options: Any,
     ) -> None:
         super().__init__(size, **options)
         self.resize = max(self.size) if resize is None else resize
@@ -202,9 +208,9 @@ class Resize(Transform):
         ValueError: An argument is out of range.
     """
 
-    def __init__(self, size: int | Sequence[int], **options: Any) -> None:
+    def __init__(self, size: SupportsIndex | Sequence[SupportsIndex], **options: Any) -> None:
         super().__init__(size, **options)
-        self.shorter = size if isinstance(size, int) else None
+        self.shorter = index(size) if isinstance(size, SupportsIndex) else None
 
     def output_size(self, stored: Size) -> Size:
         if self.shorter is None:
@@ -241,8 +247,8 @@ def decode_batch(
         out: The tensor to decode into, of the shape of the result: uint8 or float32, in the memory
             of the CPU, pinned or not, contiguous or in ``torch.channels_last``.
         threads: The number of threads, at least 1. With 1, all is done on the caller's.
-        errors: What to do with a file that is refused or cannot be read: "raise" its error, which
-            says which one it is, or "return" them all.
+        errors: What to do with a file that is refused or cannot be read: "raise" its error, or
+            "return" them all. Other errors are raised. All say which picture it is.
 
     Returns:
         The pictures, in a new tensor or `out`, and the errors.
@@ -250,12 +256,16 @@ def decode_batch(
     Raises:
         GipError: A file was refused, and `errors` is "raise".
         OSError: A file cannot be read, and `errors` is "raise".
-        ValueError: `out` does not fit, results differ in size, or an argument is out of range.
+        ValueError: `out` does not fit, results differ in size, a picture lacks what the mode has,
+            or an argument is out of range.
+        TypeError: A file is none.
     """
     if errors not in ("raise", "return"):
         raise ValueError(f'errors is {errors!r}; it must be "raise" or "return"')
     if threads < 1:
         raise ValueError(f"threads is {threads}; it must be at least 1")
+    if isinstance(sources, str | bytes | PathLike):
+        raise TypeError("sources is one file; it must be several")
     files = list(sources)
     if isinstance(transform, Resize) and transform.shorter is not None:
         raise ValueError("the results of Resize with one number differ in size")
@@ -267,12 +277,14 @@ def decode_batch(
         raise ValueError(f"out has shape {shape}; it must be that of {len(files)} pictures")
     draws = [transform.draw() for _ in files]
 
-    def one_of(index: int) -> GipError | OSError | None:
+    def one_of(number: int) -> GipError | OSError | None:
         try:
-            transform._apply(files[index], draws[index], out[index])
-        except (GipError, OSError) as error:
-            error.add_note(f"picture {index} of {len(files)}")
-            out[index] = 0
+            transform._apply(files[number], draws[number], out[number])
+        except Exception as error:
+            error.add_note(f"picture {number} of {len(files)}")
+            if not isinstance(error, GipError | OSError):
+                raise
+            out[number] = 0
             return error
         return None
 
@@ -281,7 +293,7 @@ def decode_batch(
     else:
         with ThreadPoolExecutor(threads) as pool:
             found = list(pool.map(one_of, range(len(files))))
-    failed = {index: error for index, error in enumerate(found) if error is not None}
+    failed = {number: error for number, error in enumerate(found) if error is not None}
     if failed and errors == "raise":
         raise next(iter(failed.values()))
     return Batch(out, failed)
