@@ -89,10 +89,15 @@ pub(crate) fn print(text: &str, output: Option<&Path>) -> Result<()> {
         tell(text);
         return Ok(());
     }
-    match writeln!(io::stdout(), "{text}") {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
+    Ok(unless_closed(writeln!(io::stdout(), "{text}"))?)
+}
+
+/// A program that reads our output, such as `head`, may have seen enough of it.
+fn unless_closed(written: io::Result<()>) -> io::Result<()> {
+    written.or_else(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => Ok(()),
+        _ => Err(error),
+    })
 }
 
 /// The destination of a result. A regular file gets its name only when it is complete: after a
@@ -171,7 +176,8 @@ impl Output {
         match self {
             Self::Standard => {
                 let mut stdout = io::stdout().lock();
-                stdout.write_all(bytes).and_then(|()| stdout.flush()).context("standard output")
+                let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
+                unless_closed(written).context("standard output")
             }
             Self::Special(path) => OpenOptions::new()
                 .write(true)
