@@ -188,16 +188,6 @@ mod killed {
     const SIGTERM: i32 = 15;
 
     impl Room {
-        fn spawn(&self, args: &[&str]) -> Child {
-            Command::new(env!("CARGO_BIN_EXE_gip"))
-                .args(args)
-                .current_dir(self.path(""))
-                .stdout(Stdio::piped())
-                .stderr(Stdio::piped())
-                .spawn()
-                .expect("the binary was built")
-        }
-
         /// Runs a script of the shell, whose `$@` is `gip` with arguments.
         fn script(&self, script: &str, args: &[&str]) -> Output {
             Command::new("sh")

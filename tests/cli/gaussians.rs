@@ -1,7 +1,6 @@
 //! `gip export` and `gip import`.
 
 use std::collections::BTreeMap;
-use std::process::{Command, Stdio};
 
 use image::{ColorType, ImageEncoder};
 use serde_json::Value;
@@ -82,13 +81,7 @@ fn a_reader_that_has_seen_enough_is_no_error() {
     let spot = "{\"center\":[3,4],\"cholesky\":[2,0,1],\"color\":[0.5]}\n".repeat(5000);
     room.write("a.jsonl", spot);
     room.ok(&["import", "a.jsonl", "a.gip", "--size", "96x64"]);
-    let mut gip = Command::new(env!("CARGO_BIN_EXE_gip"))
-        .args(["export", "a.gip", "-"])
-        .current_dir(room.path("."))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the binary was built");
+    let mut gip = room.spawn(&["export", "a.gip", "-"]);
     drop(gip.stdout.take());
     let output = gip.wait_with_output().expect("the tool ends");
     let told = text(&output.stderr);

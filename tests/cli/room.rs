@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
 use image::DynamicImage;
 use serde_json::Value;
@@ -27,16 +27,21 @@ impl Room {
         self.pipe(args, &[])
     }
 
-    /// Runs `gip` in this directory with bytes on its standard input.
-    pub(crate) fn pipe(&self, args: &[&str], input: &[u8]) -> Output {
-        let mut gip = Command::new(env!("CARGO_BIN_EXE_gip"))
+    /// Starts `gip` in this directory, with pipes.
+    pub(crate) fn spawn(&self, args: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_gip"))
             .args(args)
             .current_dir(self.0.path())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .expect("the binary was built");
+            .expect("the binary was built")
+    }
+
+    /// Runs `gip` in this directory with bytes on its standard input.
+    pub(crate) fn pipe(&self, args: &[&str], input: &[u8]) -> Output {
+        let mut gip = self.spawn(args);
         // A tool that fails early reads nothing; that is no failure of the test.
         let _ = gip.stdin.take().expect("piped").write_all(input);
         gip.wait_with_output().expect("the tool ends")
