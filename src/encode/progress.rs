@@ -143,7 +143,7 @@ impl<'a> Observer<'a> {
         let run = |mut poll: Option<&mut dyn FnMut() -> Result<()>>| {
             let (mut memory, mut portion) = (M::default(), Vec::new());
             // Without a clock, nothing but the remaining tasks tells how many to take.
-            let most = if Stopwatch::RUNS { 1 } else { usize::MAX };
+            let most = if Stopwatch::runs() { 1 } else { usize::MAX };
             let (mut least, mut most, mut since_poll) = (1, most, BETWEEN_POLLS);
             loop {
                 let first = take(&mut portion, least, most);
@@ -161,7 +161,7 @@ impl<'a> Observer<'a> {
                 let found: Vec<R> = portion.drain(..).map(|item| task(&mut memory, item)).collect();
                 let time = start.elapsed();
                 results.lock().expect("no task runs meanwhile").push((first, found));
-                if !Stopwatch::RUNS {
+                if !Stopwatch::runs() {
                     continue;
                 }
                 since_poll += time;
