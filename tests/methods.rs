@@ -217,6 +217,49 @@ fn gaussians_of_ones_own_get_the_codes_of_the_encoder() {
 }
 
 #[test]
+fn a_target_gets_the_gaussians_that_it_needs() {
+    let (header, gaussians, samples) = fitted();
+    let (source, limits) = (source(&samples), Limits::default());
+    let encode = |gaussians: &[Gaussian], target| {
+        let picture = Picture::from_gaussians(&header, gaussians, &limits).expect("valid");
+        let encoded = Encoder::new().with_target(target).encode_fitted(&source, &picture);
+        encoded.expect("it encodes")
+    };
+    // Much of a fit that is too good for the target is left out.
+    let by_psnr = [24.0, 28.0, 32.0, 36.0, 40.0].map(|psnr| {
+        let encoded = encode(&gaussians, Target::Psnr(psnr));
+        assert!((psnr..psnr + 0.5).contains(&encoded.report.psnr), "{psnr}: {:?}", encoded.report);
+        encoded.bytes.len()
+    });
+    let by_quality = [10.0, 40.0, 70.0, 90.0]
+        .map(|quality| encode(&gaussians, Target::Quality(quality)).bytes.len());
+    for sizes in [&by_psnr[..], &by_quality] {
+        let grows = |pair: &[usize]| 20 * pair[1] > 21 * pair[0];
+        assert!(sizes.windows(2).all(grows), "{sizes:?}");
+    }
+    for bytes in by_psnr {
+        let [of_psnr, of_size] = [Target::Psnr(24.0), Target::Bytes(bytes as u64)]
+            .map(|target| encode(&gaussians, target).report.psnr);
+        assert!(of_size > of_psnr - 1.0, "{bytes} bytes: {of_size} dB, {of_psnr} dB");
+    }
+    // What is out of reach comes as near as a smaller file does.
+    let mut noise = fastrand::Rng::with_seed(1);
+    let noisy: Vec<Gaussian> = gaussians
+        .iter()
+        .map(|gaussian| {
+            let color = gaussian.color.map(|value| value + 0.4 * (noise.f32() - 0.5));
+            Gaussian { color, ..*gaussian }
+        })
+        .collect();
+    let of_size = encode(&noisy, Target::Bytes(800)).report;
+    let of_psnr = encode(&noisy, Target::Psnr(60.0)).report;
+    assert!(
+        of_psnr.shortfall.is_some() && of_psnr.psnr > of_size.psnr - 0.5,
+        "{of_psnr:?}, {of_size:?}"
+    );
+}
+
+#[test]
 fn gaussians_beyond_the_bounds_are_brought_within() {
     let (header, mut gaussians, samples) = fitted();
     gaussians[0].color = [50.0, -50.0, 1.0, 0.0];

@@ -237,7 +237,7 @@ fn encode_for_target(
         let sources = Resolutions::single(&tiled);
         let mut fit = Fit::new(sources, training, budget, precision, layout.base(), job.seed, work);
         fit.adopt(fitted.gaussians(), observer)?;
-        entropy::code(fit, None, job, judge, &tiled, &layout, observer)
+        entropy::code_adopted(fit, job, judge, &tiled, &layout, observer)
     } else {
         let copies = resolutions::copies(job, observer)?;
         let sources = Resolutions { picture: &tiled, copies: &copies };

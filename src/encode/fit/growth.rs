@@ -88,15 +88,7 @@ impl Fit<'_> {
         if count == 0 {
             return Ok(());
         }
-        let parameterization = self.bounds.parameterization;
-        let items = self.parameters.values.iter().enumerate();
-        // In the order of energy, and of equal ones in that of the Gaussians.
-        let mut keys = observer.map(items, |(index, values)| {
-            let gaussian = values.gaussian(parameterization);
-            let Gaussian { center, cholesky, .. } = gaussian;
-            let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
-            u64::from(ordered(gaussian.energy() * perceptual_weight)) << 32 | index as u64
-        })?;
+        let mut keys = self.importances(observer)?;
         observer.poll()?;
         keys.select_nth_unstable(count - 1);
         let mut keep = vec![true; keys.len()];
@@ -108,6 +100,26 @@ impl Fit<'_> {
         self.parameters.retain(|index| keep[index]);
         self.invalidate();
         observer.poll()
+    }
+
+    /// The trained values of all Gaussians, the most important first.
+    pub(super) fn by_importance(&self, observer: &mut Observer<'_>) -> Result<Vec<Components>> {
+        let mut keys = self.importances(observer)?;
+        keys.sort_unstable_by(|a, b| b.cmp(a));
+        // The cast leaves the index.
+        Ok(keys.into_iter().map(|key| self.parameters.values[key as u32 as usize]).collect())
+    }
+
+    /// Keys in the order of energy, and of equal ones in that of the Gaussians, with their indices.
+    fn importances(&self, observer: &mut Observer<'_>) -> Result<Vec<u64>> {
+        let parameterization = self.bounds.parameterization;
+        let items = self.parameters.values.iter().enumerate();
+        observer.map(items, |(index, values)| {
+            let gaussian = values.gaussian(parameterization);
+            let Gaussian { center, cholesky, .. } = gaussian;
+            let perceptual_weight = self.tiled.loss.weight_under(center, cholesky);
+            u64::from(ordered(gaussian.energy() * perceptual_weight)) << 32 | index as u64
+        })
     }
 
     /// Pruning: removes Gaussians that are invalid, nearly without colour, or outside the picture.

@@ -18,6 +18,9 @@ const FORESEEN: f64 = 0.75;
 /// The share of the iterations from which on the resolution is that of the picture.
 const COARSE_UNTIL: f32 = 0.5;
 
+/// Of how many parts of the fewest Gaussians that are enough there may be one more.
+const PARTS: usize = 32;
+
 /// What an iteration depends on.
 #[derive(Clone, Copy, Debug)]
 struct Iteration {
@@ -97,17 +100,46 @@ impl Fit<'_> {
             let shape = parameterization.shape_of(cholesky);
             self.bounds.clamped(Components { center, shape, color })
         };
-        let components: Vec<_> = gaussians.iter().map(components).collect();
-        self.parameters.extend(&components);
-        self.parameters.sort(observer)?;
+        let components = gaussians.iter().map(components).collect();
         self.is_adopted = true;
-        self.settle(observer)?;
+        self.hold(components, observer)?;
         let surplus = self.len().saturating_sub(self.wanted(1.0));
         if surplus > 0 {
             self.cull(surplus, observer)?;
             self.settle(observer)?;
         }
         observer.report(0, 0, self.len(), self.psnr())
+    }
+
+    /// Keeps the fewest of the Gaussians that are enough, always the most important ones. Without effect if all are too
+    /// few.
+    pub(crate) fn reduce(
+        &mut self,
+        mut is_enough: impl FnMut(&Self, &mut Observer<'_>) -> Result<bool>,
+        observer: &mut Observer<'_>,
+    ) -> Result<()> {
+        let by_importance = self.by_importance(observer)?;
+        let (mut too_few, mut enough) = (0, by_importance.len());
+        if !is_enough(self, observer)? {
+            return Ok(());
+        }
+        while enough - too_few > 1 + enough / PARTS {
+            let count = too_few.midpoint(enough);
+            self.hold(by_importance[..count].to_vec(), observer)?;
+            match is_enough(self, observer)? {
+                true => enough = count,
+                false => too_few = count,
+            }
+        }
+        self.hold(by_importance[..enough].to_vec(), observer)
+    }
+
+    /// Replaces the Gaussians by others, which are not trained.
+    fn hold(&mut self, values: Vec<Components>, observer: &mut Observer<'_>) -> Result<()> {
+        self.parameters.replace(values);
+        self.parameters.sort(observer)?;
+        self.invalidate();
+        self.settle(observer)
     }
 
     /// Trains from nothing again, with this many Gaussians.

@@ -163,8 +163,12 @@ impl<'a> TargetSearch<'a> {
                 if log_ratio <= 0.0 || finer < finest {
                     break;
                 }
-                coded = self.descended(gaussians, finer, self.work.passes, observer)?;
-                log_ratio = self.log_ratio(&coded.coded, aim, observer)?;
+                let other = self.descended(gaussians, finer, self.work.passes, observer)?;
+                let log_ratio_of_other = self.log_ratio(&other.coded, aim, observer)?;
+                // That of Gaussians that fit badly may rise: fine steps leave them as they are.
+                if log_ratio_of_other < log_ratio {
+                    (coded, log_ratio) = (other, log_ratio_of_other);
+                }
             }
         }
         self.trimmed(coded, log_ratio, aim, observer)
