@@ -1,8 +1,10 @@
 //! Smaller copies of a source.
 
+use core::ops::Range;
+
 use super::error::Result;
 use super::progress::Observer;
-use super::source::Source;
+use super::source::{Source, SourceSamples};
 
 /// The averages of a source over squares of `side` pixels, interleaved. Colours count as they show: times alpha.
 pub(crate) fn averages(
@@ -12,27 +14,72 @@ pub(crate) fn averages(
 ) -> Result<Vec<u16>> {
     let ([width, height], channels) = (source.size(), source.color().channels());
     let rows = observer.map(0..height.div_ceil(side), |row| {
-        let mut averages = Vec::with_capacity(width.div_ceil(side) * channels);
-        for left in (0..width).step_by(side) {
-            let (mut sums, mut weights) = ([0; 4], [0; 4]);
-            for y in row * side..(row * side + side).min(height) {
-                for x in left..(left + side).min(width) {
-                    let pixel = (y * width + x) * channels;
-                    let sample = |channel| u64::from(source.wide_sample(pixel + channel));
-                    for channel in 0..channels {
-                        let is_seen_through = source.is_premultiplied() && channel + 1 < channels;
-                        let weight = if is_seen_through { sample(channels - 1) } else { 1 };
-                        sums[channel] += weight * sample(channel);
-                        weights[channel] += weight;
-                    }
-                }
-            }
-            let average = |(sum, weight): (u64, u64)| ((sum + weight / 2) / weight.max(1)) as u16;
-            averages.extend(sums.into_iter().zip(weights).take(channels).map(average));
+        let lines = row * side..(row * side + side).min(height);
+        let samples = lines.start * width * channels..lines.end * width * channels;
+        match source.samples() {
+            _ if source.is_premultiplied() => averages_that_show(source, lines, side),
+            SourceSamples::Eight(all) => plain_averages(&all[samples], width, channels, side, 257),
+            SourceSamples::Sixteen(all) => plain_averages(&all[samples], width, channels, side, 1),
         }
-        averages
     })?;
     Ok(rows.concat())
+}
+
+/// The averages of squares in the same rows, times `scale`.
+fn plain_averages<T: Copy + Into<u32>>(
+    samples: &[T],
+    width: usize,
+    channels: usize,
+    side: usize,
+    scale: u64,
+) -> Vec<u16> {
+    let mut of_columns = vec![0_u32; width * channels];
+    let rows = samples.chunks_exact(width * channels);
+    let count = rows.len();
+    for row in rows {
+        for (sum, &sample) in of_columns.iter_mut().zip(row) {
+            *sum += sample.into();
+        }
+    }
+    let mut averages = Vec::with_capacity(width.div_ceil(side) * channels);
+    for columns in of_columns.chunks(side * channels) {
+        let mut sums = [0_u64; 4];
+        for pixel in columns.chunks_exact(channels) {
+            for (sum, &of_column) in sums.iter_mut().zip(pixel) {
+                *sum += u64::from(of_column);
+            }
+        }
+        let weight = (columns.len() / channels * count) as u64;
+        averages.extend(sums[..channels].iter().map(|sum| rounded(scale * sum, weight)));
+    }
+    averages
+}
+
+/// The averages of squares in the same rows, where colours count times alpha.
+fn averages_that_show(source: &Source<'_>, lines: Range<usize>, side: usize) -> Vec<u16> {
+    let ([width, _], channels) = (source.size(), source.color().channels());
+    let mut averages = Vec::with_capacity(width.div_ceil(side) * channels);
+    for left in (0..width).step_by(side) {
+        let (mut sums, mut weights) = ([0; 4], [0; 4]);
+        for y in lines.clone() {
+            for x in left..(left + side).min(width) {
+                let pixel = (y * width + x) * channels;
+                let sample = |channel| u64::from(source.wide_sample(pixel + channel));
+                for channel in 0..channels {
+                    let weight = if channel + 1 < channels { sample(channels - 1) } else { 1 };
+                    sums[channel] += weight * sample(channel);
+                    weights[channel] += weight;
+                }
+            }
+        }
+        averages.extend((0..channels).map(|channel| rounded(sums[channel], weights[channel])));
+    }
+    averages
+}
+
+/// A sum of samples divided by that of their weights.
+fn rounded(sum: u64, weight: u64) -> u16 {
+    ((sum + weight / 2) / weight.max(1)) as u16
 }
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ pub(crate) const STEP: f64 = 0.25;
 const LEAST_DIRECTED: f32 = 0.06;
 /// The fewest and the most iterations of training. A map is small, so it has time for more of them than its
 /// picture at low efforts.
-const ITERATIONS: (u32, u32) = (180, 700);
+const ITERATIONS: (u32, u32) = (60, 700);
 /// Pictures of fewer nodes than this have no texture.
 const LEAST_NODES: usize = 256;
 
