@@ -90,7 +90,7 @@ pub(crate) fn code_adopted(
     match job.aim {
         Aim::File(FileAim::Psnr(psnr)) => {
             let most = share * SquaredError::at_psnr(psnr, tiled.samples()).0;
-            fit.reduce(|fit, _| Ok(fit.best_error().squared.0 <= most), observer)?;
+            fit.reduce(&|fit, _| Ok(fit.best_error().squared.0 <= most), observer)?;
         }
         Aim::File(FileAim::Quality(quality)) => {
             let is_enough = |fit: &Fit<'_>, observer: &mut Observer<'_>| {
@@ -98,7 +98,7 @@ pub(crate) fn code_adopted(
                 let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
                 Ok(judge.judge(&picture, observer)?.excess(quality) <= share)
             };
-            fit.reduce(is_enough, observer)?;
+            fit.reduce(&is_enough, observer)?;
         }
         _ => {}
     }

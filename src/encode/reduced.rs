@@ -15,44 +15,36 @@ pub(crate) fn averages(
     let ([width, height], channels) = (source.size(), source.color().channels());
     let rows = observer.map(0..height.div_ceil(side), |row| {
         let lines = row * side..(row * side + side).min(height);
-        let samples = lines.start * width * channels..lines.end * width * channels;
-        match source.samples() {
-            _ if source.is_premultiplied() => averages_that_show(source, lines, side),
-            SourceSamples::Eight(all) => plain_averages(&all[samples], width, channels, side, 257),
-            SourceSamples::Sixteen(all) => plain_averages(&all[samples], width, channels, side, 1),
+        if source.is_premultiplied() {
+            return averages_that_show(source, lines, side);
         }
+        // By columns first, which is fast.
+        let mut of_columns = vec![0_u64; width * channels];
+        for y in lines.clone() {
+            let samples = y * of_columns.len()..(y + 1) * of_columns.len();
+            match source.samples() {
+                SourceSamples::Eight(all) => add(&mut of_columns, &all[samples], 257),
+                SourceSamples::Sixteen(all) => add(&mut of_columns, &all[samples], 1),
+            }
+        }
+        let mut averages = Vec::with_capacity(width.div_ceil(side) * channels);
+        for columns in of_columns.chunks(side * channels) {
+            let weight = (columns.len() / channels * lines.len()) as u64;
+            for channel in 0..channels {
+                let sum = columns[channel..].iter().step_by(channels).sum();
+                averages.push(rounded(sum, weight));
+            }
+        }
+        averages
     })?;
     Ok(rows.concat())
 }
 
-/// The averages of squares in the same rows, times `scale`.
-fn plain_averages<T: Copy + Into<u32>>(
-    samples: &[T],
-    width: usize,
-    channels: usize,
-    side: usize,
-    scale: u64,
-) -> Vec<u16> {
-    let mut of_columns = vec![0_u32; width * channels];
-    let rows = samples.chunks_exact(width * channels);
-    let count = rows.len();
-    for row in rows {
-        for (sum, &sample) in of_columns.iter_mut().zip(row) {
-            *sum += sample.into();
-        }
+/// Adds `scale` times each of some samples.
+fn add<T: Copy + Into<u64>>(sums: &mut [u64], samples: &[T], scale: u64) {
+    for (sum, &sample) in sums.iter_mut().zip(samples) {
+        *sum += scale * sample.into();
     }
-    let mut averages = Vec::with_capacity(width.div_ceil(side) * channels);
-    for columns in of_columns.chunks(side * channels) {
-        let mut sums = [0_u64; 4];
-        for pixel in columns.chunks_exact(channels) {
-            for (sum, &of_column) in sums.iter_mut().zip(pixel) {
-                *sum += u64::from(of_column);
-            }
-        }
-        let weight = (columns.len() / channels * count) as u64;
-        averages.extend(sums[..channels].iter().map(|sum| rounded(scale * sum, weight)));
-    }
-    averages
 }
 
 /// The averages of squares in the same rows, where colours count times alpha.

@@ -1,5 +1,7 @@
 //! Birth and death of Gaussians: densification, culling and pruning, for a budget.
 
+use rayon::prelude::*;
+
 use super::components::Components;
 use super::densify::{Densifier, MIN_COLOR};
 use super::paper::decoded;
@@ -105,9 +107,11 @@ impl Fit<'_> {
     /// The trained values of all Gaussians, the most important first.
     pub(super) fn by_importance(&self, observer: &mut Observer<'_>) -> Result<Vec<Components>> {
         let mut keys = self.importances(observer)?;
-        keys.sort_unstable_by(|a, b| b.cmp(a));
+        keys.par_sort_unstable();
+        observer.poll()?;
         // The cast leaves the index.
-        Ok(keys.into_iter().map(|key| self.parameters.values[key as u32 as usize]).collect())
+        let value = |key: u64| self.parameters.values[key as u32 as usize];
+        Ok(keys.into_iter().rev().map(value).collect())
     }
 
     /// Keys in the order of energy, and of equal ones in that of the Gaussians, with their indices.

@@ -115,7 +115,7 @@ impl Fit<'_> {
     /// few.
     pub(crate) fn reduce(
         &mut self,
-        mut is_enough: impl FnMut(&Self, &mut Observer<'_>) -> Result<bool>,
+        is_enough: &dyn Fn(&Self, &mut Observer<'_>) -> Result<bool>,
         observer: &mut Observer<'_>,
     ) -> Result<()> {
         let by_importance = self.by_importance(observer)?;
