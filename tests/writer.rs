@@ -1,9 +1,9 @@
 //! Gaussians that come from elsewhere: rendered, and written to files.
 
 use image_gip::{
-    ColorModel, Decoder, Gaussian, Header, Kernel, Limits, Metadata, OptionError, Parameterization,
-    Picture, PictureError, Precision, Quantizer, RenderOptions, SampleDepth, StreamDecoder, Text,
-    Threads, UniformQuantizer, WriteError, Writer, metrics,
+    ColorModel, Decoder, Gaussian, Header, Kernel, LimitKind, Limits, Metadata, OptionError,
+    Parameterization, Picture, PictureError, Precision, Quantizer, RenderOptions, SampleDepth,
+    StreamDecoder, Text, Threads, UniformQuantizer, WriteError, Writer, metrics,
 };
 use proptest::prelude::*;
 
@@ -197,6 +197,38 @@ fn the_first_flaw_is_told_with_its_index() {
         }
         other => panic!("{other:?}"),
     }
+}
+
+#[test]
+fn what_a_decoder_would_refuse_is_not_written() {
+    let color = ColorModel::Rgb;
+    let gaussians = gaussians(5, color);
+    let mut few = Limits::default();
+    few.max_gaussians = 4;
+    let mut lazy = Limits::default();
+    (lazy.max_work, lazy.max_memory) = (0, 1 << 20);
+    let large = vec![Gaussian { cholesky: [500.0, 0.0, 500.0], ..gaussians[0] }; 80];
+    for precision in [Precision::Float, Precision::Packed, Precision::Entropy] {
+        let writer = Writer::new(header(color)).with_precision(precision);
+        let refused = writer.clone().with_limits(few.clone()).write(&gaussians);
+        let expected = WriteError::Limit { kind: LimitKind::Gaussians, wanted: 5, allowed: 4 };
+        assert_eq!(refused, Err(expected), "{precision:?}");
+        writer.write(&large).expect("the default limits allow that");
+        let refused = writer.with_limits(lazy.clone()).write(&large);
+        assert!(
+            matches!(refused, Err(WriteError::Limit { kind: LimitKind::Work, .. })),
+            "{refused:?}"
+        );
+    }
+    let mut wide = Header::new(1 << 17, 1, color);
+    wide.depth = SampleDepth::Sixteen;
+    let writer = Writer::new(wide);
+    let refused = writer.write(&gaussians);
+    assert!(
+        matches!(refused, Err(WriteError::Limit { kind: LimitKind::Width, .. })),
+        "{refused:?}"
+    );
+    writer.with_limits(Limits::none()).write(&gaussians).expect("there are no limits");
 }
 
 #[test]

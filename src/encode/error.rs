@@ -61,6 +61,18 @@ pub enum WriteError {
     /// The step of colour is out of range.
     #[error("a step of colour of {0}; it must be 10^-6 to 1000")]
     ColorStep(f32),
+    /// A decoder with the limits of [`Writer::with_limits`](crate::Writer::with_limits) would refuse the file.
+    #[error(
+        "a decoder with these limits would refuse the file: {kind}: {wanted} required, {allowed} allowed"
+    )]
+    Limit {
+        /// Which limit.
+        kind: LimitKind,
+        /// What the file requires, in the unit of the limit; it may require more.
+        wanted: u64,
+        /// The limit.
+        allowed: u64,
+    },
 }
 
 /// Why a source is not a picture that the format can hold.

@@ -4,7 +4,7 @@ use fearless_simd::{Level, dispatch};
 use rayon::prelude::*;
 
 use super::aim::Aim;
-use super::error::{EncodeError, Result};
+use super::error::{EncodeError, Result, WriteError};
 use super::file::FileLayout;
 use super::job::Job;
 use super::progress::Observer;
@@ -61,6 +61,21 @@ pub(crate) fn check_limits(job: &Job<'_>) -> Result<()> {
     let mut stream = StreamDecoder::new().with_limits(limits.clone());
     stream.feed(&layout.start(gaussians)).map_err(refusal)?;
     Ok(())
+}
+
+/// Refuses a file of the writer that a decoder with these limits would refuse, or its rendering at full size.
+pub(crate) fn check_written(file: &[u8], limits: &Limits) -> Result<(), WriteError> {
+    let mut stream = StreamDecoder::new().with_limits(limits.clone());
+    let picture = stream.feed(file).map(|_| stream.picture().expect("the header was read"));
+    match picture.and_then(|picture| picture.check(&RenderOptions::new())) {
+        Err(DecodeError::Limit { kind, wanted, allowed }) => {
+            Err(WriteError::Limit { kind, wanted, allowed })
+        }
+        checked => {
+            checked.expect("the decoder reads what the writer writes");
+            Ok(())
+        }
+    }
 }
 
 /// The error of a decoder that refuses a file of the encoder: nothing but limits makes it do so.

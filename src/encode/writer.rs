@@ -12,6 +12,7 @@ use super::progress::Observer;
 use super::rate_model;
 use super::rdo;
 use super::texture;
+use super::verify;
 use crate::coding::entropy::{
     CenterGrid, Code, MOST_CODE, Quantization, QuantizationSteps, QuantizedCodes,
 };
@@ -20,6 +21,7 @@ use crate::container::{Header, Metadata};
 use crate::error::PictureError;
 use crate::gaussian::{CENTER, Gaussian, MAX_COMPONENTS, MAX_GAUSSIANS, SHAPE};
 use crate::kernel::Kernel;
+use crate::limits::Limits;
 use crate::render;
 use crate::texture::Texture;
 use crate::threads::Threads;
@@ -59,6 +61,7 @@ pub struct Writer {
     texture: Vec<Gaussian>,
     metadata: Metadata,
     first_layer: Option<u32>,
+    limits: Limits,
     threads: Threads,
 }
 
@@ -77,6 +80,7 @@ impl Writer {
             texture: Vec::new(),
             metadata: Metadata::default(),
             first_layer: None,
+            limits: Limits::default(),
             threads: Threads::default(),
         }
     }
@@ -138,6 +142,13 @@ impl Writer {
         Self { first_layer: bytes, ..self }
     }
 
+    /// As [`Encoder::with_limits`](crate::Encoder::with_limits): what a decoder with these limits would refuse is not
+    /// written. Default: [`Limits::default`].
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
     /// Sets the threads that work. The file does not depend on them.
     #[must_use]
     pub fn with_threads(self, threads: Threads) -> Self {
@@ -149,9 +160,16 @@ impl Writer {
     /// for some.
     ///
     /// # Errors
-    /// When an option is out of range, and for the first Gaussian that the format would not draw, before or after
-    /// rounding, or that has no code.
+    /// When an option is out of range, for the first Gaussian that the format would not draw, before or after
+    /// rounding, or that has no code, and when the limits are exceeded.
     pub fn write(&self, gaussians: &[Gaussian]) -> Result<Vec<u8>, WriteError> {
+        let file = self.unlimited(gaussians)?;
+        verify::check_written(&file, &self.limits)?;
+        Ok(file)
+    }
+
+    /// A file that a decoder with the limits may refuse.
+    fn unlimited(&self, gaussians: &[Gaussian]) -> Result<Vec<u8>, WriteError> {
         self.header.check()?;
         render::check(gaussians, MAX_GAUSSIANS)?;
         self.metadata.check().map_err(OptionError::Metadata)?;

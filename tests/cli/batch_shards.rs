@@ -102,6 +102,26 @@ fn only_what_is_old_or_damaged_is_made_again() {
 }
 
 #[test]
+fn shards_beyond_the_last_one_are_refused() {
+    let room = room();
+    batch(&room, 0, &[]);
+    let before = room.files("out");
+    for resume in [&[][..], &["--resume"]] {
+        let args = ["in", "--out", "out", "--shards", "3"];
+        let (_, error) = room.batch(2, &[&args[..], &QUICK, resume].concat());
+        assert!(error.contains("which is 000001.tar: 000002.tar; remove"), "{error}");
+        assert_eq!(room.files("out"), before);
+    }
+    fs::remove_file(room.path("out/000002.tar")).expect("it is ours");
+    // Names that no run writes.
+    for name in ["other.tar", "2.tar", "0000007.tar", "000007.tar.gz"] {
+        room.write(&format!("out/{name}"), "");
+    }
+    room.batch(0, &[&["in", "--out", "out", "--shards", "3"], &QUICK[..]].concat());
+    assert_eq!(room.files("out").len(), 6);
+}
+
+#[test]
 fn decoded_pictures_are_members_too() {
     let room = room();
     room.batch(0, &[&["in", "--out", "gips"], &QUICK[..]].concat());

@@ -204,14 +204,15 @@ pub(crate) fn encode<'py>(
     Ok(PyBytes::new(py, &encoded.bytes))
 }
 
-/// Refuses a mapping of Gaussians that says it is of another size or kernel, as an exported .npz may.
+/// Refuses a mapping of Gaussians that says it is of another size, depth or kernel, as an exported .npz may.
 fn check_header_of(fitted: &Bound<'_, PyAny>, header: &Header) -> PyResult<()> {
     let differs = |name: &str, found: &Bound<'_, PyAny>, wanted: &dyn Display| {
         Err(PyValueError::new_err(format!(
             "the Gaussians have the {name} {found}; it must be {wanted}"
         )))
     };
-    for (name, wanted) in [("width", header.width), ("height", header.height)] {
+    let depth = header.depth.bits().into();
+    for (name, wanted) in [("width", header.width), ("height", header.height), ("depth", depth)] {
         if let Some(found) = given::header_field(fitted, name)?
             && !found.eq(wanted)?
         {

@@ -15,7 +15,7 @@ fn exception<'py>(py: Python<'py>, class: &str, message: String) -> PyResult<Bou
 }
 
 /// Makes an exception; the error of making it, if that fails.
-fn raised<'py>(made: PyResult<Bound<'py, PyAny>>) -> PyErr {
+pub(crate) fn raised<'py>(made: PyResult<Bound<'py, PyAny>>) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
@@ -53,7 +53,7 @@ pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
 }
 
 /// A `LimitError`, which says how to raise the limit.
-fn limit_error<'py>(
+pub(crate) fn limit_error<'py>(
     py: Python<'py>,
     message: &str,
     kind: LimitKind,

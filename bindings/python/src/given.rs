@@ -298,7 +298,7 @@ impl<'py> HeaderFields<'_, 'py> {
     }
 }
 
-/// What a mapping of Gaussians says of their header under this name, in objects of Python: numbers of NumPy's become some.
+/// What a mapping of Gaussians says of their header under this name, in objects of Python.
 pub(crate) fn header_field<'py>(
     gaussians: &Bound<'py, PyAny>,
     name: &str,
@@ -307,9 +307,8 @@ pub(crate) fn header_field<'py>(
     if !mapping.contains(name)? {
         return Ok(None);
     }
-    let array =
-        gaussians.py().import("numpy")?.call_method1("asarray", (mapping.get_item(name)?,))?;
-    array.call_method0("tolist").map(Some)
+    let types = gaussians.py().import("image_gip._types")?;
+    types.call_method1("header_field", (mapping.get_item(name)?,)).map(Some)
 }
 
 /// The base colour of so many channels: one number for all, or one for each.

@@ -6,10 +6,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::encode::precision as precision_of;
-use crate::errors::{picture_error, warn};
+use crate::errors::{limit_error, picture_error, raised, warn};
 use crate::given::{Given, HeaderFields, parameterization as parameterization_of};
 use crate::light::{DisplayFields, LightFields};
 use crate::numbers::{Integer, Real};
+use crate::objects::Limits;
 use crate::{metadata, threads};
 
 /// Makes a file of Gaussians that come from elsewhere, such as another method or another file. Nothing is fitted.
@@ -35,6 +36,8 @@ use crate::{metadata, threads};
 ///     threads: The number of threads, 1 to 1024, that work with "entropy".
 ///     cicp, mastering_display, content_light, icc, exif, xmp, texts, metadata: What to store with the picture, as for
 ///         `encode`.
+///     limits: Those of the decoder that is to read the file: what it would refuse is not written. Default: Limits(),
+///         with which `decode` reads every file.
 ///
 /// Returns:
 ///     The file. With "entropy" it lacks the Gaussians that do not show inside the picture.
@@ -43,8 +46,9 @@ use crate::{metadata, threads};
 ///     ValueError: As for `render`; or a Gaussian is not positive definite once it is rounded, or has no code in the
 ///         entropy coding, and the message has the index of the first one; no first layer is as small as `first_layer`.
 ///     TypeError: An argument has the wrong type, is missing, or is one of another precision.
+///     LimitError: A decoder with these limits would refuse the file.
 #[pyfunction]
-#[pyo3(signature = (gaussians, *, like=None, width=None, height=None, depth=None, kernel=None, cutoff=None, base_color=None, precision="f32", parameterization=None, bits=None, quantizers=None, color_step=None, first_layer=None, threads=1, cicp=None, mastering_display=None, content_light=None, icc=None, exif=None, xmp=None, texts=None, metadata="all"))]
+#[pyo3(signature = (gaussians, *, like=None, width=None, height=None, depth=None, kernel=None, cutoff=None, base_color=None, precision="f32", parameterization=None, bits=None, quantizers=None, color_step=None, first_layer=None, threads=1, cicp=None, mastering_display=None, content_light=None, icc=None, exif=None, xmp=None, texts=None, metadata="all", limits=None))]
 #[expect(clippy::too_many_arguments, reason = "they are keywords in Python")]
 pub(crate) fn pack<'py>(
     py: Python<'py>,
@@ -71,6 +75,7 @@ pub(crate) fn pack<'py>(
     xmp: Option<&Bound<'py, PyAny>>,
     texts: Option<&Bound<'py, PyAny>>,
     metadata: &str,
+    limits: Option<Limits>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let kind = precision_of(precision)?;
     let packed = [Precision::Packed];
@@ -99,7 +104,7 @@ pub(crate) fn pack<'py>(
     if let Some(name) = parameterization {
         header.parameterization = parameterization_of(name)?;
     }
-    let mut writer = Writer::new(header).with_precision(kind).with_metadata(stored);
+    let mut writer = Writer::new(header).with_precision(kind).with_metadata(stored).with_limits(Limits::of(limits));
     if let Some([position, shape, color]) = bits {
         let depth = |bits: Integer<'_>| bits.within("a number of bits", 1..=16_u8);
         writer = writer.with_bit_depths(depth(position)?, depth(shape)?, depth(color)?);
@@ -118,6 +123,9 @@ pub(crate) fn pack<'py>(
     })?;
     written.map(|file| PyBytes::new(py, &file)).map_err(|error| match &error {
         WriteError::Picture(error) => picture_error(py, error),
+        WriteError::Limit { kind, wanted, allowed } => {
+            raised(limit_error(py, &error.to_string(), *kind, *wanted, *allowed))
+        }
         WriteError::Option(OptionError::Threads(_)) => PyRuntimeError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     })

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import threading
+import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -307,6 +308,24 @@ def test_ctrl_c() -> None:
     with pytest.raises(KeyboardInterrupt):
         image_gip.encode(draw(400, 300, 3), effort=7, threads=2)
     timer.join()
+
+
+def test_very_wide_gaussians_are_cancelled_at_once() -> None:
+    """Each of them covers all pixels, so that every pass of the search looks at all for each."""
+    random, count = np.random.default_rng(3), 1500
+    wide = {
+        "center": random.uniform(0, [256, 192], (count, 2)),
+        "covariance": np.eye(2) * random.uniform(4e6, 4e7, (count, 1, 1)),
+        "color": random.uniform(-0.1, 0.1, (count, 3)),
+    }
+    begin = time.monotonic()
+
+    def stop(_: Progress) -> bool:
+        return time.monotonic() < begin + 0.5
+
+    with pytest.raises(image_gip.CancelledError):
+        image_gip.encode(draw(256, 192, 3), fitted=wide, bpp=1, progress=stop)
+    assert time.monotonic() < begin + 2.5
 
 
 def test_the_interpreter_goes_on() -> None:

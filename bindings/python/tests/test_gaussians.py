@@ -324,9 +324,19 @@ def test_arrays_of_the_tool(textured: bytes, tool: Path, tmp_path: Path) -> None
     np.savez_compressed(tmp_path / "c.npz", **fields)
     gip("import", "c.npz", "c.gip")
     assert (tmp_path / "c.gip").read_bytes() == file
+    for name in ("width", "height", "depth", "base_color"):
+        fields[name] = fields[name].astype(np.float64)
+    # Both take the same.
+    with np.load(tmp_path / "c.npz") as arrays:
+        assert image_gip.pack(arrays) == file
+    assert image_gip.pack(fields) == file
     np.savez(tmp_path / "d.npz", **fields)
     gip("import", "d.npz", "d.gip")
     assert (tmp_path / "d.gip").read_bytes() == file
+    fields["base_color"] = np.float32(257)
+    np.savez(tmp_path / "e.npz", **fields)
+    gip("import", "e.npz", "e.gip")
+    assert image_gip.pack(fields) == (tmp_path / "e.gip").read_bytes()
     np.savez(tmp_path / "e.npz", spots=expected)
     failed = subprocess.run(
         [tool, "import", "e.npz", "e.gip"], cwd=tmp_path, capture_output=True, text=True
@@ -461,6 +471,24 @@ def test_arguments_that_do_not_fit(file: bytes) -> None:
         image_gip.render(gaussians, **SIZE, region=(90, 0, 20, 20))
 
 
+def test_what_a_decoder_would_refuse_is_not_packed() -> None:
+    gaussians = some(5)
+    with pytest.raises(image_gip.LimitError) as error:
+        image_gip.pack(gaussians, **SIZE, limits=Limits(max_gaussians=4))
+    assert (error.value.wanted, error.value.allowed) == (5, 4)
+    with pytest.raises(image_gip.LimitError, match="max_width"):
+        image_gip.pack(gaussians, width=1 << 17, height=1)
+    wide = Limits(max_width=1 << 17)
+    file = image_gip.pack(gaussians, width=1 << 17, height=1, limits=wide)
+    assert image_gip.info(file, limits=wide).size == (1 << 17, 1)
+    # The work of a rendering.
+    large = np.repeat(gaussians[:1], 3000)
+    large["covariance"], large["color"] = np.eye(2) * 1e8, 1e-3
+    for precision in ("f32", "packed", "entropy"):
+        with pytest.raises(image_gip.LimitError, match="max_work"):
+            image_gip.pack(large, width=2048, height=2048, precision=precision)
+
+
 def test_fitted_gaussians_get_the_codes_of_the_encoder() -> None:
     gaussians = some(150)
     gaussians["color"] *= 0.4
@@ -487,9 +515,13 @@ def test_fitted_gaussians_get_the_codes_of_the_encoder() -> None:
     fields: dict[str, Any] = {name: gaussians[name] for name in ("center", "covariance", "color")}
     fields |= {**SIZE, "base_color": np.full(3, 110 * 257), "kernel": np.array("quartic")}
     assert image_gip.encode(picture, fitted=fields, tune="psnr", bytes=800) == small
-    for name, value in {"width": 5, "height": np.int32(7), "kernel": "exponential"}.items():
+    wrong_fields = {"width": 5, "height": np.int32(7), "depth": 16, "kernel": "exponential"}
+    for name, value in wrong_fields.items():
         with pytest.raises(ValueError, match=f"have the {name} {value}; it must be"):
             image_gip.encode(picture, fitted=fields | {name: value})
+    as_others_save_them = {"kernel": np.bytes_(b"quartic"), "width": float(WIDTH), "depth": 8.0}
+    again = image_gip.encode(picture, fitted=fields | as_others_save_them, tune="psnr", bytes=800)
+    assert again == small
     del fields["width"]
     with pytest.raises(TypeError, match="must be given"):
         image_gip.render(fields)

@@ -11,6 +11,7 @@ import pytest
 import torch
 import torch.utils.data
 from conftest import HAS_TORCH, draw
+from numpy.lib.stride_tricks import as_strided
 
 import image_gip
 from image_gip.torch import (
@@ -80,6 +81,17 @@ def test_what_does_not_fit_is_refused(file: bytes) -> None:
         transform(file, out=torch.empty((3, 32, 47), dtype=torch.uint8))
     with pytest.raises(ValueError, match="that of 2 pictures"):
         decode_batch([file] * 2, transform, out=torch.empty((3, 3, 32, 48), dtype=torch.uint8))
+    samples = np.zeros(2 * 3 * 32 * 48, np.uint8)
+    for step in (0, 1, 32 * 48):  # that of a tensor that is expanded, and others
+        shared = as_strided(samples, (2, 3, 32, 48), (step, 32 * 48, 48, 1))
+        tensor = torch.from_numpy(shared) if HAS_TORCH else shared.view(torch.Tensor)
+        with pytest.raises(ValueError, match="share memory"):
+            decode_batch([file] * 2, transform, out=tensor)
+    # One picture, none of whose channels has a place of its own.
+    shared = as_strided(samples, (3, 32, 48), (0, 48, 1))
+    tensor = torch.from_numpy(shared) if HAS_TORCH else shared.view(torch.Tensor)
+    with pytest.raises(ValueError, match="contiguous"):
+        transform(file, out=tensor)
     with pytest.raises(ValueError, match="differ in size"):
         decode_batch([file], Resize(32))
     for wrong in ({"dtype": torch.int32}, {"mode": "CMYK"}):

@@ -1,6 +1,6 @@
 //! The limits of what is read and written, by the names that they have in `--limit`.
 
-use image_gip::{DecodeError, EncodeError, LimitKind, Limits};
+use image_gip::{DecodeError, EncodeError, LimitKind, Limits, WriteError};
 use thiserror::Error;
 
 /// Each kind of limit with its name.
@@ -56,6 +56,9 @@ pub(crate) fn advice(error: &anyhow::Error) -> Option<String> {
             return Some(*kind);
         }
         if let Some(EncodeError::Limit { kind, .. }) = cause.downcast_ref() {
+            return Some(*kind);
+        }
+        if let Some(WriteError::Limit { kind, .. }) = cause.downcast_ref() {
             return Some(*kind);
         }
         cause.is::<MemoryLimit>().then_some(LimitKind::Memory)

@@ -12,6 +12,7 @@ mod encode;
 mod errors;
 mod files;
 mod gaussians;
+mod in_grid;
 mod info;
 mod limits;
 mod picture;

@@ -11,6 +11,7 @@ use image_gip::{
 use crate::args;
 use crate::decode::skipped;
 use crate::files::{self, Output};
+use crate::in_grid::Grid;
 
 /// Pixels of the picture between two of its texture's map.
 const CELL: f32 = 8.0;
@@ -40,15 +41,20 @@ pub(crate) fn run(args: &args::Transform) -> Result<()> {
     let losses = metadata.retain(args.keep.policy().unwrap_or_default());
     warnings.extend(losses.iter().map(ToString::to_string));
 
-    let mut writer = Writer::new(header.clone()).with_metadata(metadata);
+    let mut writer =
+        Writer::new(header.clone()).with_metadata(metadata).with_limits(limits.clone());
     let steps = stream.quantization_steps();
     let is_coded = steps.is_some();
     if let Some(steps) = steps {
         writer = writer.with_precision(Precision::Entropy).with_steps(steps);
     }
-    let mut writing = Writing { writer, gaussians: &gaussians, texture, warnings };
+    let mut writing = Writing { writer, texture, warnings };
     let (turned, difference) = args.threads.pool()?.install(|| {
-        let turned = if is_coded { writing.entropy_coded()? } else { writing.write()? };
+        let turned = if is_coded {
+            writing.entropy_coded(&gaussians, Grid::new(header.width, header.height))?
+        } else {
+            writing.write(&gaussians)?
+        };
         let difference = difference(&header, &gaussians, &turned, &limits)?;
         anyhow::Ok((turned, difference))
     })?;
@@ -136,32 +142,34 @@ fn shows(gaussian: &Gaussian, header: &Header) -> bool {
 }
 
 /// A file that is written.
-struct Writing<'a> {
+struct Writing {
     writer: Writer,
-    gaussians: &'a [Gaussian],
     texture: Vec<Gaussian>,
     warnings: Vec<String>,
 }
 
-impl Writing<'_> {
-    /// The file with the grid of the input; with floats if a Gaussian has no code.
-    fn entropy_coded(&mut self) -> Result<Vec<u8>> {
-        match self.write() {
+impl Writing {
+    /// The file with the grid of the input; with floats if a Gaussian has no code: another encoder's input may have larger
+    /// codes of shape and colour than are written here.
+    fn entropy_coded(&mut self, gaussians: &[Gaussian], grid: Grid) -> Result<Vec<u8>> {
+        let brought_in: Vec<_> =
+            gaussians.iter().filter_map(|spot| grid.brought_in(spot)).collect();
+        match self.write(&brought_in) {
             Err(WriteError::Picture(PictureError::Gaussian { rule, .. })) => {
                 self.warnings.push(format!("stored as floats: of one Gaussian, {rule}"));
                 self.writer = self.writer.clone().with_precision(Precision::Float);
-                Ok(self.write()?)
+                Ok(self.write(gaussians)?)
             }
             file => Ok(file?),
         }
     }
 
     /// The file, without those of the texture's Gaussians that have no code.
-    fn write(&mut self) -> Result<Vec<u8>, WriteError> {
+    fn write(&mut self, gaussians: &[Gaussian]) -> Result<Vec<u8>, WriteError> {
         let mut left_out = 0;
         loop {
             let writer = self.writer.clone().with_texture(self.texture.clone());
-            match writer.write(self.gaussians) {
+            match writer.write(gaussians) {
                 Err(WriteError::Texture(PictureError::Gaussian { index, .. })) => {
                     self.texture.remove(index);
                     left_out += 1;
@@ -212,4 +220,27 @@ fn difference(
     found.render_planes(&options, &mut stored)?;
     let psnr = metrics::psnr(&exact, &stored, 1.0);
     Ok(format!("{rounded} of {all} Gaussians rounded: {psnr:.1} dB from the exact picture"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image_gip::ColorModel;
+
+    #[test]
+    fn what_has_no_code_becomes_floats() {
+        let header = Header::new(64, 48, ColorModel::Gray);
+        let spot = |x: f32, color: f32| Gaussian {
+            center: [x, 20.0],
+            cholesky: [60.0, 0.0, 40.0],
+            color: [color, 0.0, 0.0, 0.0],
+        };
+        let gaussians = [spot(30.0, 60_000.0), spot(150.0, 0.5)];
+        let writer = Writer::new(header.clone()).with_precision(Precision::Entropy);
+        let mut writing = Writing { writer, texture: Vec::new(), warnings: Vec::new() };
+        let file = writing.entropy_coded(&gaussians, Grid::new(64, 48)).expect("floats hold all");
+        assert!(writing.warnings[0].contains("its colour is too strong"), "{:?}", writing.warnings);
+        let told = difference(&header, &gaussians, &file, &Limits::default());
+        assert_eq!(told.expect("a file"), "all of 2 Gaussians exact");
+    }
 }

@@ -146,6 +146,7 @@ def pack(
     xmp: _Buffer | None = None,
     texts: Mapping[str, str] | Iterable[tuple[str, str]] | None = None,
     metadata: MetadataPolicy = "all",
+    limits: Limits | None = None,
 ) -> bytes: ...
 def info(
     src: _Source, *, metadata: MetadataPolicy = "all", limits: Limits | None = None

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass, fields
 from operator import index
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
 
 #: The channels of a picture, as Pillow names them.
 Mode: TypeAlias = Literal["L", "LA", "RGB", "RGBA"]
@@ -209,3 +211,19 @@ class Progress:
     gaussians: int
     #: PSNR in dB of the present Gaussians.
     psnr: float
+
+
+def header_field(value: object) -> Any:
+    """What an array, or what makes one, says of a header, in objects of Python.
+
+    Texts of bytes become str, and floats that are whole become int, as `gip import` takes them.
+    """
+    array = np.asarray(value)
+    if array.dtype.kind == "S":
+        array = array.astype(str)
+    plain = array.tolist()
+    return [_whole(item) for item in plain] if isinstance(plain, list) else _whole(plain)
+
+
+def _whole(value: Any) -> Any:
+    return int(value) if isinstance(value, float) and value.is_integer() else value

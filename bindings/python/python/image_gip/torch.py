@@ -275,6 +275,10 @@ def decode_batch(
     elif out.ndim != 4 or len(out) != len(files):
         shape = tuple(out.shape)
         raise ValueError(f"out has shape {shape}; it must be that of {len(files)} pictures")
+    elif _shares_memory(out):
+        raise ValueError(
+            "the pictures of out share memory; they need a tensor that is not expanded"
+        )
     draws = [transform.draw() for _ in files]
 
     def one_of(number: int) -> GipError | OSError | None:
@@ -341,6 +345,12 @@ def _file(value: Any) -> Source:
     if isinstance(value, Mapping):
         return value["path"] if value.get("bytes") is None else value["bytes"]
     return value
+
+
+def _shares_memory(pictures: torch.Tensor) -> bool:
+    """Whether a picture begins before the end of the one before it."""
+    samples = pictures.detach().numpy()
+    return len(samples) > 1 and samples.strides[0] < samples[0].nbytes
 
 
 def _checked(dtype: torch.dtype) -> torch.dtype:

@@ -85,7 +85,7 @@ pub(crate) struct Batch {
     /// Pictures are in the order of the inputs. A member is named by the path below INPUT, in whose last part dots become
     /// underscores: 2024/a.gip. Pictures that cannot be read are left out of their shard. Each shard is made by one job,
     /// and with --resume only those are made that lack a picture or are older than one; if inputs were added or removed
-    /// before others, these change their shard.
+    /// before others, these change their shard. A folder that has shards beyond the last one of this run is refused.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) shards: Option<u32>,
     /// Write a line of JSON for every file to FILE, or to standard output if it is `-`.

@@ -44,6 +44,9 @@ pub(crate) fn run(args: &args::Batch) -> Result<ExitCode> {
     let Plan { mut items, mut folders } = Plan::new(items, args.manifest.as_deref())?;
     if let Some(each) = args.shards {
         shards::assign(&mut items, &args.out, each as usize);
+        if !items.is_empty() {
+            shards::check_last(&args.out, items.len().div_ceil(each as usize))?;
+        }
         folders = [args.out.clone()].into();
     }
     args.manifest.as_deref().map_or(Ok(()), manifest::check)?;

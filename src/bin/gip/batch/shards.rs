@@ -1,7 +1,7 @@
 //! Shards: tar files that many results are written to.
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -12,11 +12,13 @@ use anyhow::{Context, Result, bail};
 use super::age;
 use super::failure::{catch_panic, is_cancelled};
 use super::inputs::Item;
+use super::left_out::listed;
 use super::manifest::{Manifest, Record};
 use super::tar::{self, TarWriter};
 use super::task::Facts;
 use super::work::{Batch, Tally, bar};
 use super::workers;
+use crate::errors::WrongUsage;
 use crate::files;
 
 /// The path of a result below the folder of the results, as the key that a member is named by: what follows the
@@ -31,8 +33,35 @@ pub(super) fn member(below: &Path) -> PathBuf {
 pub(super) fn assign(items: &mut [Item], out: &Path, each: usize) {
     for (number, item) in items.iter_mut().enumerate() {
         let below = item.output.strip_prefix(out).unwrap_or(&item.output);
-        item.output = out.join(format!("{:06}.tar", number / each)).join(below);
+        item.output = out.join(name_of(number / each)).join(below);
     }
+}
+
+/// Refuses a folder that has shards beyond the `count` of this run, such as those of an earlier one with fewer pictures
+/// each: who reads the folder would take them for a part of the result.
+pub(super) fn check_last(out: &Path, count: usize) -> Result<()> {
+    let Ok(entries) = fs::read_dir(out) else { return Ok(()) };
+    let is_beyond = |name: &str| {
+        let number = name.strip_suffix(".tar").and_then(|number| number.parse::<usize>().ok());
+        number.is_some_and(|number| number >= count && name == name_of(number))
+    };
+    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let mut beyond: Vec<_> = names.filter(|name| is_beyond(name)).collect();
+    if beyond.is_empty() {
+        return Ok(());
+    }
+    beyond.sort();
+    let (out, found) = (out.display(), listed(beyond.iter().cloned(), beyond.len()));
+    bail!(WrongUsage(format!(
+        "{out} has shards of another run, beyond the last one of this run, which is {}: {found}; remove them, or take \
+         another folder for --out",
+        name_of(count - 1)
+    )))
+}
+
+/// The name of a shard.
+fn name_of(number: usize) -> String {
+    format!("{number:06}.tar")
 }
 
 /// A tar file that results are written to.

@@ -30,7 +30,8 @@ pub(crate) fn run(args: &args::Import) -> Result<()> {
     header.parameterization = args.parameterization.into();
     check(&header, &imported, &limits).with_context(context)?;
 
-    let file = args.threads.pool()?.install(|| writer(args, header).write(&imported.gaussians));
+    let writer = writer(args, header).with_limits(limits.clone());
+    let file = args.threads.pool()?.install(|| writer.write(&imported.gaussians));
     let file = file.map_err(|error| match error {
         WriteError::Picture(error) => flaw(&error, &imported).context(context()),
         WriteError::Option(_) | WriteError::ColorStep(_) | WriteError::Quantizers(_) => {

@@ -139,7 +139,9 @@ pub(crate) fn read(bytes: &[u8], most: u64) -> Result<Imported> {
         let value = |&number: &f64| {
             whole(number).with_context(|| format!("base_color {number}; it must be 0 to 65535"))
         };
-        base.values.iter().map(value).collect::<Result<Vec<u16>>>()
+        let values = base.values.iter().map(value).collect::<Result<Vec<u16>>>()?;
+        // One number is for all channels.
+        anyhow::Ok(if base.shape.is_empty() { values.repeat(channels) } else { values })
     });
     let kernel = arrays.0.get("kernel").map(|array| array.text().context("kernel"));
     let cutoff = arrays.shaped("cutoff", &[])?.map(|numbers| numbers[0] as f32);
