@@ -3,6 +3,7 @@
 use core::ops::ControlFlow;
 use std::sync::Arc;
 
+use super::adopted;
 use super::aim::Aim;
 use super::appearance::Curve;
 use super::error::{EncodeError, OptionError};
@@ -10,6 +11,7 @@ use super::fit::training::Training;
 use super::importance::Importance;
 use super::job::Job;
 use super::options::{Precision, Target, Tune};
+use super::outcome::Outcome;
 use super::pipeline;
 use super::progress::{Observer, Progress};
 use super::shortfall::Shortfall;
@@ -22,6 +24,9 @@ use crate::kernel::Kernel;
 use crate::limits::Limits;
 use crate::render::Picture;
 use crate::threads::Threads;
+
+/// A way from jobs for a source, of rising effort, to the file of the last one.
+type Encode<'a> = dyn Fn(&[Job<'_>], &mut Observer<'_>) -> Result<Outcome, EncodeError> + Sync + 'a;
 
 // Constants: docs/tuning.md, "Iterations".
 /// For the efforts 1 to 7: iterations of training, and passes of rate-distortion optimization over
@@ -246,7 +251,7 @@ impl Encoder {
         source: &Source<'_>,
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
-        self.run(source, None, progress)
+        self.run(source, &pipeline::encode, progress)
     }
 
     /// Encodes Gaussians that were fitted to `source` by other means: codes are chosen for the target as they are
@@ -280,21 +285,21 @@ impl Encoder {
         fitted: &Picture<'_>,
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
-        self.run(source, Some(fitted), progress)
+        self.check_fitted(source, fitted.header())?;
+        let encode =
+            |jobs: &[Job<'_>], observer: &mut Observer<'_>| adopted::encode(jobs, fitted, observer);
+        self.run(source, &encode, progress)
     }
 
-    /// Encodes `source`: with Gaussians of its own, or those that are fitted.
+    /// Encodes `source` in a way.
     fn run(
         &self,
         source: &Source<'_>,
-        fitted: Option<&Picture<'_>>,
+        encode: &Encode<'_>,
         progress: &mut (dyn FnMut(&Progress) -> ControlFlow<()> + Send),
     ) -> Result<Encoded, EncodeError> {
         let start = Stopwatch::start();
         let (aim, runs) = self.check(source.pixels())?;
-        if let Some(fitted) = fitted {
-            self.check_fitted(source, fitted.header())?;
-        }
         let iterations = runs.iter().map(|(training, _)| training.iterations).sum();
         let mut observer = Observer::new(progress, iterations);
         let source = source.keeping_invisible(self.keep_invisible);
@@ -316,10 +321,7 @@ impl Encoder {
                 passes: *passes,
             })
             .collect();
-        let outcome = on_threads(self.threads, || match fitted {
-            Some(fitted) => pipeline::encode_fitted(&jobs, fitted, &mut observer),
-            None => pipeline::encode(&jobs, &mut observer),
-        })??;
+        let outcome = on_threads(self.threads, || encode(&jobs, &mut observer))??;
         Ok(Encoded {
             bytes: outcome.file,
             report: Report {

@@ -77,36 +77,8 @@ pub(crate) fn finish(
     code(fit, too_good, job, judge, tiled, layout, observer)
 }
 
-/// The file of Gaussians from elsewhere: of all, or of the fewest that the target needs.
-pub(crate) fn code_adopted(
-    mut fit: Fit<'_>,
-    job: &Job<'_>,
-    judge: &Judge<'_>,
-    tiled: &TiledSource,
-    layout: &FileLayout<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<(Vec<u8>, Work)> {
-    let share = rate_model::SHARE_OF_FIT;
-    match job.aim {
-        Aim::File(FileAim::Psnr(psnr)) => {
-            let most = share * SquaredError::at_psnr(psnr, tiled.samples()).0;
-            fit.reduce(&|fit, _| Ok(fit.best_error().squared.0 <= most), observer)?;
-        }
-        Aim::File(FileAim::Quality(quality)) => {
-            let is_enough = |fit: &Fit<'_>, observer: &mut Observer<'_>| {
-                let (gaussians, limits) = (fit.gaussians(), Limits::none());
-                let picture = Picture::new(layout.header(), &gaussians, &limits, 0);
-                Ok(judge.judge(&picture, observer)?.excess(quality) <= share)
-            };
-            fit.reduce(&is_enough, observer)?;
-        }
-        _ => {}
-    }
-    code(fit, None, job, judge, tiled, layout, observer)
-}
-
 /// The file of a fit as it is, coded for the target, or of `too_good` if that comes nearer to the target.
-fn code(
+pub(crate) fn code(
     fit: Fit<'_>,
     too_good: Option<Fitted>,
     job: &Job<'_>,

@@ -3,6 +3,7 @@
 //! `fit` turns pixels into Gaussians, `rdo` turns Gaussians into codes of the entropy coding, and
 //! `file` writes codes as bytes; `pipeline` runs these stages one after the other.
 
+mod adopted;
 mod aim;
 mod alpha_bleed;
 mod appearance;

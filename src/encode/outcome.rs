@@ -1,10 +1,15 @@
 //! A finished encoding, and which of two is better.
 
 use super::aim::{Aim, FileAim};
+use super::error::Result;
+use super::file::FileLayout;
 use super::fit::Work;
+use super::job::Job;
 use super::options::Tune;
-use super::shortfall::Shortfall;
-use super::verify::{FilePsnr, TextureCost};
+use super::progress::Observer;
+use super::quality::{self, Judge};
+use super::shortfall::{Reached, Shortfall};
+use super::verify::{FilePsnr, TextureCost, Verified};
 
 // Constants: docs/tuning.md, "Search for a target".
 /// What twice the size must bring, in dB or in points of quality.
@@ -29,6 +34,40 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
+    /// That of a file for a job whose aim was `asked`: decodes it to tell what it shows.
+    pub(crate) fn of(
+        file: Vec<u8>,
+        mut work: Work,
+        job: &Job<'_>,
+        asked: Aim,
+        judge: &Judge<'_>,
+        layout: &FileLayout<'_>,
+        observer: &mut Observer<'_>,
+    ) -> Result<Self> {
+        let source = job.source;
+        let verified = Verified::within(&file, source, job.limits, observer)?;
+        let (gaussians, texture) = (verified.gaussians(), verified.texture());
+        observer.expect(job.workload(gaussians as usize).verification());
+        let (psnr, verdict) = verified.judged(judge, observer)?;
+        work.peak_memory = work.peak_memory.max(quality::memory(source));
+        // The estimate of an exact copy would have rounding errors.
+        let is_exact = psnr.rounded == f64::INFINITY;
+        let quality = if is_exact { 100.0 } else { verdict.quality() };
+        let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
+        let reached = Reached {
+            bytes: file.len(),
+            metadata: layout.metadata_length(),
+            psnr: psnr.rounded,
+            exact_psnr,
+            quality,
+            verdict,
+            gaussians,
+        };
+        let shortfall = asked.of_file().and_then(|aim| Shortfall::of(aim, reached));
+        let is_lost_to_rounding = false;
+        Ok(Self { file, work, gaussians, psnr, quality, texture, shortfall, is_lost_to_rounding })
+    }
+
     /// Whether this file is better than another one for an aim: the smaller one of two that reach a PSNR or a
     /// quality, else the one that shows the better picture.
     pub(crate) fn is_better_than(&self, other: &Self, aim: Aim, tune: Tune) -> bool {

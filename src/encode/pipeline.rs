@@ -14,13 +14,11 @@ use super::quality::{self, Judge};
 use super::rate_model;
 use super::rdo::SearchWork;
 use super::resolutions::Resolutions;
-use super::shortfall::{Reached, Shortfall};
+use super::shortfall::Shortfall;
 use super::sketch::{self, Sketch};
 use super::tiled_source::TiledSource;
-use super::verify::Verified;
 use super::workload::PREPARATION;
 use super::{entropy, packed, resolutions, verify};
-use crate::render::Picture;
 
 // Constants: docs/tuning.md, "Search for a target".
 /// If the target is a size, and fewer pixels than this come to each Gaussian, the file is compared with one
@@ -53,18 +51,6 @@ pub(crate) fn encode(jobs: &[Job<'_>], observer: &mut Observer<'_>) -> Result<Ou
         best.work = work;
     }
     Ok(best)
-}
-
-/// The file of the last job, of Gaussians that are given for its source.
-pub(crate) fn encode_fitted(
-    jobs: &[Job<'_>],
-    fitted: &Picture<'_>,
-    observer: &mut Observer<'_>,
-) -> Result<Outcome> {
-    let job = jobs.last().expect("there is a job");
-    verify::check_limits(job)?;
-    let judge = Judge::new(job.source);
-    encode_for_target(job, &judge, Form::Fitted(fitted), Work::default(), observer)
 }
 
 /// The file of a job: a sketch, unless one of the picture itself shows more.
@@ -168,21 +154,13 @@ fn with_fewer(
     }
 }
 
-/// How many of the Gaussians that are given are encoded: all, if the number or the size of the file does not say less.
-fn fitted_count(fitted: &Picture<'_>, aim: Aim) -> Option<usize> {
-    let is_limited = matches!(aim, Aim::Count(_) | Aim::File(FileAim::Size(_)));
-    (!is_limited).then(|| fitted.gaussians().len())
-}
-
 /// What is fitted.
 #[derive(Clone, Copy, Debug)]
-enum Form<'a> {
+enum Form {
     /// A small copy of the picture.
     Sketch,
     /// The picture, with so many Gaussians, or as many as the target asks for.
     Whole(Option<usize>),
-    /// Nothing: these are the Gaussians.
-    Fitted(&'a Picture<'a>),
 }
 
 /// Fits the source, codes the Gaussians for the target, and decodes the file to tell what it shows. `work` was done
@@ -190,7 +168,7 @@ enum Form<'a> {
 fn encode_for_target(
     job: &Job<'_>,
     judge: &Judge<'_>,
-    form: Form<'_>,
+    form: Form,
     work: Work,
     observer: &mut Observer<'_>,
 ) -> Result<Outcome> {
@@ -200,17 +178,13 @@ fn encode_for_target(
     let (sketch, count) = match form {
         Form::Sketch => (Some(Sketch::of(job, observer)?), None),
         Form::Whole(count) => (None, count),
-        Form::Fitted(fitted) => (None, fitted_count(fitted, job.aim)),
     };
     let tiled = match &sketch {
         Some(sketch) => sketch.tiled(source, observer)?,
         None => TiledSource::new(source, job.tune, observer)?,
     };
     let (kernel, parameterization) = (training.kernel, training.parameterization);
-    let layout = match form {
-        Form::Fitted(fitted) => FileLayout::of_fitted(fitted.header(), job.metadata),
-        _ => FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata),
-    };
+    let layout = FileLayout::new(source, tiled.mean, kernel, parameterization, job.metadata);
     let layout = layout.with_first_layer(job.first_layer);
 
     let asked = job.aim;
@@ -233,11 +207,6 @@ fn encode_for_target(
     let mut is_lost_to_rounding = false;
     let (file, mut work) = if let Some(sketch) = &sketch {
         sketch.encode(job, budget, &tiled, &layout, work, observer)
-    } else if let Form::Fitted(fitted) = form {
-        let sources = Resolutions::single(&tiled);
-        let mut fit = Fit::new(sources, training, budget, precision, layout.base(), job.seed, work);
-        fit.adopt(fitted.gaussians(), observer)?;
-        entropy::code_adopted(fit, job, judge, &tiled, &layout, observer)
     } else {
         let copies = resolutions::copies(job, observer)?;
         let sources = Resolutions { picture: &tiled, copies: &copies };
@@ -254,30 +223,11 @@ fn encode_for_target(
         }
     }?;
 
+    work.peak_memory = work.peak_memory.max(peak_before);
     // The decoder needs memory, too.
     drop(tiled);
-    let verified = Verified::within(&file, source, job.limits, observer)?;
-    let (gaussians, texture) = (verified.gaussians(), verified.texture());
-    let workload = job.workload(gaussians as usize);
-    observer.expect(workload.verification());
-    let (psnr, verdict) = verified.judged(judge, observer)?;
-    let judging = quality::memory(source);
-    work.peak_memory = work.peak_memory.max(judging).max(peak_before);
-    // The estimate of an exact copy would have rounding errors.
-    let is_exact = psnr.rounded == f64::INFINITY;
-    let quality = if is_exact { 100.0 } else { verdict.quality() };
-    let exact_psnr = 10.0 * (12.0 * f64::from(source.depth().max_sample()).powi(2)).log10();
-    let reached = Reached {
-        bytes: file.len(),
-        metadata: layout.metadata_length(),
-        psnr: psnr.rounded,
-        exact_psnr,
-        quality,
-        verdict,
-        gaussians,
-    };
-    let shortfall = asked.of_file().and_then(|aim| Shortfall::of(aim, reached));
-    Ok(Outcome { file, work, gaussians, psnr, quality, texture, shortfall, is_lost_to_rounding })
+    let outcome = Outcome::of(file, work, job, asked, judge, &layout, observer)?;
+    Ok(Outcome { is_lost_to_rounding, ..outcome })
 }
 
 /// The work from training on, about, with so many Gaussians.
@@ -293,7 +243,7 @@ fn work_from_training(job: &Job<'_>, gaussians: usize) -> f64 {
 
 /// The aim, or the size of a file without Gaussians if the aim is a smaller one; and what decides the number of
 /// Gaussians during training.
-fn within_reach(
+pub(crate) fn within_reach(
     job: &Job<'_>,
     layout: &FileLayout<'_>,
     tiled: &TiledSource,

@@ -104,7 +104,10 @@ pub(crate) fn pack<'py>(
     if let Some(name) = parameterization {
         header.parameterization = parameterization_of(name)?;
     }
-    let mut writer = Writer::new(header).with_precision(kind).with_metadata(stored).with_limits(Limits::of(limits));
+    let mut writer = Writer::new(header)
+        .with_precision(kind)
+        .with_metadata(stored)
+        .with_limits(Limits::of(limits));
     if let Some([position, shape, color]) = bits {
         let depth = |bits: Integer<'_>| bits.within("a number of bits", 1..=16_u8);
         writer = writer.with_bit_depths(depth(position)?, depth(shape)?, depth(color)?);
