@@ -7,7 +7,6 @@ use super::file::FileLayout;
 use super::fit::budget::Budget;
 use super::fit::{Fit, Work};
 use super::job::Job;
-use super::loss::SquaredError;
 use super::outcome::Outcome;
 use super::pipeline::within_reach;
 use super::progress::Observer;
@@ -43,13 +42,13 @@ pub(crate) fn encode(
     let job = &Job { aim, ..*job };
     // A number, or a size, may have no room for all.
     let is_limited = matches!(aim, Aim::Count(_) | Aim::File(FileAim::Size(_)));
-    let budget = if is_limited { budget } else { Budget::Count(all) };
+    let room = if is_limited { budget } else { Budget::Count(all) };
 
     let sources = Resolutions::single(&tiled);
     let (base, work) = (layout.base(), Work::default());
-    let mut fit = Fit::new(sources, job.training, budget, job.precision, base, job.seed, work);
+    let mut fit = Fit::new(sources, job.training, room, job.precision, base, job.seed, work);
     fit.adopt(fitted.gaussians(), observer)?;
-    reduce(&mut fit, job, &judge, &tiled, &layout, observer)?;
+    reduce(&mut fit, aim, budget, &judge, &layout, observer)?;
     let preparing = tiled.memory() + tiled.scratch_memory;
     let (file, mut work) = entropy::code(fit, None, job, &judge, &tiled, &layout, observer)?;
     work.peak_memory = work.peak_memory.max(preparing);
@@ -61,18 +60,17 @@ pub(crate) fn encode(
 /// Keeps the fewest Gaussians that a PSNR or a quality needs.
 fn reduce(
     fit: &mut Fit<'_>,
-    job: &Job<'_>,
+    aim: Aim,
+    budget: Budget,
     judge: &Judge<'_>,
-    tiled: &TiledSource,
     layout: &FileLayout<'_>,
     observer: &mut Observer<'_>,
 ) -> Result<()> {
-    match job.aim {
-        Aim::File(FileAim::Psnr(psnr)) => {
-            let most = SHARE_OF_FIT * SquaredError::at_psnr(psnr, tiled.samples()).0;
-            fit.reduce(&|fit, _| Ok(fit.best_error().squared.0 <= most), observer)
+    match (aim, budget) {
+        (_, Budget::SquaredError(most)) => {
+            fit.reduce(&|fit, _| Ok(fit.best_error().squared <= most), observer)
         }
-        Aim::File(FileAim::Quality(quality)) => {
+        (Aim::File(FileAim::Quality(quality)), _) => {
             let is_enough = |fit: &Fit<'_>, observer: &mut Observer<'_>| {
                 let (gaussians, limits) = (fit.gaussians(), Limits::none());
                 let picture = Picture::new(layout.header(), &gaussians, &limits, 0);

@@ -261,7 +261,9 @@ impl Encoder {
     /// A Gaussian whose colour exceeds 2 full samples, whose centre is far outside of the picture, or one of whose
     /// standard deviations exceeds twice the longer side, begins with the nearest values within. Those that are not
     /// worth their bytes are left out, and of those for which a number of Gaussians or bytes has no room, or which a
-    /// PSNR or quality does not need, the least important ones. For a target of more bytes or quality than the Gaussians have, see [`Report::shortfall`]. [`Writer`](crate::Writer) stores Gaussians as they are, without a source.
+    /// PSNR or quality does not need, the least important ones. For a target of more bytes or quality than the
+    /// Gaussians have, see [`Report::shortfall`]. [`Writer`](crate::Writer) stores Gaussians as they are, without a
+    /// source.
     ///
     /// # Errors
     /// Those of [`Encoder::encode`]; and [`EncodeError::Option`] when the precision is not

@@ -2,6 +2,7 @@
 
 use image_gip::{
     ChunkType, DecodeError, EncodeError, LimitKind, OptionError, PictureError, RequestError,
+    WriteError,
 };
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -15,7 +16,7 @@ fn exception<'py>(py: Python<'py>, class: &str, message: String) -> PyResult<Bou
 }
 
 /// Makes an exception; the error of making it, if that fails.
-pub(crate) fn raised<'py>(made: PyResult<Bound<'py, PyAny>>) -> PyErr {
+fn raised<'py>(made: PyResult<Bound<'py, PyAny>>) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
@@ -53,7 +54,7 @@ pub(crate) fn decode_error(py: Python<'_>, error: DecodeError) -> PyErr {
 }
 
 /// A `LimitError`, which says how to raise the limit.
-pub(crate) fn limit_error<'py>(
+fn limit_error<'py>(
     py: Python<'py>,
     message: &str,
     kind: LimitKind,
@@ -101,6 +102,18 @@ pub(crate) fn encode_error(py: Python<'_>, error: &EncodeError) -> PyErr {
         }
         EncodeError::Option(error) => PyValueError::new_err(error.to_string()),
         _ => raised(exception(py, "CancelledError", error.to_string())),
+    }
+}
+
+/// The exception for an error of the writer.
+pub(crate) fn write_error(py: Python<'_>, error: &WriteError) -> PyErr {
+    match error {
+        WriteError::Picture(error) => picture_error(py, error),
+        WriteError::Limit { kind, wanted, allowed } => {
+            raised(limit_error(py, &error.to_string(), *kind, *wanted, *allowed))
+        }
+        WriteError::Option(OptionError::Threads(_)) => PyRuntimeError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
     }
 }
 

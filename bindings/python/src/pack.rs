@@ -1,12 +1,12 @@
 //! `pack`.
 
-use image_gip::{OptionError, Precision, Quantizer, UniformQuantizer, WriteError, Writer};
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use image_gip::{Precision, Quantizer, UniformQuantizer, Writer};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::encode::precision as precision_of;
-use crate::errors::{limit_error, picture_error, raised, warn};
+use crate::errors::{warn, write_error};
 use crate::given::{Given, HeaderFields, parameterization as parameterization_of};
 use crate::light::{DisplayFields, LightFields};
 use crate::numbers::{Integer, Real};
@@ -124,14 +124,7 @@ pub(crate) fn pack<'py>(
     let written = py.detach(|| {
         threads::decoding(threads, |threads| writer.with_threads(threads).write(&given.gaussians))
     })?;
-    written.map(|file| PyBytes::new(py, &file)).map_err(|error| match &error {
-        WriteError::Picture(error) => picture_error(py, error),
-        WriteError::Limit { kind, wanted, allowed } => {
-            raised(limit_error(py, &error.to_string(), *kind, *wanted, *allowed))
-        }
-        WriteError::Option(OptionError::Threads(_)) => PyRuntimeError::new_err(error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
-    })
+    written.map(|file| PyBytes::new(py, &file)).map_err(|error| write_error(py, &error))
 }
 
 /// The quantizers of the caller. The writer checks their number and their ranges.

@@ -118,11 +118,11 @@ impl Fit<'_> {
         is_enough: &dyn Fn(&Self, &mut Observer<'_>) -> Result<bool>,
         observer: &mut Observer<'_>,
     ) -> Result<()> {
-        let by_importance = self.by_importance(observer)?;
-        let (mut too_few, mut enough) = (0, by_importance.len());
         if !is_enough(self, observer)? {
             return Ok(());
         }
+        let by_importance = self.by_importance(observer)?;
+        let (mut too_few, mut enough) = (0, by_importance.len());
         while enough - too_few > 1 + enough / PARTS {
             let count = too_few.midpoint(enough);
             self.hold(by_importance[..count].to_vec(), observer)?;
@@ -131,7 +131,11 @@ impl Fit<'_> {
                 false => too_few = count,
             }
         }
-        self.hold(by_importance[..enough].to_vec(), observer)
+        // Unless these are those that were tried last.
+        if self.len() != enough {
+            self.hold(by_importance[..enough].to_vec(), observer)?;
+        }
+        Ok(())
     }
 
     /// Replaces the Gaussians by others, which are not trained.
