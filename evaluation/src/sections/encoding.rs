@@ -155,7 +155,7 @@ pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
     let ends = times.iter().take(1).chain(times.iter().rev().take(5).rev());
     for (seconds, name) in ends {
         let cells = [format!("{seconds:.2}"), format!("{:.2}", seconds / middle)];
-        table.row(&[&[name.clone()], &cells[..]].concat());
+        table.row(&[std::slice::from_ref(name), &cells[..]].concat());
     }
     let mut text = format!(
         "\n### Single pictures\n\nCompared with each other: the {} pictures of {}, at effort {} and {rate} bits per \
