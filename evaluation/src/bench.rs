@@ -14,7 +14,7 @@ use crate::{gip, provenance};
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 4;
 const QUICK_LARGE_PICTURES: usize = 1;
-/// Iterations of the published methods, if no others are asked for.
+/// Iterations of the published methods.
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 2_000;
 
@@ -54,6 +54,8 @@ pub(crate) struct Bench {
     pub(crate) quick: bool,
     /// Of the published methods.
     pub(crate) iterations: u32,
+    /// Whether the published methods run for the paper's iterations as well.
+    pub(crate) is_long: bool,
     /// CSV with measurements of the baselines from elsewhere.
     pub(crate) reference: Option<PathBuf>,
     /// Where to write the README's picture.
@@ -70,7 +72,7 @@ impl Bench {
         folders: &Folders,
         folder: PathBuf,
         quick: bool,
-        iterations: Option<u32>,
+        is_long: bool,
         reference: Option<PathBuf>,
     ) -> Result<Self> {
         let load = |folder: &PathBuf, few| pictures::load(folder, quick.then_some(few));
@@ -84,7 +86,8 @@ impl Bench {
             screens: others(&folders.screens, QUICK_LARGE_PICTURES)?,
             contents: folders.content.as_deref().map_or(Ok(Contents::default()), Contents::load)?,
             quick,
-            iterations: iterations.unwrap_or(if quick { QUICK_ITERATIONS } else { ITERATIONS }),
+            iterations: if quick { QUICK_ITERATIONS } else { ITERATIONS },
+            is_long,
             reference,
             readme_picture: None,
             product: provenance::product(),
@@ -229,7 +232,7 @@ mod tests {
             screens: None,
             content: None,
         };
-        Bench::new(&folders, report.into(), false, None, None)
+        Bench::new(&folders, report.into(), false, false, None)
     }
 
     #[test]

@@ -73,9 +73,9 @@ struct Args {
     /// Only these sections [default: all].
     #[arg(long, value_enum, value_name = "SECTION")]
     only: Vec<Section>,
-    /// Iterations of the published methods [default: 3000, quick: 2000; the paper: 50000].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    iterations: Option<u32>,
+    /// In `representation`, the published methods with all of the paper's iterations, too, on four pictures: hours.
+    #[arg(long)]
+    long: bool,
     /// CSV with measurements of the same baselines by other programs, to compare ours with; it
     /// needs the columns codec, quality, image, bytes, psnr and msssim of `rate.csv`.
     #[arg(long, value_name = "CSV")]
@@ -102,7 +102,7 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
-    let mut bench = Bench::new(folders, args.out, args.quick, args.iterations, args.reference)?;
+    let mut bench = Bench::new(folders, args.out, args.quick, args.long, args.reference)?;
     bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
     for section in sections {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use image::{Rgb, RgbImage};
 use image_gip::metrics;
 
 use crate::visual;
@@ -110,6 +111,31 @@ impl TestPicture {
     }
 }
 
+/// A picture of so many columns and rows of square tiles, which are parts of some pictures, none of them twice; `None`
+/// where they have not as many.
+pub(crate) fn mosaic(
+    pictures: &[&TestPicture],
+    (columns, rows): (u32, u32),
+    side: u32,
+) -> Option<TestPicture> {
+    let mut tiles = pictures.iter().flat_map(|picture| {
+        let (across, down) = (picture.width / side, picture.height / side);
+        (0..across * down).map(move |tile| (picture, tile % across * side, tile / across * side))
+    });
+    let mut mosaic = RgbImage::new(columns * side, rows * side);
+    for tile in 0..columns * rows {
+        let (picture, left, top) = tiles.next()?;
+        for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+            let index = ((top + y) * picture.width + left + x) as usize * 3;
+            let pixel = [0, 1, 2].map(|sample| picture.rgb[index + sample]);
+            mosaic.put_pixel(tile % columns * side + x, tile / columns * side + y, Rgb(pixel));
+        }
+    }
+    let (width, height) = mosaic.dimensions();
+    let name = format!("{columns} x {rows} tiles");
+    Some(TestPicture { name, path: PathBuf::new(), width, height, rgb: mosaic.into_raw() })
+}
+
 /// All PNGs of a folder by name, or `at_most` of them, evenly spread.
 pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPicture>> {
     let unreadable = || format!("cannot read the folder {}", folder.display());
@@ -150,6 +176,20 @@ mod tests {
         assert_eq!(reds, [0, 3, 3, 0, 0, 6, 9, 9, 6, 6, 6, 9, 9, 6, 6]);
         assert_eq!(picture.mirrored(2, 2).rgb, picture.rgb);
         assert_eq!(picture.mirrored(1, 1).rgb, [0, 1, 2]);
+    }
+
+    #[test]
+    fn a_mosaic_has_every_tile_once() {
+        let picture = |width: u32, height: u32, first: u8| {
+            let rgb = (0..(width * height * 3) as u8).map(|sample| first + sample).collect();
+            TestPicture { name: String::new(), path: PathBuf::new(), width, height, rgb }
+        };
+        let (wide, high) = (picture(3, 1, 0), picture(1, 2, 100));
+        let mosaic = mosaic(&[&wide, &high], (2, 2), 1).expect("there are five tiles");
+        assert_eq!((mosaic.width, mosaic.height), (2, 2));
+        assert_eq!(mosaic.rgb, [0, 1, 2, 3, 4, 5, 6, 7, 8, 100, 101, 102]);
+        assert!(super::mosaic(&[&wide], (2, 2), 1).is_none());
+        assert!(super::mosaic(&[&wide], (1, 1), 2).is_none());
     }
 
     #[test]

@@ -61,6 +61,13 @@ impl<const K: usize, const V: usize> Store<K, V> {
         Ok(Self { file, rows, machine: machine.to_owned() })
     }
 
+    /// The measurement under a key, if there is one.
+    pub(crate) fn find(&self, version: &str, key: [&str; K]) -> Option<[f64; V]> {
+        let key: Vec<String> =
+            [self.machine.as_str(), version].into_iter().chain(key).map(str::to_owned).collect();
+        self.rows.get(&key).copied()
+    }
+
     /// The measurement under a key: from the file, or else made now and appended to it.
     pub(crate) fn get(
         &mut self,

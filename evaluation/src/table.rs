@@ -36,11 +36,13 @@ pub(crate) fn percent(share: Option<f64>) -> String {
     share.map_or_else(|| "-".into(), |share| format!("{:+.1} %", 100.0 * share))
 }
 
-/// The median (of an even number of values the upper one), `None` of nothing.
+/// The median (of an even number of values the mean of the two in the middle), `None` of nothing.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let upper = *values.get(values.len() / 2)?;
+    let lower = values[(values.len() - 1) / 2];
+    Some(f64::midpoint(lower, upper))
 }
 
 /// The mean, `None` of nothing.
@@ -77,7 +79,7 @@ mod tests {
     #[test]
     fn statistics() {
         assert_eq!(median([3.0, 9.0, 1.0]), Some(3.0));
-        assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(3.0));
+        assert_eq!(median([4.0, 1.0, 3.0, 2.0]), Some(2.5));
         assert_eq!(mean([3.0, 9.0, 0.0]), Some(4.0));
         assert_eq!((median([]), mean([])), (None, None));
         assert_eq!(percent(Some(-0.125)), "-12.5 %");

@@ -41,14 +41,25 @@ impl Version {
         picture: &TestPicture,
         bytes: f64,
     ) -> Result<Self> {
-        let settings = settings(baseline);
-        let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
-        let mut trip =
-            |setting: &str| worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2]);
-        let setting = nearest(&settings, bytes, |setting| Ok(trip(setting)?.bytes))?;
-        let trip = trip(setting)?;
+        let setting = nearest_setting(worker, baseline, picture, bytes)?;
+        let trip = worker.round_trip(baseline.id, &setting, picture, Some(1), [1; 2])?;
         Ok(Self { bytes: trip.bytes, samples: trip.decoded, report: None })
     }
+}
+
+/// The setting of a baseline whose file of a picture is nearest in size.
+pub(crate) fn nearest_setting(
+    worker: &mut Worker,
+    baseline: &Baseline,
+    picture: &TestPicture,
+    bytes: f64,
+) -> Result<String> {
+    let settings = settings(baseline);
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let setting = nearest(&settings, bytes, |setting| {
+        Ok(worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?.bytes)
+    })?;
+    Ok(setting.to_owned())
 }
 
 /// The baseline of a name.

@@ -1,26 +1,24 @@
-//! What each effort costs, and how long it takes to reach the PSNR of other codecs.
+//! What each effort costs, and what single pictures cost.
 
-use anyhow::{Context, Result};
-use image_gip::{ColorModel, Source, Target, Threads};
+use anyhow::Result;
+use image_gip::{ColorModel, Encoder, Source, Target, Threads};
 
-use super::rate_store::RateStore;
-use crate::baselines::{BASELINES, Baseline};
-use crate::bench::{Bench, timing_version};
-use crate::curve::Curve;
-use crate::pictures::TestPicture;
+use crate::bench::Bench;
+use crate::pictures::{self, TestPicture};
 use crate::store::Store;
 use crate::table::{Table, mean, median};
-use crate::versions::nearest;
 use crate::{gip, memory};
 
 const QUICK_EFFORTS: [u8; 3] = [1, 3, 5];
-/// Those whose PSNR is to be reached.
-const RIVALS: [&str; 2] = ["AVIF tune=psnr", "WebP"];
-/// The rivals' times are medians over so many runs.
-const REPEATS: u32 = 5;
+/// An encoding is timed so often, or until all of its runs have taken so many seconds.
+const RUNS: usize = 5;
+const SECONDS: f64 = 4.0;
+/// The tiles of the largest picture: 25 megapixels.
+const TILES: (u32, u32) = (12, 8);
+const TILE: u32 = 512;
 
-/// Measurements of our encoder: PSNR, seconds, peak memory in bytes.
-type EncodingStore = Store<3, 3>;
+/// Measurements of our encoder: PSNR, seconds with one thread and with all, peak memory in bytes.
+type EncodingStore = Store<2, 4>;
 
 /// An encoding of one picture with an effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,19 +30,15 @@ struct Encoding {
     memory: f64,
 }
 
-/// Of files with about `rate` bits per pixel.
-pub(super) fn measure(bench: &mut Bench, kodak: &[TestPicture], rate: f64) -> Result<String> {
+/// What each effort costs on sets of pictures, each with its name, in files of about `rate` bits per pixel.
+pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64) -> Result<String> {
     let mut text = format!(
-        "\n### Efforts\n\nCompared with each other, then with the named codecs: our encoder, tuned \
-         for PSNR, asked for {rate} bits per pixel. Times are those of the encoder from samples in \
-         memory to a verified file in memory; all threads where none are named. Memory is the \
-         encoder's peak memory without the source. The times to another codec's PSNR at {rate} bits \
-         per pixel (interpolated between its settings) are interpolated between efforts, and divided \
-         by that codec's own, with all threads, too: medians over the pictures, and the least and \
-         the largest. Where the lowest effort is better already, its time is taken.\n",
+        "\n### Efforts\n\nCompared with each other: our encoder, tuned for PSNR, asked for {rate} bits per pixel. \
+         Times are those of the encoder from samples in memory to a verified file in memory, of one thread and of \
+         all in turns; all where none are named. Memory is the encoder's peak memory without the source. PSNR is \
+         a mean over the pictures, all else medians.\n",
     );
-    let large = bench.large.clone();
-    for (name, pictures) in [("Kodak", kodak), ("Large pictures", &large)] {
+    for &(name, pictures) in sets {
         if !pictures.is_empty() {
             text.push_str(&format!("\n{name}, {} pictures:\n", pictures.len()));
             text.push_str(&set(bench, pictures, rate)?);
@@ -53,62 +47,46 @@ pub(super) fn measure(bench: &mut Bench, kodak: &[TestPicture], rate: f64) -> Re
     Ok(text)
 }
 
-fn set(bench: &mut Bench, pictures: &[TestPicture], rate: f64) -> Result<String> {
+fn set(bench: &Bench, pictures: &[TestPicture], rate: f64) -> Result<String> {
     let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
     let mut store: EncodingStore = bench.store(
         "encoding.csv",
-        ["effort", "threads", "image"],
-        ["psnr", "encode_seconds", "encode_peak_memory"],
+        ["effort", "image"],
+        ["psnr", "seconds_one", "seconds_all", "peak_memory"],
     )?;
     let mut by_picture = Vec::new();
     for picture in pictures {
-        let encodings =
-            efforts.iter().map(|&effort| encoding(&mut store, bench, effort, picture, rate));
+        let encodings = efforts.iter().map(|&effort| {
+            let key = [&effort.to_string(), picture.name.as_str()];
+            let values = store.get(&bench.product, key, || {
+                let encoder = gip::psnr_encoder(effort).with_target(Target::BitsPerPixel(rate));
+                measured(&encoder, picture)
+            })?;
+            let [psnr, one, all, memory] = values;
+            let megapixels = 1e-6 * picture.pixels();
+            Ok(Encoding { megapixels, psnr, seconds: [one, all], memory })
+        });
         by_picture.push(encodings.collect::<Result<Vec<_>>>()?);
     }
-    let mut text = effort_table(efforts, &by_picture);
-    let (mut files, mut times) = (RateStore::open(bench)?, rival_times(bench)?);
-    let mut table = Table::new(&["time to the PSNR of", "over its own time", "from", "to"]);
-    for name in RIVALS {
-        let rival = BASELINES.iter().find(|baseline| baseline.name == name).context(name)?;
-        let mut ratios = Vec::new();
-        for (picture, encodings) in pictures.iter().zip(&by_picture) {
-            let (psnr, seconds) =
-                rival_at_rate(&mut files, &mut times, bench, rival, picture, rate)?;
-            ratios.push(seconds_to(psnr, encodings).unwrap_or(f64::INFINITY) / seconds);
-        }
-        let cell = |value: f64| format!("{value:.2}");
-        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = ratios.iter().copied().fold(0.0, f64::max);
-        let middle = median(ratios).unwrap_or(f64::NAN);
-        table.row(&[name.to_owned(), cell(middle), cell(least), cell(most)]);
-    }
-    text.push_str(&table.finish());
-    Ok(text)
+    Ok(effort_table(efforts, &by_picture))
 }
 
-fn encoding(
-    store: &mut EncodingStore,
-    bench: &Bench,
-    effort: u8,
-    picture: &TestPicture,
-    rate: f64,
-) -> Result<Encoding> {
-    let mut with = |label: &str, threads: Threads| {
-        store.get(&bench.product, [&effort.to_string(), label, &picture.name], || {
-            let source =
-                Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
-            let target = Target::BitsPerPixel(rate);
-            let encoder = gip::psnr_encoder(effort).with_target(target).with_threads(threads);
-            let (encoded, memory) = memory::peak(|| encoder.encode(&source));
-            let report = encoded?.report;
-            Ok([report.psnr, report.seconds, memory])
-        })
+/// PSNR, seconds with one thread and with all, peak memory with all.
+fn measured(encoder: &Encoder, picture: &TestPicture) -> Result<[f64; 4]> {
+    let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
+    let (mut one, mut all) = (Vec::new(), Vec::new());
+    let encode = |threads| encoder.clone().with_threads(threads).encode(&source);
+    let (report, memory) = loop {
+        let (encoded, memory) = memory::peak(|| encode(Threads::Pool));
+        let report = encoded?.report;
+        all.push(report.seconds);
+        one.push(encode(Threads::One)?.report.seconds);
+        if all.len() == RUNS || one.iter().chain(&all).sum::<f64>() > SECONDS {
+            break (report, memory);
+        }
     };
-    let [psnr, one, _] = with("one", Threads::One)?;
-    let [_, all, memory] = with("all", Threads::Pool)?;
-    let megapixels = f64::from(picture.width) * f64::from(picture.height) * 1e-6;
-    Ok(Encoding { megapixels, psnr, seconds: [one, all], memory })
+    let [one, all] = [one, all].map(|seconds| median(seconds).unwrap_or(f64::NAN));
+    Ok([report.psnr, one, all, memory])
 }
 
 /// What each effort costs per megapixel.
@@ -143,68 +121,69 @@ fn effort_table(efforts: &[u8], by_picture: &[Vec<Encoding>]) -> String {
     table.finish()
 }
 
-/// The encoding times of other codecs in seconds, with all threads.
-fn rival_times(bench: &Bench) -> Result<Store<2, 1>> {
-    bench.store("encoding-others.csv", ["codec", "image"], ["encode_seconds"])
-}
-
-/// A codec's PSNR in dB at a rate, and its encoding time at the nearest setting with all threads.
-fn rival_at_rate(
-    files: &mut RateStore,
-    times: &mut Store<2, 1>,
-    bench: &mut Bench,
-    rival: &Baseline,
-    picture: &TestPicture,
-    rate: f64,
-) -> Result<(f64, f64)> {
-    let product = bench.product.clone();
-    let (worker, versions) = bench.baselines()?;
-    let mut curve = Vec::new();
-    for setting in rival.settings {
-        let point = files.baseline(worker, &versions, rival, setting, picture)?;
-        curve.push((point.rate, point.distortion.psnr));
+/// What single pictures of all sets cost at the default effort, and one of 25 megapixels.
+pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
+    let mut sets = bench.sets();
+    for (name, pictures) in [("large", &bench.large), ("screens", &bench.screens)] {
+        sets.push(pictures::PictureSet { name, pictures: pictures.clone() });
     }
-    let setting = nearest(rival.settings, rate, |setting| {
-        Ok(files.baseline(worker, &versions, rival, setting, picture)?.rate)
-    })?;
-    let [seconds] =
-        times.get(&timing_version(&product, &versions), [rival.id, &picture.name], || {
-            let trip = worker.round_trip(rival.id, setting, picture, None, [REPEATS, 1])?;
-            Ok([trip.encode_seconds])
-        })?;
-    let psnr = Curve::new(curve).quality(rate).context("no file of about this rate")?;
-    Ok((psnr, seconds))
-}
-
-/// Seconds with all threads until a PSNR is reached; `None` if no effort reaches it.
-fn seconds_to(psnr: f64, encodings: &[Encoding]) -> Option<f64> {
-    let reached = encodings.iter().position(|encoding| encoding.psnr >= psnr)?;
-    let at = &encodings[reached];
-    let Some(before) = reached.checked_sub(1).map(|index| &encodings[index]) else {
-        return Some(at.seconds[1]);
-    };
-    let share = (psnr - before.psnr) / (at.psnr - before.psnr);
-    Some(before.seconds[1] * (at.seconds[1] / before.seconds[1]).powf(share))
+    sets.retain(|set| !set.pictures.is_empty());
+    let mut store: EncodingStore = bench.store(
+        "encoding-pictures.csv",
+        ["set", "image"],
+        ["psnr", "seconds_one", "seconds_all", "peak_memory"],
+    )?;
+    let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
+    let (mut names, mut times) = (Vec::new(), Vec::new());
+    let mut all = Vec::new();
+    for set in &sets {
+        names.push(set.name);
+        for picture in &set.pictures {
+            let key = [set.name, &picture.name];
+            let [_, _, seconds, _] =
+                store.get(&bench.product, key, || measured(&encoder, picture))?;
+            times.push((
+                seconds / picture.pixels() * 1e6,
+                format!("{} ({})", picture.name, set.name),
+            ));
+            all.push(picture);
+        }
+    }
+    times.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let middle = median(times.iter().map(|&(seconds, _)| seconds)).unwrap_or(f64::NAN);
+    let mut table = Table::new(&["picture", "s per megapixel", "over the median"]);
+    let ends = times.iter().take(1).chain(times.iter().rev().take(5).rev());
+    for (seconds, name) in ends {
+        let cells = [format!("{seconds:.2}"), format!("{:.2}", seconds / middle)];
+        table.row(&[std::slice::from_ref(name), &cells[..]].concat());
+    }
+    let mut text = format!(
+        "\n### Single pictures\n\nCompared with each other: the {} pictures of {}, at effort {} and {rate} bits per \
+         pixel, with all threads. The median is {middle:.2} seconds per megapixel; these are the fastest and the \
+         slowest.\n{}",
+        times.len(),
+        names.join(", "),
+        gip::EFFORT,
+        table.finish(),
+    );
+    if let Some(mosaic) = pictures::mosaic(&all, TILES, TILE) {
+        let key = ["mosaic", mosaic.name.as_str()];
+        let values = store.get(&bench.product, key, || measured(&encoder, &mosaic))?;
+        let [_, one, all, memory] = values;
+        text.push_str(&format!(
+            "\nA picture of {:.0} megapixels, a mosaic of {} tiles of {TILE} x {TILE} pixels of these pictures, none of \
+             them twice, takes {all:.1} seconds ({one:.1} with one thread) and {:.1} bytes of memory per pixel.\n",
+            1e-6 * mosaic.pixels(),
+            TILES.0 * TILES.1,
+            memory / mosaic.pixels(),
+        ));
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_time_to_a_psnr_is_that_of_the_first_effort_that_reaches_it() {
-        let encoding = |psnr: f64, all: f64| Encoding {
-            megapixels: 1.0,
-            psnr,
-            seconds: [2.0 * all, all],
-            memory: 1.0,
-        };
-        let efforts = [encoding(30.0, 1.0), encoding(32.0, 4.0), encoding(32.5, 8.0)];
-        assert_eq!(seconds_to(29.0, &efforts), Some(1.0));
-        assert_eq!(seconds_to(31.0, &efforts), Some(2.0));
-        assert_eq!(seconds_to(32.0, &efforts), Some(4.0));
-        assert_eq!(seconds_to(33.0, &efforts), None);
-    }
 
     #[test]
     fn efforts_are_told_per_megapixel() {

@@ -26,8 +26,7 @@ pub(crate) fn description(iterations: u32) -> String {
     format!(
         "The published methods run for {iterations} iterations (the paper: {PAPER_ITERATIONS}) and \
          halve their learning rates each time the same share ({HALVING}) of the iterations has \
-         passed; all else is as published. With fewer iterations than in the paper they are worse \
-         than they can be. All run in this crate, with its renderer and optimizer, on this \
+         passed; all else is as published. All run in this crate, with its renderer and optimizer, on this \
          machine's processor."
     )
 }

@@ -19,6 +19,7 @@ pub(crate) mod printed;
 mod product_tests;
 pub(crate) mod quality;
 mod quantizers;
+mod race;
 pub(crate) mod rate;
 mod rate_store;
 mod reference;

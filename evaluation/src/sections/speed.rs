@@ -4,7 +4,7 @@ use anyhow::Result;
 use image_gip::{Target, Threads};
 
 use super::rate_store::RateStore;
-use super::{encoding, growth};
+use super::{encoding, growth, race};
 use crate::baselines::{BASELINES, DESCRIPTION};
 use crate::bench::{Bench, timing_version};
 use crate::comparison::{Better, NamedFigures, better_than};
@@ -34,6 +34,10 @@ const TIMES: [&str; 4] = [
 ];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let (kodak, large) = (pictures(bench), bench.large.clone());
+    let sets = [("Kodak", &kodak[..]), ("Large pictures", &large[..])];
+    // What matters most comes first, so that a run that is interrupted has it.
+    let races = race::measure(bench, &sets)?;
     let rows = measure_all(bench)?;
     let mut text = format!(
         "Compared with: {DESCRIPTION} On each picture they are at the setting whose rate is \
@@ -57,8 +61,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
             text.push_str(&format!("\n![{title}]({name})\n"));
         }
     }
-    let kodak = pictures(bench);
-    text.push_str(&encoding::measure(bench, &kodak, RATE)?);
+    text.push_str(&races);
+    text.push_str(&encoding::efforts(bench, &sets, RATE)?);
+    text.push_str(&encoding::single_pictures(bench, RATE)?);
     text.push_str(&growth::measure(bench)?);
     Ok(text)
 }

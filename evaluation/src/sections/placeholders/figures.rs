@@ -116,7 +116,7 @@ mod tests {
         let ours = [[90.0, 10.0, 20.0], [91.0, 20.0, 22.0], [92.0, 30.0, 24.0]];
         let theirs = [[f64::NAN; 3], [91.0, 21.0, 19.0], [92.0, 11.0, 18.0]];
         assert_eq!(cell(&ours, &ours), "20.0 (20.0); 22.00 dB; 0");
-        assert_eq!(cell(&theirs, &ours), "16.0 (21.0); 18.50 dB; 1; none of 1");
+        assert_eq!(cell(&theirs, &ours), "16.0 (16.0); 18.50 dB; 1; none of 1");
         assert_eq!(cell(&theirs[..1], &ours), "none");
     }
 
