@@ -117,11 +117,21 @@ class Team {
   }
 }
 
+/** What is loaded; if it cannot be, as without a connection, the next picture tries all again. */
+async function loaded(load) {
+  try {
+    return await load();
+  } catch (error) {
+    [canStart, canHaveThreads] = [true, canShare];
+    throw error;
+  }
+}
+
 /** This thread, where there can be no worker: the page stands still meanwhile. */
 const ownThread = {
   async run({ image, options }, _, onprogress, signal) {
-    const { encode, load } = await import('./encoder-core.js');
-    await load();
+    const { encode, load } = await loaded(() => import('./encoder-core.js'));
+    await loaded(load);
     await new Promise((resolve) => setTimeout(resolve));
     signal?.throwIfAborted();
     return encode(image, { ...options, onprogress: (progress) => void onprogress?.(progress) });

@@ -517,3 +517,21 @@ for (const style of fits) {
     });
   });
 }
+
+test('when the decoder could not be loaded, the next picture tries again', async () => {
+  await withPage(script, async (page) => {
+    await page.evaluate(() => customElements.whenDefined('gip-image'));
+    const outcome = () =>
+      page.evaluate(async () => {
+        const image = document.createElement('gip-image');
+        image.src = '/picture.gip';
+        document.body.append(image);
+        return image.decode().then(() => 'shown', ({ cause }) => cause.name);
+      });
+    const ofDecoder = /dist.(core|worker).js/;
+    await page.context().route(ofDecoder, (route) => route.abort());
+    assert.equal(await outcome(), 'TypeError');
+    await page.context().unroute(ofDecoder);
+    assert.equal(await outcome(), 'shown');
+  }, { quiet: true });
+});
