@@ -25,6 +25,8 @@ export const KEYS = [
 
 /** Whether a control has the focus that uses the key itself. */
 function isOfControl({ key, target }) {
+  // A menu takes arrows, Space, and the letters that its entries begin with.
+  if (target.closest('select')) return true;
   if (target.closest('input')) return /^(Arrow|Page|Home|End)/.test(key);
   return key === ' ' && target.closest('button, summary') !== null;
 }

@@ -175,6 +175,7 @@ function setRival(bitmap, name, text) {
   find('#beside').textContent = name;
   setComparing(bitmap !== null);
   announce(text);
+  message.hidden = true;
   if (bitmap) find('#maker [name="size"]').textContent = text;
   else tell(text);
 }
@@ -281,4 +282,4 @@ listenToKeys(stage, actions);
 new PointerInput(stageElement, stage);
 setPanel(matchMedia('(min-width: 70rem)').matches);
 
-if (parameters.has('src')) open((signal) => fromUrl(parameters.get('src'), signal));
+if (parameters.get('src')) open((signal) => fromUrl(parameters.get('src'), signal));
