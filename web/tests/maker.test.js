@@ -131,6 +131,7 @@ onPage('it is compared with what the browser makes of as many bytes', {}, async 
 onPage('a .gip that is opened takes its place, and encoding can be stopped', {}, async (page) => {
   await drop(page, await picture(page, { width: 640, height: 480 }));
   await page.waitForSelector('#maker [name="cancel"]:not([hidden])');
+  assert.ok(await page.isHidden('#welcome'), 'the picture is there already');
   await page.click('#maker [name="cancel"]');
   await page.waitForSelector('#maker[aria-busy="false"]');
   const sample = await readFile(new URL('../sample/sumac.gip', import.meta.url));
