@@ -41,7 +41,7 @@ async function answer(request) {
 }
 
 addEventListener('install', () => skipWaiting());
-addEventListener('activate', (event) => event.waitUntil(clients.claim()));
+for (const type of ['activate', 'message']) addEventListener(type, (event) => event.waitUntil(clients.claim()));
 addEventListener('fetch', (event) => {
   const { request } = event;
   // `<gip-image>` and other scripts get the file itself.

@@ -74,8 +74,24 @@ test('images, sources and backgrounds are shown, on the first visit and on later
     assert.ok(await keepsRules());
     await page.reload();
     await until(isShown, 'all pictures on the next visit');
+    const session = await page.context().newCDPSession(page);
+    await session.send('Page.reload', { ignoreCache: true });
+    await page.waitForFunction(() => navigator.serviceWorker.controller === null && document.readyState === 'complete');
+    const install = (script) => page.evaluate(async (script) => (await import('/dist/transparent.js')).install(script).then(() => 'is there', ({ message }) => message), script);
+    assert.equal(await install('/service-worker.js'), 'is there');
+    await until(isShown, 'all pictures of a page that was loaded without the cache');
     // Scripts get the file itself.
     const size = await page.evaluate(async () => (await (await fetch('/photo.gip')).arrayBuffer()).byteLength);
     assert.equal(size, picture.length);
   }, { quiet: true });
+});
+
+test('a service worker that is for other pages is told', async () => {
+  await withPage('', async (page) => {
+    const message = await page.evaluate(async () => {
+      const { install } = await import('/dist/transparent.js');
+      return install('/dist/service-worker.js').then(() => null, ({ message }) => message);
+    });
+    assert.match(message, /is for http.*\/dist\/, and not for this page/);
+  });
 });
