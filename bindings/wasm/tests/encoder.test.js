@@ -188,8 +188,13 @@ test('a browser encodes what it can draw, and keeps Display P3', async () => {
     }
     const { file } = await encode(blob, { gaussians: 30, effort: 1, colorSpace: 'display-p3' });
     const picture = await open(file);
-    return { facts, cicp: [...(await picture.metadata()).cicp] };
+    const refused = [];
+    for (const source of [document.createElement('video'), Object.assign(document.createElement('canvas'), { width: 0 }), document.createElementNS('http://www.w3.org/2000/svg', 'image')]) {
+      await encode(source).catch(({ name, message }) => refused.push(`${name}: ${message}`));
+    }
+    return { facts, refused, cicp: [...(await picture.metadata()).cicp] };
   });
+  assert.match(found.refused.join('; '), /^RangeError: .* 0 x 0 pixels; RangeError: .* 0 x 150 pixels; TypeError: a picture must have data/);
   for (const fact of found.facts) assert.deepEqual(fact, [40, 'rgb', null, found.facts[0][3]]);
   assert.deepEqual(found.cicp, [12, 13]);
 });
