@@ -86,8 +86,9 @@ export async function install(script = '/service-worker.js', options = {}) {
   const wasControlled = serviceWorker.controller !== null;
   const registration = await serviceWorker.register(address, { scope: options.scope });
   if (wasControlled) return registration;
+  const { scope } = registration;
   // Nothing would come of waiting.
-  if (!location.href.startsWith(registration.scope)) throw new Error(`the service worker is for ${registration.scope}, and not for this page`);
+  if (!location.href.startsWith(scope)) throw new Error(`the service worker is for ${scope}, and not for this page`);
   if (!serviceWorker.controller) {
     const controlled = new Promise((resolve) => serviceWorker.addEventListener('controllerchange', resolve, { once: true }));
     // It is there, and left this page alone, which was loaded anew without the cache.

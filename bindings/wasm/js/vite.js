@@ -37,6 +37,12 @@ function optionsOf(query, common) {
   return { ...Object.fromEntries(kept), ...own };
 }
 
+/** Runs the tool. An error is what it says. */
+const runTool = (...args) =>
+  run('gip', args).catch((cause) => {
+    throw new Error(cause.stderr?.trim() || `the tool gip does not run: ${cause.message}`, { cause });
+  });
+
 /** Encodes with the tool that is installed. */
 async function encodeByTool(source, options, folder) {
   const output = join(folder, `${randomUUID()}.gip`);
@@ -47,7 +53,7 @@ async function encodeByTool(source, options, folder) {
   try {
     // A page need not tell where a picture was taken, and a placeholder has no room for a profile.
     const metadata = options === placeholderOptions ? 'none' : 'safe';
-    await run('gip', ['encode', source, output, '--metadata', metadata, ...flags]);
+    await runTool('encode', source, output, '--metadata', metadata, ...flags);
     return await readFile(output);
   } finally {
     await rm(output, { force: true });
@@ -71,7 +77,7 @@ async function encodeByModule(source, options, root) {
 }
 
 /** Whether the tool is there. */
-const hasTool = () => run('gip', ['--version']).then(() => true, () => false);
+const hasTool = () => runTool('--version').then(() => true, () => false);
 
 /** The size in the header of a file; all that are made here are upright. */
 function sizeOf(file) {

@@ -116,7 +116,8 @@ test('an encoding can be aborted, and the next one is none the worse', async () 
 test('pictures that wait for a worker can be aborted as well', async () => {
   const controller = new AbortController();
   const { signal } = controller;
-  const all = Array.from({ length: availableParallelism() + 1 }, () => encode(sample({ width: 320, height: 240 }), { effort: 7, signal }));
+  const picture = sample({ width: 320, height: 240 });
+  const all = Array.from({ length: availableParallelism() + 1 }, () => encode(picture, { effort: 7, signal }));
   const waiting = new AbortController();
   const last = encode(sample(), { ...options, signal: waiting.signal });
   waiting.abort();
@@ -189,7 +190,9 @@ test('a browser encodes what it can draw, and keeps Display P3', async () => {
     const { file } = await encode(blob, { gaussians: 30, effort: 1, colorSpace: 'display-p3' });
     const picture = await open(file);
     const refused = [];
-    for (const source of [document.createElement('video'), Object.assign(document.createElement('canvas'), { width: 0 }), document.createElementNS('http://www.w3.org/2000/svg', 'image')]) {
+    const empty = Object.assign(document.createElement('canvas'), { width: 0 });
+    const ofSvg = document.createElementNS('http://www.w3.org/2000/svg', 'image');
+    for (const source of [document.createElement('video'), empty, ofSvg]) {
       await encode(source).catch(({ name, message }) => refused.push(`${name}: ${message}`));
     }
     return { facts, refused, cicp: [...(await picture.metadata()).cicp] };

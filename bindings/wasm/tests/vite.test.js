@@ -21,6 +21,7 @@ writeFileSync(log, '');
 // It takes what is to be its result, and tells how it was called.
 const tool = `#!/bin/sh
 [ "$1" = --version ] && exit
+case "$*" in *'--quality 99'*) echo 'error: no such quality' >&2; exit 1; esac
 echo "$@" >>'${log}'
 cp '${join(folder, 'made.gip')}' "$3"
 `;
@@ -80,6 +81,14 @@ test('a picture is encoded once for each set of options, with those of the impor
   assert.match(first, /--metadata safe --bytes 9000 --effort 1$/);
   assert.match(second, /--metadata safe --quality 70 --effort 1$/);
   assert.equal(calls().filter((call) => call.endsWith('--metadata none --bytes 300 --effort 4')).length, 1);
+});
+
+test('what the tool says is the error, or that there is none', async () => {
+  await assert.rejects(pluginFor('build').load('gip&quality=99'), { message: 'error: no such quality' });
+  const { PATH } = process.env;
+  process.env.PATH = '';
+  await assert.rejects(pluginFor('build', { encoder: 'gip' }).load('gip&quality=1'), /the tool gip does not run: spawn gip ENOENT/);
+  process.env.PATH = PATH;
 });
 
 test('what is damaged in the cache is made again', async () => {
