@@ -277,7 +277,9 @@ message.querySelector('button').addEventListener('click', () => {
 for (const { label, does } of KEYS) {
   find('#keys').append(element('dt', {}, element('kbd', {}, label)), element('dd', {}, does));
 }
-listenForFiles({ target: find('#drop-target'), picker: find('#picker'), onFiles: openFiles });
+// A folder, or a file that has gone, cannot be read.
+const onFiles = (files) => void openFiles(files).catch(fail);
+listenForFiles({ target: find('#drop-target'), picker: find('#picker'), onFiles });
 listenToKeys(stage, actions);
 new PointerInput(stageElement, stage);
 setPanel(matchMedia('(min-width: 70rem)').matches);

@@ -165,6 +165,17 @@ onPage('its menus are chosen from with keys', {}, async (page) => {
   await page.keyboard.press('o');
   assert.equal(await page.inputValue('#maker [name="rival"]'), 'original');
   assert.equal(await page.getAttribute('[data-action="outlines"]', 'aria-pressed'), 'false');
+  await page.keyboard.press('?');
+  assert.ok(await page.isVisible('#help'));
+});
+
+onPage('what cannot be read, such as a folder, is told', {}, async (page) => {
+  await page.evaluate(() => {
+    Blob.prototype.arrayBuffer = () => Promise.reject(new DOMException('It has gone.', 'NotFoundError'));
+  });
+  await drop(page, { name: 'folder', bytes: Buffer.alloc(0) });
+  await page.waitForSelector('#message:not([hidden])');
+  assert.equal(await page.textContent('#message p'), 'It has gone.');
 });
 
 const threads = new URL('../../bindings/wasm/dist/encoder-threads.js', import.meta.url);
