@@ -383,7 +383,10 @@ export class GipImageElement extends ImageAttributes {
           const image = await this.#render(loader, next);
           if (this.#loader === loader && this.#near !== undefined) this.#show(image, next);
         } catch (error) {
-          if (this.#loader === loader) this.#fail(error);
+          if (this.#loader !== loader) continue;
+          // Where more pixels are beyond the limits, those that are there are stretched.
+          if (error.kind === 'limit' && this.#painting.drawn) break;
+          this.#fail(error);
         }
       }
     } finally {

@@ -535,3 +535,26 @@ test('when the decoder could not be loaded, the next picture tries again', async
     assert.equal(await outcome(), 'shown');
   }, { quiet: true });
 });
+
+test('a picture that is shown stays when more pixels are beyond the limits', async () => {
+  await withPage(element(''), async (page) => {
+    await page.evaluate(() => {
+      document.querySelector('gip-image').limits = { outputPixels: 96 * 64 };
+    });
+    await show(page, '/picture.gip');
+    const image = await canvasOf(page);
+    const shown = await page.evaluate(async () => {
+      const image = document.querySelector('gip-image');
+      image.style.width = '192px';
+      const canvas = image.shadowRoot.querySelector('canvas');
+      while (canvas.getBoundingClientRect().width < 192) await new Promise(requestAnimationFrame);
+      await new Promise((resolve) => setTimeout(resolve, 200));
+      return [image.complete, canvas.isConnected];
+    });
+    assert.deepEqual(shown, [true, true]);
+    assert.deepEqual(await canvasOf(page), image);
+    // At the size that it had before, nothing is the matter.
+    await page.evaluate(() => (document.querySelector('gip-image').style.width = '90px'));
+    await until(async () => (await canvasOf(page)).width === 90, 'the picture of another size');
+  });
+});
