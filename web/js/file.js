@@ -33,9 +33,17 @@ function decoded(part) {
   }
 }
 
+function urlOf(address) {
+  try {
+    return new URL(address, location.href);
+  } catch {
+    throw new Error(`${address} is no address`);
+  }
+}
+
 /** A file of the web. */
 export async function fromUrl(address, signal) {
-  const url = new URL(address, location.href);
+  const url = urlOf(address);
   if (!['http:', 'https:', 'blob:'].includes(url.protocol)) {
     throw new Error(`${url.protocol} addresses cannot be opened; use http: or https:`);
   }

@@ -25,7 +25,10 @@ export const KEYS = [
 
 /** Whether a control has the focus that uses the key itself. */
 function isOfControl({ key, target }) {
-  if (target.closest('input')) return /^(Arrow|Page|Home|End)/.test(key);
+  const moves = /^(Arrow|Page|Home|End)/.test(key);
+  // Entries of a menu are chosen by what they begin with as well.
+  if (target.closest('select')) return moves || /^[\w ]$/.test(key);
+  if (target.closest('input')) return moves;
   return key === ' ' && target.closest('button, summary') !== null;
 }
 

@@ -175,6 +175,7 @@ function setRival(bitmap, name, text) {
   find('#beside').textContent = name;
   setComparing(bitmap !== null);
   announce(text);
+  message.hidden = true;
   if (bitmap) find('#maker [name="size"]').textContent = text;
   else tell(text);
 }
@@ -276,9 +277,11 @@ message.querySelector('button').addEventListener('click', () => {
 for (const { label, does } of KEYS) {
   find('#keys').append(element('dt', {}, element('kbd', {}, label)), element('dd', {}, does));
 }
-listenForFiles({ target: find('#drop-target'), picker: find('#picker'), onFiles: openFiles });
+// A folder, or a file that has gone, cannot be read.
+const onFiles = (files) => void openFiles(files).catch(fail);
+listenForFiles({ target: find('#drop-target'), picker: find('#picker'), onFiles });
 listenToKeys(stage, actions);
 new PointerInput(stageElement, stage);
 setPanel(matchMedia('(min-width: 70rem)').matches);
 
-if (parameters.has('src')) open((signal) => fromUrl(parameters.get('src'), signal));
+if (parameters.get('src')) open((signal) => fromUrl(parameters.get('src'), signal));

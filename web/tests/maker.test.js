@@ -124,11 +124,14 @@ onPage('it is compared with what the browser makes of as many bytes', {}, async 
   await page.selectOption('#maker [name="rival"]', 'image/avif');
   await page.waitForSelector('#message:not([hidden])');
   assert.match(await page.textContent('#message p'), /does not write AVIF/);
+  await page.selectOption('#maker [name="rival"]', 'image/webp');
+  await page.waitForSelector('#message', { state: 'hidden' });
 });
 
 onPage('a .gip that is opened takes its place, and encoding can be stopped', {}, async (page) => {
   await drop(page, await picture(page, { width: 640, height: 480 }));
   await page.waitForSelector('#maker [name="cancel"]:not([hidden])');
+  assert.ok(await page.isHidden('#welcome'), 'the picture is there already');
   await page.click('#maker [name="cancel"]');
   await page.waitForSelector('#maker[aria-busy="false"]');
   const sample = await readFile(new URL('../sample/sumac.gip', import.meta.url));
@@ -138,13 +141,41 @@ onPage('a .gip that is opened takes its place, and encoding can be stopped', {},
   assert.equal(await page.isHidden('#maker'), true);
 });
 
-onPage('it fits on a phone', { viewport: { width: 360, height: 740 }, hasTouch: true, colorScheme: 'dark' }, async (page) => {
+for (const [place, width, height, least] of [['a phone', 360, 740, 300], ['a phone on its side', 640, 360, 200], ['a tablet', 820, 1180, 900]]) {
+  onPage(`it fits on ${place}`, { viewport: { width, height }, hasTouch: true, colorScheme: 'dark' }, async (page) => {
+    await drop(page, { ...(await picture(page)), name: 'a name that is long.png' });
+    await made(page);
+    const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+    assert.ok(wide <= width, wide);
+    const stage = await page.locator('#stage').boundingBox();
+    assert.ok(stage.height > least, stage.height);
+    const name = await page.locator('#name').boundingBox();
+    assert.ok(name.width > 100, name.width);
+    const [download] = await Promise.all([page.waitForEvent('download'), page.click('#maker [name="download"]')]);
+    assert.equal(download.suggestedFilename(), 'a name that is long.gip');
+  });
+}
+
+onPage('its menus are chosen from with keys', {}, async (page) => {
   await drop(page, await picture(page));
   await made(page);
-  const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-  assert.ok(wide <= 360, wide);
-  const { height } = await page.locator('#stage').boundingBox();
-  assert.ok(height > 300, height);
+  await page.focus('#maker [name="rival"]');
+  await page.keyboard.press('ArrowDown');
+  assert.equal(await page.inputValue('#maker [name="rival"]'), 'image/jpeg');
+  await page.keyboard.press('o');
+  assert.equal(await page.inputValue('#maker [name="rival"]'), 'original');
+  assert.equal(await page.getAttribute('[data-action="outlines"]', 'aria-pressed'), 'false');
+  await page.keyboard.press('?');
+  assert.ok(await page.isVisible('#help'));
+});
+
+onPage('what cannot be read, such as a folder, is told', {}, async (page) => {
+  await page.evaluate(() => {
+    Blob.prototype.arrayBuffer = () => Promise.reject(new DOMException('It has gone.', 'NotFoundError'));
+  });
+  await drop(page, { name: 'folder', bytes: Buffer.alloc(0) });
+  await page.waitForSelector('#message:not([hidden])');
+  assert.equal(await page.textContent('#message p'), 'It has gone.');
 });
 
 const threads = new URL('../../bindings/wasm/dist/encoder-threads.js', import.meta.url);

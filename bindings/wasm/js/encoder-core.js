@@ -57,11 +57,17 @@ function encoderOf(options) {
   );
 }
 
+/** Bytes among the metadata. WebAssembly would take another object for some of its own. */
+function bytes(value, name) {
+  if (!(value instanceof Uint8Array)) throw new TypeError(`${name} must be a Uint8Array`);
+  return value;
+}
+
 /** Stores metadata with the picture. */
 function describe(encoder, { cicp, iccProfile, exif, xmp, texts = [] }) {
-  if (cicp) encoder.setCicp(...cicp);
-  if (iccProfile) encoder.setIccProfile(iccProfile);
-  if (exif) encoder.setExif(exif);
+  if (cicp) encoder.setCicp(...[0, 1].map((at) => number(cicp[at], 'cicp', 0, 255)));
+  if (iccProfile) encoder.setIccProfile(bytes(iccProfile, 'iccProfile'));
+  if (exif) encoder.setExif(bytes(exif, 'exif'));
   if (xmp) encoder.setXmp(xmp);
   for (const { keyword, text } of texts) encoder.addText(keyword, text);
 }

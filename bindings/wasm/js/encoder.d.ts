@@ -32,11 +32,11 @@ export function encode(
      * pictures that are encoded at the same time, and at most 16.
      */
     threads?: number;
-    /** Aborting it ends the workers at once. */
+    /** Aborting it rejects at once, and ends the workers of this picture. */
     signal?: AbortSignal;
-    /** Called on this thread, at most every 50 ms. */
+    /** Called on this thread, at most every 50 ms. What it throws ends the encoding, which rejects with it. */
     onprogress?: (progress: Progress) => void;
-    /** Whether the samples may be moved to the worker, so that they are not copied and gone afterwards. */
+    /** Whether the samples may be moved to the worker where they can be: they are not copied, and gone afterwards. */
     transfer?: boolean;
     /** The colour space in which what can be drawn is read. Default `srgb`. */
     colorSpace?: 'srgb' | 'display-p3';

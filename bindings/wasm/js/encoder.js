@@ -1,9 +1,11 @@
 // The encoder for scripts. It works in workers of its own, and never blocks the page.
 
+import { abortable } from './abortable.js';
 import { canShare, cores, mostPictures, source, starts } from './encoder-place.js';
 import { unpack } from './errors.js';
 import { number } from './numbers.js';
 import { pixelsOf } from './pictures.js';
+import { checked } from './pixels.js';
 import { firstOf } from './start.js';
 
 export { GipError, LimitError } from './errors.js';
@@ -47,20 +49,49 @@ class Team {
       this.#onprogress = onprogress;
       this.#settle = (error, result) => {
         signal?.removeEventListener('abort', abort);
-        if (error) reject(unpack(error));
+        if (error) reject(error);
         else resolve(result);
       };
-      this.#workers[0].postMessage(message, transfer);
+      try {
+        this.#send(message, transfer);
+      } catch (error) {
+        // Among the options is what cannot be copied, such as a function.
+        this.#rest();
+        this.#finish(error);
+      }
     });
   }
 
+  #send(message, transfer) {
+    const [first] = this.#workers;
+    try {
+      first.postMessage(message, transfer);
+    } catch {
+      // Shared memory, and a small `Buffer` of Node, are not moved.
+      first.postMessage(message);
+    }
+  }
+
   #hear({ progress, result, error }) {
-    if (progress) return this.#onprogress?.(progress);
-    const settle = this.#settle;
-    this.#settle = null;
+    if (progress) return this.#tell(progress);
     // After a trap, there is no telling what is in the memory.
     if (error?.kind === 'failed') this.end();
     else this.#rest();
+    this.#finish(error && unpack(error), result);
+  }
+
+  #tell(progress) {
+    try {
+      this.#onprogress?.(progress);
+    } catch (error) {
+      this.end();
+      this.#finish(error);
+    }
+  }
+
+  #finish(error, result) {
+    const settle = this.#settle;
+    this.#settle = this.#onprogress = null;
     settle?.(error, result);
   }
 
@@ -86,11 +117,21 @@ class Team {
   }
 }
 
+/** What is loaded; if it cannot be, as without a connection, the next picture tries all again. */
+async function loaded(load) {
+  try {
+    return await load();
+  } catch (error) {
+    [canStart, canHaveThreads] = [true, canShare];
+    throw error;
+  }
+}
+
 /** This thread, where there can be no worker: the page stands still meanwhile. */
 const ownThread = {
   async run({ image, options }, _, onprogress, signal) {
-    const { encode, load } = await import('./encoder-core.js');
-    await load();
+    const { encode, load } = await loaded(() => import('./encoder-core.js'));
+    await loaded(load);
     await new Promise((resolve) => setTimeout(resolve));
     signal?.throwIfAborted();
     return encode(image, { ...options, onprogress: (progress) => void onprogress?.(progress) });
@@ -144,15 +185,14 @@ async function nextTeam(asked) {
 /** The arrays of a picture that nobody else needs. */
 const buffersOf = (image, mayTake) => (mayTake && image?.data ? [image.data.buffer] : []);
 
-/** Encodes a picture; see the declarations. */
-export async function encode(picture, { signal, onprogress, transfer = false, colorSpace, threads, ...options } = {}) {
-  signal?.throwIfAborted();
-  if (threads !== undefined) number(threads, 'threads', 1, 64);
+async function work(picture, { signal, onprogress, transfer = false, colorSpace, threads, ...options }) {
   pictures += 1;
   try {
     const pixels = await pixelsOf(picture, colorSpace);
     signal?.throwIfAborted();
-    const { width, height, channels, data, colorSpace: space } = pixels ?? {};
+    // A worker may never hear of samples that are gone, as they are after they have been moved.
+    checked(pixels);
+    const { width, height, channels, data, colorSpace: space } = pixels;
     const image = { width, height, channels, data, colorSpace: space };
     const team = await nextTeam(threads);
     try {
@@ -163,4 +203,14 @@ export async function encode(picture, { signal, onprogress, transfer = false, co
   } finally {
     pictures -= 1;
   }
+}
+
+/** Encodes a picture; see the declarations. */
+export async function encode(picture, options = {}) {
+  const { signal, threads, onprogress } = options;
+  signal?.throwIfAborted();
+  if (threads !== undefined) number(threads, 'threads', 1, 64);
+  if (onprogress && typeof onprogress !== 'function') throw new TypeError('onprogress must be a function');
+  // Whoever waits for a team hears at once that the signal is aborted.
+  return abortable(work(picture, options), signal);
 }

@@ -231,7 +231,8 @@ export class GipImageElement extends ImageAttributes {
 
   /** Does what is to be done: begins, goes on, places what is there, and renders it anew. */
   #refresh() {
-    if (this.#state === 'waiting') this.#begin();
+    // Like `<img>`, it follows attributes that are set one after another, such as a source and its placeholder, together.
+    if (this.#state === 'waiting') queueMicrotask(() => this.#begin());
     if (this.#loader?.held && this.#due) this.#loader.release();
     if (!this.#header || !this.#loader) return;
     this.#orient();
@@ -248,7 +249,7 @@ export class GipImageElement extends ImageAttributes {
   }
 
   #begin() {
-    if (!this.hasAttribute('src')) return;
+    if (this.#state !== 'waiting' || !this.hasAttribute('src')) return;
     const placeholder = bytesOf(this.placeholder);
     if (!this.#due && !(placeholder && this.isConnected)) return;
     this.#state = 'loading';
@@ -269,11 +270,7 @@ export class GipImageElement extends ImageAttributes {
       const options = { init, limits: this.limits, placeholder };
       loader = new Loader(this.src, options, () => this.#arrived(loader), failed);
     } catch (error) {
-      // Listeners that are added after the attribute are to hear of it.
-      queueMicrotask(() => {
-        if (this.#state === 'loading' && !this.#loader) this.#fail(error);
-      });
-      return;
+      return this.#fail(error);
     }
     this.#loader = loader;
     if (this.#due) loader.release();
@@ -386,7 +383,10 @@ export class GipImageElement extends ImageAttributes {
           const image = await this.#render(loader, next);
           if (this.#loader === loader && this.#near !== undefined) this.#show(image, next);
         } catch (error) {
-          if (this.#loader === loader) this.#fail(error);
+          if (this.#loader !== loader) continue;
+          // Where more pixels are beyond the limits, those that are there are stretched.
+          if (error.kind === 'limit' && this.#painting.drawn) break;
+          this.#fail(error);
         }
       }
     } finally {

@@ -31,7 +31,7 @@ export function keyword(name, value) {
 // Where there are no elements, as in Node, the module can be imported all the same.
 const Base = globalThis.HTMLElement ?? class {};
 
-/** Defines a property that sets the attribute of the same name. */
+/** Defines a property that sets the attribute of the same name. Without a value, as frameworks take one back, there is none. */
 function define(property, get) {
   const name = property.toLowerCase();
   Object.defineProperty(ImageAttributes.prototype, property, {
@@ -39,26 +39,18 @@ function define(property, get) {
       return get(this, this.getAttribute(name), name);
     },
     set(value) {
-      this.setAttribute(name, value);
+      if (value == null) this.removeAttribute(name);
+      else this.setAttribute(name, value);
     },
     configurable: true,
   });
 }
 
-export class ImageAttributes extends Base {
-  get crossOrigin() {
-    const value = this.getAttribute('crossorigin');
-    return value === null ? null : keyword('crossorigin', value);
-  }
-
-  set crossOrigin(value) {
-    if (value === null) this.removeAttribute('crossorigin');
-    else this.setAttribute('crossorigin', value);
-  }
-}
+export class ImageAttributes extends Base {}
 
 define('src', (element, value) => (value ? new URL(value, element.baseURI).href : ''));
 for (const side of ['width', 'height']) define(side, (element) => Math.round(contentSize(element)[side]));
+define('crossOrigin', (_, value, name) => (value === null ? null : keyword(name, value)));
 for (const text of ['alt', 'placeholder']) define(text, (_, value) => value ?? '');
 for (const property of ['loading', 'fetchPriority', 'referrerPolicy', 'texture', 'detail']) {
   define(property, (_, value, name) => keyword(name, value));

@@ -1,5 +1,6 @@
 // The package's interface for scripts. It works in a worker of its own, and never blocks the page.
 
+import { abortable } from './abortable.js';
 import { allLimits } from './limits.js';
 import { Upright } from './orientation.js';
 import { RemoteDecoder } from './remote.js';
@@ -15,17 +16,6 @@ export {
   UnsupportedError,
 } from './errors.js';
 export { defaultLimits } from './limits.js';
-
-/** Rejects as soon as the signal is aborted. */
-function abortable(promise, signal) {
-  if (!signal) return promise;
-  return new Promise((resolve, reject) => {
-    const abort = () => reject(signal.reason);
-    if (signal.aborted) abort();
-    signal.addEventListener('abort', abort, { once: true });
-    promise.then(resolve, reject).finally(() => signal.removeEventListener('abort', abort));
-  });
-}
 
 /** Decodes bytes as they arrive, and renders what has arrived. */
 export class StreamDecoder extends Upright {

@@ -6,7 +6,6 @@ const isOf = (object, name) => typeof globalThis[name] === 'function' && object 
 const drawable = [
   'ImageBitmap',
   'HTMLImageElement',
-  'SVGImageElement',
   'HTMLCanvasElement',
   'OffscreenCanvas',
   'HTMLVideoElement',
@@ -22,6 +21,7 @@ const sizeOf = (image) => [
 /** Draws it, and reads the pixels, in Display P3 where that is asked for. */
 function draw(image, colorSpace) {
   const [width, height] = sizeOf(image);
+  if (!(width > 0 && height > 0)) throw new RangeError(`the picture has ${width} x ${height} pixels`);
   const canvas = new OffscreenCanvas(width, height);
   const context = canvas.getContext('2d', { colorSpace, willReadFrequently: true });
   context.drawImage(image, 0, 0);

@@ -25,24 +25,29 @@ function reduced(data, channels) {
   return samples;
 }
 
+/** The picture, if it has all of its samples. */
+export function checked(image) {
+  const { width, height, data, channels = 4 } = image ?? {};
+  const isEight = data instanceof Uint8Array || data instanceof Uint8ClampedArray;
+  if (!isEight && !(data instanceof Uint16Array)) {
+    throw new TypeError('a picture must have data: a Uint8Array, Uint8ClampedArray or Uint16Array');
+  }
+  if (![1, 2, 3, 4].includes(channels)) throw new RangeError(`channels is ${String(channels)}; it must be 1 to 4`);
+  if (!(data.length === width * height * channels)) {
+    throw new RangeError(`${data.length} samples; ${width} x ${height} pixels of ${channels} channels need others`);
+  }
+  return image;
+}
+
 /**
  * Width, height, channels, samples, and the codes of the colour space, if it is not sRGB. Without `channels`, the
  * picture is RGBA, as an `ImageData`, and channels in which there is nothing are left out.
  */
 export function samplesOf(image) {
-  const { width, height, data, channels, colorSpace } = image ?? {};
-  const isEight = data instanceof Uint8Array || data instanceof Uint8ClampedArray;
-  if (!isEight && !(data instanceof Uint16Array)) {
-    throw new TypeError('a picture must have data: a Uint8Array, Uint8ClampedArray or Uint16Array');
-  }
-  const given = channels ?? 4;
-  if (![1, 2, 3, 4].includes(given)) throw new RangeError(`channels is ${String(given)}; it must be 1 to 4`);
-  if (!(data.length === width * height * given)) {
-    throw new RangeError(`${data.length} samples; ${width} x ${height} pixels of ${given} channels need others`);
-  }
+  const { width, height, data, channels, colorSpace } = checked(image);
   const bytes = data instanceof Uint8ClampedArray ? new Uint8Array(data.buffer, data.byteOffset, data.length) : data;
   const cicp = cicpOf[colorSpace];
-  if (channels !== undefined || !isEight) return { width, height, channels: given, data: bytes, cicp };
+  if (channels !== undefined || data instanceof Uint16Array) return { width, height, channels: channels ?? 4, data: bytes, cicp };
   const least = channelsOf(bytes);
   return { width, height, channels: least, data: reduced(bytes, least), cicp };
 }

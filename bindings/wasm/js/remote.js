@@ -52,6 +52,14 @@ class OwnThread {
     return new Host(Decoder);
   });
 
+  constructor() {
+    // Without a connection, no worker started either: the next decoder tries all again.
+    this.#host.catch(() => {
+      own = null;
+      canStart = true;
+    });
+  }
+
   async call(id, method, argument) {
     const host = await this.#host;
     await new Promise((resolve) => setTimeout(resolve));
@@ -61,7 +69,7 @@ class OwnThread {
 }
 
 const threads = new Set();
-let canStart = typeof Worker === 'function';
+let canStart = true;
 let starting = null;
 let own = null;
 

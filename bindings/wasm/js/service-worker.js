@@ -10,15 +10,19 @@ const wasm = new URLSearchParams(location.search).get('wasm') ?? 'image_gip_bg.w
 async function pngOf(response) {
   await load(new URL(wasm, location));
   const decoder = new Decoder();
+  let png;
   try {
-    for await (const bytes of pieces(response.body)) decoder.feed(bytes);
-    decoder.finish();
-  } catch (error) {
-    // As browsers do, it shows the part that has arrived.
-    if (!(decoder.progress.gaussians > 0)) throw error;
+    try {
+      for await (const bytes of pieces(response.body)) decoder.feed(bytes);
+      decoder.finish();
+    } catch (error) {
+      // As browsers do, it shows the part that has arrived.
+      if (!(decoder.progress.gaussians > 0)) throw error;
+    }
+    png = await decoder.png();
+  } finally {
+    decoder.close();
   }
-  const png = await decoder.png();
-  decoder.close();
   return new Response(png, { headers: { 'Content-Type': 'image/png' } });
 }
 
@@ -37,7 +41,7 @@ async function answer(request) {
 }
 
 addEventListener('install', () => skipWaiting());
-addEventListener('activate', (event) => event.waitUntil(clients.claim()));
+for (const type of ['activate', 'message']) addEventListener(type, (event) => event.waitUntil(clients.claim()));
 addEventListener('fetch', (event) => {
   const { request } = event;
   // `<gip-image>` and other scripts get the file itself.

@@ -5,7 +5,8 @@
  * visit on they are there at once.
  *
  * `script` is the address of `service-worker.js` of this package, which must be on the page's own origin, at or above the
- * pages that it is for. Rejects with an `Error` where there are no service workers, and as `register` of the browser does.
+ * pages that it is for. Rejects with an `Error` where there are no service workers, or it is not for this
+ * page, and as `register` of the browser does.
  */
 export function install(
   script?: string | URL,

@@ -24,7 +24,7 @@ export interface Options {
    * or `auto`, the tool where it is installed. The files of the two differ in bytes. Default `auto`.
    */
   encoder?: 'auto' | 'gip' | 'wasm';
-  /** The folder of files that were encoded before. Default: `.image-gip` in Vite's own. */
+  /** The folder of files that were encoded before, from Vite's `root`. Default: `.image-gip` in Vite's own folder. */
   cache?: string;
   // What an import can set as well, as in `?gip&quality=60`; see `encoder-types.d.ts`.
   quality?: number;
@@ -37,6 +37,7 @@ export interface Options {
   firstLayer?: number;
 }
 
+/** Throws a `TypeError` or `RangeError` for options that there are not. */
 export default function gip(options?: Options): {
   name: 'image-gip';
   enforce: 'pre';

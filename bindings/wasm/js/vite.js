@@ -4,10 +4,10 @@ import { execFile } from 'node:child_process';
 import { createHash, randomUUID } from 'node:crypto';
 import { mkdir, readFile, rename, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
-import { basename, extname, join } from 'node:path';
+import { basename, extname, join, resolve } from 'node:path';
 import { promisify } from 'node:util';
 
-import { Cursor, chunksOf } from './chunks.js';
+import { Cursor, chunksOf, types } from './chunks.js';
 import { markup } from './markup.js';
 
 const run = promisify(execFile);
@@ -26,13 +26,22 @@ const placeholderOptions = { bytes: 300, effort: 4 };
 function optionsOf(query, common) {
   const own = {};
   for (const [name, value] of new URLSearchParams(query)) {
-    if (numbers.includes(name)) own[name] = Number(value);
-    else if (name !== 'gip') throw new Error(`?gip&${name}: there is no such option; there are ${numbers}`);
+    if (numbers.includes(name)) {
+      own[name] = Number(value);
+      // Of an empty text it would be 0.
+      if (value.trim() === '' || Number.isNaN(own[name])) throw new RangeError(`?gip&${name}=${value}: it must be a number`);
+    } else if (name !== 'gip') throw new Error(`?gip&${name}: there is no such option; there are ${numbers}`);
   }
   const hasTarget = targets.some((name) => name in own);
   const kept = Object.entries(common).filter(([name]) => !(hasTarget && targets.includes(name)));
   return { ...Object.fromEntries(kept), ...own };
 }
+
+/** Runs the tool. An error is what it says. */
+const runTool = (...args) =>
+  run('gip', args).catch((cause) => {
+    throw new Error(cause.stderr?.trim() || `the tool gip does not run: ${cause.message}`, { cause });
+  });
 
 /** Encodes with the tool that is installed. */
 async function encodeByTool(source, options, folder) {
@@ -44,7 +53,7 @@ async function encodeByTool(source, options, folder) {
   try {
     // A page need not tell where a picture was taken, and a placeholder has no room for a profile.
     const metadata = options === placeholderOptions ? 'none' : 'safe';
-    await run('gip', ['encode', source, output, '--metadata', metadata, ...flags]);
+    await runTool('encode', source, output, '--metadata', metadata, ...flags);
     return await readFile(output);
   } finally {
     await rm(output, { force: true });
@@ -68,7 +77,7 @@ async function encodeByModule(source, options, root) {
 }
 
 /** Whether the tool is there. */
-const hasTool = () => run('gip', ['--version']).then(() => true, () => false);
+const hasTool = () => runTool('--version').then(() => true, () => false);
 
 /** The size in the header of a file; all that are made here are upright. */
 function sizeOf(file) {
@@ -77,8 +86,20 @@ function sizeOf(file) {
   return { width: cursor.number(), height: cursor.number() };
 }
 
+/** Whether a file is whole. What lies on a disk for months, and goes from one to another with the caches of builds, may not be. */
+function isWhole(file) {
+  try {
+    const { type, end } = [...chunksOf(file)].at(-1) ?? {};
+    return type === types.end && end === file.length;
+  } catch {
+    return false;
+  }
+}
+
 /** The plug-in; see the declarations. */
 export default function gip({ encoder = 'auto', cache: place, ...common } = {}) {
+  const unknown = Object.keys(common).filter((name) => !numbers.includes(name));
+  if (unknown.length > 0) throw new TypeError(`there is no option ${unknown}; there are encoder,cache,${numbers}`);
   if (!['auto', 'gip', 'wasm'].includes(encoder)) throw new RangeError(`encoder is ${encoder}; it must be auto, gip or wasm`);
   let [config, cache, byTool] = [null, null, null];
   /** What the development server has: content and type by path. */
@@ -94,11 +115,9 @@ export default function gip({ encoder = 'auto', cache: place, ...common } = {}) 
     const name = `${key.digest('hex').slice(0, 32)}.gip`;
     const stored = join(cache, name);
     const make = async () => {
-      try {
-        return await readFile(stored);
-      } catch {
-        await mkdir(cache, { recursive: true });
-      }
+      const before = await readFile(stored).catch(() => null);
+      if (before && isWhole(before)) return before;
+      await mkdir(cache, { recursive: true });
       const file = await (kind === 'gip' ? encodeByTool(path, options, cache) : encodeByModule(path, options, config.root));
       // Whole or not at all, whatever happens meanwhile.
       const partial = `${stored}.${randomUUID()}`;
@@ -128,13 +147,13 @@ export default function gip({ encoder = 'auto', cache: place, ...common } = {}) 
 
     configResolved(resolved) {
       config = resolved;
-      cache = place ?? join(config.cacheDir, '.image-gip');
+      cache = place ? resolve(config.root, place) : join(config.cacheDir, '.image-gip');
     },
 
     configureServer(server) {
       server.middlewares.use((request, response, next) => {
-        const { pathname } = new URL(request.url, 'http://localhost');
-        const file = served.get(pathname.slice(pathname.indexOf('/@image-gip/')));
+        const [path] = request.url.split('?');
+        const file = served.get(path.slice(path.indexOf('/@image-gip/')));
         if (!file) return next();
         response.writeHead(200, { 'Content-Type': file.type, 'Content-Length': file.content.length });
         response.end(file.content);

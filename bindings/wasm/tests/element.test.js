@@ -237,9 +237,9 @@ test('with few bytes wanted, the first layers are loaded of what is close to the
     };
   }
   const below = '<gip-image src="/far.gip"></gip-image><gip-image src="/full.gip" detail="full"></gip-image>';
-  const html = `${element('src="/few.gip" width="600"')}<div style="height: 8000px"></div>${below}`;
+  const html = `${element('width="600"')}<div style="height: 8000px"></div>${below}`;
   await withPage(saving + html, async (page) => {
-    await settled(page);
+    await show(page, '/few.gip');
     await until(() => log.open === 0, 'the end of the transfer');
     const few = log.sent;
     assert.ok(few >= large.length / 6 && few < large.length / 2, `${few} of ${large.length} bytes`);
@@ -517,3 +517,44 @@ for (const style of fits) {
     });
   });
 }
+
+test('when the decoder could not be loaded, the next picture tries again', async () => {
+  await withPage(script, async (page) => {
+    await page.evaluate(() => customElements.whenDefined('gip-image'));
+    const outcome = () =>
+      page.evaluate(async () => {
+        const image = document.createElement('gip-image');
+        image.src = '/picture.gip';
+        document.body.append(image);
+        return image.decode().then(() => 'shown', ({ cause }) => cause.name);
+      });
+    const ofDecoder = /dist.(core|worker).js/;
+    await page.context().route(ofDecoder, (route) => route.abort());
+    assert.equal(await outcome(), 'TypeError');
+    await page.context().unroute(ofDecoder);
+    assert.equal(await outcome(), 'shown');
+  }, { quiet: true });
+});
+
+test('a picture that is shown stays when more pixels are beyond the limits', async () => {
+  await withPage(element(''), async (page) => {
+    await page.evaluate(() => {
+      document.querySelector('gip-image').limits = { outputPixels: 96 * 64 };
+    });
+    await show(page, '/picture.gip');
+    const image = await canvasOf(page);
+    const shown = await page.evaluate(async () => {
+      const image = document.querySelector('gip-image');
+      image.style.width = '192px';
+      const canvas = image.shadowRoot.querySelector('canvas');
+      while (canvas.getBoundingClientRect().width < 192) await new Promise(requestAnimationFrame);
+      await new Promise((resolve) => setTimeout(resolve, 200));
+      return [image.complete, canvas.isConnected];
+    });
+    assert.deepEqual(shown, [true, true]);
+    assert.deepEqual(await canvasOf(page), image);
+    // At the size that it had before, nothing is the matter.
+    await page.evaluate(() => (document.querySelector('gip-image').style.width = '90px'));
+    await until(async () => (await canvasOf(page)).width === 90, 'the picture of another size');
+  });
+});

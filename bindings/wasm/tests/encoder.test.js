@@ -91,6 +91,10 @@ test('what is out of range is refused, with words', async () => {
   await refused({ name: 'RangeError', message: /firstLayer is 10/ }, picture, { firstLayer: 10 });
   await refused({ name: 'RangeError', message: /256 samples/ }, { ...picture, data: new Uint8Array(256) });
   await refused({ name: 'TypeError', message: /must have data/ }, { width: 1, height: 1 });
+  for (const metadata of [{ exif: 'II*' }, { iccProfile: new ArrayBuffer(8) }]) {
+    await refused({ name: 'TypeError', message: /must be a Uint8Array/ }, picture, { metadata });
+  }
+  await refused({ name: 'RangeError', message: /cicp is 300/ }, picture, { metadata: { cicp: [300, 1] } });
   // This is refused by the encoder itself.
   await refused({ name: 'RangeError', message: /invalid option/ }, picture, {
     metadata: { texts: [{ keyword: '', text: 'nothing' }] },
@@ -107,6 +111,36 @@ test('an encoding can be aborted, and the next one is none the worse', async () 
   assert.throws(() => core.encode(picture, { effort: 7, onprogress: () => false }), { name: 'AbortError' });
   const { file } = await encode(sample(), options);
   assert.deepEqual(core.encode(sample(), options).file, file);
+});
+
+test('pictures that wait for a worker can be aborted as well', async () => {
+  const controller = new AbortController();
+  const { signal } = controller;
+  const picture = sample({ width: 320, height: 240 });
+  const all = Array.from({ length: availableParallelism() + 1 }, () => encode(picture, { effort: 7, signal }));
+  const waiting = new AbortController();
+  const last = encode(sample(), { ...options, signal: waiting.signal });
+  waiting.abort();
+  // None of the others is done.
+  assert.equal(await Promise.race([last.catch(({ name }) => name), ...all]), 'AbortError');
+  controller.abort();
+  for (const { reason } of await Promise.allSettled(all)) assert.equal(reason.name, 'AbortError');
+});
+
+test('what no worker can be sent, and a listener that throws, are told, and the next picture is made', async () => {
+  const gone = sample();
+  assert.ok((await encode(gone, { ...options, transfer: true })).file.length > 0);
+  const shared = { ...sample(), data: new Uint8Array(new SharedArrayBuffer(sample().data.length)) };
+  const failed = () => {
+    throw new Error('a fault of the page');
+  };
+  for (let more = availableParallelism(); more >= 0; more -= 1) {
+    await assert.rejects(encode(gone, { ...options, transfer: true }), { name: 'RangeError', message: /^0 samples/ });
+    await assert.rejects(encode(sample(), { ...options, metadata: { xmp: () => '' } }), { name: 'DataCloneError' });
+    await assert.rejects(encode(sample(), { ...options, onprogress: failed }), /a fault of the page/);
+  }
+  assert.ok((await encode(shared, { ...options, transfer: true })).file.length > 0);
+  assert.ok((await encode(sample(), options)).file.length > 0);
 });
 
 test('more pictures than workers are all encoded', async () => {
@@ -155,8 +189,15 @@ test('a browser encodes what it can draw, and keeps Display P3', async () => {
     }
     const { file } = await encode(blob, { gaussians: 30, effort: 1, colorSpace: 'display-p3' });
     const picture = await open(file);
-    return { facts, cicp: [...(await picture.metadata()).cicp] };
+    const refused = [];
+    const empty = Object.assign(document.createElement('canvas'), { width: 0 });
+    const ofSvg = document.createElementNS('http://www.w3.org/2000/svg', 'image');
+    for (const source of [document.createElement('video'), empty, ofSvg]) {
+      await encode(source).catch(({ name, message }) => refused.push(`${name}: ${message}`));
+    }
+    return { facts, refused, cicp: [...(await picture.metadata()).cicp] };
   });
+  assert.match(found.refused.join('; '), /^RangeError: .* 0 x 0 pixels; RangeError: .* 0 x 150 pixels; TypeError: a picture must have data/);
   for (const fact of found.facts) assert.deepEqual(fact, [40, 'rgb', null, found.facts[0][3]]);
   assert.deepEqual(found.cicp, [12, 13]);
 });

@@ -179,6 +179,26 @@ test('it may be replaced by one of another picture, with its source', async () =
   });
 });
 
+test('source and placeholder are replaced together, in whatever order, with one request', async () => {
+  const requests = [];
+  harness.routes['/other.gip'] = (request) => void requests.push(request.url);
+  const own = makePicture({ width: 48, height: 64, layers: [20] });
+  await gatedPage({}, async (page, { open }) => {
+    open();
+    await settled(page);
+    for (const [at, names] of [['src', 'placeholder'], ['placeholder', 'src']].entries()) {
+      await page.evaluate(([names, values]) => {
+        const image = document.querySelector('gip-image');
+        for (const name of names) image[name] = values[name];
+        image.crossOrigin = names[0] === 'src' ? 'use-credentials' : 'anonymous';
+      }, [names, { src: `/other.gip?${at}`, placeholder: own.toString('base64') }]);
+      await shows(page, own);
+    }
+    await until(() => requests.length >= 2, 'the requests');
+    assert.deepEqual(requests, ['/other.gip?0', '/other.gip?1']);
+  });
+});
+
 test('a small file of its own is shown until the other one shows more', async () => {
   const own = makePicture({ width: 96, height: 64, layers: [30], seed: 3 });
   let allowed = 0;

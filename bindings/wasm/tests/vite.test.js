@@ -1,7 +1,7 @@
 // The plug-in for Vite, without Vite, and with a program in place of the tool: `npm run bundlers -- site` has both.
 
 import assert from 'node:assert/strict';
-import { chmodSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { chmodSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { delimiter, join } from 'node:path';
 import { after, test } from 'node:test';
@@ -21,6 +21,7 @@ writeFileSync(log, '');
 // It takes what is to be its result, and tells how it was called.
 const tool = `#!/bin/sh
 [ "$1" = --version ] && exit
+case "$*" in *'--quality 99'*) echo 'error: no such quality' >&2; exit 1; esac
 echo "$@" >>'${log}'
 cp '${join(folder, 'made.gip')}' "$3"
 `;
@@ -36,7 +37,7 @@ function pluginFor(command, options) {
     addWatchFile() {},
     emitFile: (file) => `reference${emitted.push(file)}`,
   };
-  plugin.configResolved({ command, cacheDir: folder, base: '/base/' });
+  plugin.configResolved({ command, cacheDir: folder, root: folder, base: '/base/' });
   const load = async (query, path = original) => {
     const code = await plugin.load.call(context, `${path}?${query}`);
     return code && (await import(`data:text/javascript,${encodeURIComponent(code)}#${Math.random()}`)).default;
@@ -82,12 +83,44 @@ test('a picture is encoded once for each set of options, with those of the impor
   assert.equal(calls().filter((call) => call.endsWith('--metadata none --bytes 300 --effort 4')).length, 1);
 });
 
+test('what the tool says is the error, or that there is none', async () => {
+  await assert.rejects(pluginFor('build').load('gip&quality=99'), { message: 'error: no such quality' });
+  const { PATH } = process.env;
+  process.env.PATH = '';
+  await assert.rejects(pluginFor('build', { encoder: 'gip' }).load('gip&quality=1'), /the tool gip does not run: spawn gip ENOENT/);
+  process.env.PATH = PATH;
+});
+
+test('what is damaged in the cache is made again', async () => {
+  const options = { cache: 'damaged', effort: 3 };
+  const first = pluginFor('build', options);
+  await first.load('gip');
+  const cached = join(folder, 'damaged');
+  const damages = [
+    () => Buffer.alloc(0),
+    (bytes) => bytes.subarray(0, bytes.length / 2),
+    (bytes) => bytes.map((byte, at) => (at === bytes.length - 9 ? byte ^ 1 : byte)),
+    (bytes) => Buffer.concat([bytes, bytes]),
+  ];
+  for (const damage of damages) {
+    for (const name of readdirSync(cached)) writeFileSync(join(cached, name), damage(readFileSync(join(cached, name))));
+    const { load, emitted } = pluginFor('build', options);
+    await load('gip');
+    assert.deepEqual(emitted[0].source, file);
+    for (const name of readdirSync(cached)) assert.deepEqual(readFileSync(join(cached, name)), file);
+  }
+});
+
 test('other imports are none of its business, and unknown options are told', async () => {
   const { load } = pluginFor('build');
   assert.equal(await load('url'), null);
   assert.equal(await load('gipsy'), null);
   await assert.rejects(load('gip&size=3'), /gip&size: there is no such option/);
+  for (const value of ['', '%20', 'high', 'NaN']) {
+    await assert.rejects(load(`gip&quality=${value}`), { name: 'RangeError', message: /it must be a number/ });
+  }
   assert.throws(() => gip({ encoder: 'rust' }), { name: 'RangeError' });
+  assert.throws(() => gip({ qualty: 60 }), { name: 'TypeError', message: /there is no option qualty/ });
 });
 
 test('the development server sends both files', async () => {
@@ -105,4 +138,5 @@ test('the development server sends both files', async () => {
   assert.deepEqual(get(src), { type: 'image/vnd.gip', content: file });
   assert.equal(get(fallback).type, 'image/jpeg');
   assert.equal(get('/index.html').type, 'next');
+  assert.equal(get('//').type, 'next');
 });
