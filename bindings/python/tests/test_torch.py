@@ -103,6 +103,17 @@ def test_what_does_not_fit_is_refused(file: bytes) -> None:
         RandomResizedCrop(224, flip=2)
 
 
+@pytest.mark.skipif(not HAS_TORCH, reason="there is no torch")
+def test_tensors_are_on_the_cpu(file: bytes) -> None:
+    transform = RandomResizedCrop(20)
+    torch.set_default_device("meta")
+    try:
+        assert transform(file).device.type == "cpu"
+        assert decode_batch([file], transform).images.device.type == "cpu"
+    finally:
+        torch.set_default_device("cpu")
+
+
 def test_alpha_over_a_background() -> None:
     samples = np.dstack((draw(48, 32, 3), draw(48, 32, 1)))
     file = image_gip.encode(samples, bpp=4, effort=1)
