@@ -140,8 +140,13 @@ def test_errors_of_each_picture(files: list[bytes]) -> None:
         with pytest.raises(kind) as other:
             decode_batch([files[0], wrong], Part((32, 48)), errors="return")
         assert other.value.__notes__ == ["picture 1 of 2"]
-    with pytest.raises(TypeError, match="must be several"):
-        decode_batch("a.gip", Part((32, 48)))
+    file = files[0]
+    one: list[Any] = ["a.gip", Path("a.gip"), file, bytearray(file), io.BytesIO(file)]
+    for sources in [*one, np.frombuffer(file, np.uint8)]:
+        with pytest.raises(TypeError, match="must be several"):
+            decode_batch(sources, Part((32, 48)), errors="return")
+    paths = np.array(["missing.gip"])
+    assert list(decode_batch(paths, Part((32, 48)), errors="return").errors) == [0]
 
 
 def test_sizes_are_whole_numbers_of_any_type(files: list[bytes]) -> None:

@@ -268,7 +268,7 @@ def decode_batch(
         raise ValueError(f'errors is {errors!r}; it must be "raise" or "return"')
     if threads < 1:
         raise ValueError(f"threads is {threads}; it must be at least 1")
-    if isinstance(sources, str | bytes | PathLike):
+    if _is_file(sources):
         raise TypeError("sources is one file; it must be several")
     files = list(sources)
     if isinstance(transform, Resize) and transform.shorter is not None:
@@ -349,6 +349,16 @@ def _file(value: Any) -> Source:
     if isinstance(value, Mapping):
         return value["path"] if value.get("bytes") is None else value["bytes"]
     return value
+
+
+def _is_file(sources: Any) -> bool:
+    """Whether this is one file, of whose bytes or lines each would be taken for a file."""
+    if isinstance(sources, str | PathLike) or hasattr(sources, "read"):
+        return True
+    try:
+        return memoryview(sources).format in ("B", "b", "c")
+    except TypeError:
+        return False
 
 
 def _shares_memory(pictures: torch.Tensor) -> bool:
