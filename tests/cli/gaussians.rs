@@ -518,7 +518,7 @@ fn svg_of_strong_colours_is_bounded() {
     room.write("a.jsonl", format!("{head}\n{spot}\n"));
     room.ok(&["import", "a.jsonl", "a.gip"]);
     let error = room.fails(&["export", "a.gip", "a.svg", "--limit", "memory=4M"]);
-    assert!(error.contains("limit exceeded: memory"), "{error}");
+    assert!(error.contains("limit exceeded: bytes of memory"), "{error}");
     room.ok(&["export", "a.gip", "a.svg"]);
 }
 
