@@ -307,6 +307,20 @@ fn splats_are_looked_at_along_z() {
         assert!(found.iter().any(is_near), "{found:?}");
     }
 
+    // Over a base colour, amplitudes are what is left to the shown colour; that which a file says comes first.
+    room.ok(&["import", "a.ply", "base.gip", "--size", "20x20", "--base-color", "51"]);
+    let read = room.ok(&["export", "base.gip", "-"]);
+    let is_near = |found: Vec<f64>| {
+        let expected = [4.0, 5.0, 2.0, 0.0, 3.0, 0.4, 0.15, -0.1];
+        found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5)
+    };
+    assert!(read.lines().skip(1).map(numbers).any(is_near), "{read}");
+    room.ok(&["export", "base.gip", "base.ply"]);
+    room.ok(&["import", "base.ply", "again.gip", "--base-color", "0"]);
+    let again = room.ok(&["export", "again.gip", "-"]);
+    assert!(again.lines().skip(1).map(numbers).any(is_near), "{again}");
+    assert!(again.contains("\"base_color\":[0,0,0]"), "{again}");
+
     // The numbers of the tool's own binary, from the highest byte on.
     room.ok(&["export", "a.gip", "b.ply"]);
     room.ok(&["import", "b.ply", "b.gip"]);
@@ -401,7 +415,7 @@ fn what_is_wrong_is_told_with_its_place() {
         ("format ascii 1.0", "format text 1.0", "line 2 of its header"),
         ("format ascii 1.0\n", "", "no format"),
         ("comment gip width 9", "comment gip width w", "line 3 of its header"),
-        ("property float opacity", "property list uchar int opacity", "of its header"),
+        ("property float opacity", "property opacity", "of its header"),
         ("property float scale_1", "property float scale", "no property scale_1"),
         ("element vertex 2", "element vertex 3", "it ends before vertex 2"),
         ("element vertex 2", "element vertex -2", "line 5 of its header"),
@@ -414,6 +428,10 @@ fn what_is_wrong_is_told_with_its_place() {
     ] {
         refused("c.ply", ply.replacen(old, new, 1).as_bytes(), expected);
     }
+    let listed = ply.replacen("property float opacity", "property list uchar int a", 1);
+    refused("c.ply", listed.as_bytes(), "vertices with lists are not read");
+    let cameras = ply.replacen("element vertex", "element camera 1\nelement vertex", 1);
+    refused("c.ply", cameras.as_bytes(), "its first element is camera");
     let binary = room.read("a.ply");
     refused("c.ply", &binary[..binary.len() - 1], "it ends at rot_3 of vertex 89");
 
@@ -447,6 +465,61 @@ fn what_is_wrong_is_told_with_its_place() {
     let error = room.fails(&["import", "a.npz", "b.png"]);
     assert!(error.contains("b.png: gip import writes .gip files only"), "{error}");
     room.ok(&["import", "a.npz", "b.png", "--force"]);
+}
+
+#[test]
+fn what_editors_and_other_programs_add_is_skipped() {
+    let room = room(ColorType::Rgb8);
+    let mark = b"\xEF\xBB\xBF".as_slice();
+    for format in ["json", "jsonl"] {
+        room.ok(&["export", "a.gip", &format!("a.{format}")]);
+        let contents = text(&room.read(&format!("a.{format}"))).replace('\n', "\r\n");
+        room.write(&format!("b.{format}"), [mark, contents.as_bytes()].concat());
+        room.ok(&["import", &format!("b.{format}"), "b.gip"]);
+        assert_eq!(lines(&room, "b.gip"), lines(&room, "a.gip"));
+    }
+    room.write("a.ply", SPLATS);
+    room.ok(&["import", "a.ply", "a.gip", "--size", "20x20"]);
+    let spaced = SPLATS.replacen("\n9 9", "\n\n9 9", 1);
+    let (before, after) = spaced.split_once("comment by hand").expect("a comment");
+    // In Latin-1, as old programs write.
+    let comment = b"comment \xE9 end_header of others".as_slice();
+    room.write("b.ply", [mark, before.as_bytes(), comment, after.as_bytes()].concat());
+    room.ok(&["import", "b.ply", "b.gip", "--size", "20x20"]);
+    assert_eq!(room.read("b.gip"), room.read("a.gip"));
+}
+
+#[test]
+fn other_files_in_an_archive_are_skipped() {
+    let room = room(ColorType::Rgb8);
+    room.ok(&["export", "a.gip", "a.npz"]);
+    room.ok(&["import", "a.npz", "b.gip"]);
+    let archive = room.read("a.npz");
+    // Another name, and contents that are no array: the covariance is not needed, as there is the Cholesky factor.
+    let place = |part: &[u8]| {
+        let all = archive.windows(part.len()).enumerate().filter(|(_, found)| *found == part);
+        all.map(|(place, _)| place).collect::<Vec<_>>()
+    };
+    let mut other = archive.clone();
+    for at in place(b"covariance.npy") {
+        other[at..][..14].copy_from_slice(b"read_me_______");
+    }
+    other[place(b"\x93NUMPY")[1]] = b' ';
+    room.write("c.npz", other);
+    room.ok(&["import", "c.npz", "c.gip"]);
+    assert_eq!(room.read("c.gip"), room.read("b.gip"));
+}
+
+#[test]
+fn svg_of_strong_colours_is_bounded() {
+    let room = Room::new();
+    let spot = r#"{"center":[8,8],"cholesky":[2,0,2],"color":[-60000]}"#;
+    let head = r#"{"format":"gip-gaussians","version":1,"width":16,"height":16}"#;
+    room.write("a.jsonl", format!("{head}\n{spot}\n"));
+    room.ok(&["import", "a.jsonl", "a.gip"]);
+    let error = room.fails(&["export", "a.gip", "a.svg", "--limit", "memory=4M"]);
+    assert!(error.contains("limit exceeded: bytes of memory"), "{error}");
+    room.ok(&["export", "a.gip", "a.svg"]);
 }
 
 #[test]

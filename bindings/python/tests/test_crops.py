@@ -63,6 +63,22 @@ def test_a_crop_at_the_edge_of_any_size_is_inside(file: bytes) -> None:
         assert _crops.render(file, (64, 96), crop, (7, 5), RGB, dtype=np.uint8).shape == (3, 7, 5)
 
 
+@pytest.mark.parametrize(
+    "crop",
+    [
+        Crop(-1, 0, 32, 32),
+        Crop(0, 65, 32, 32),
+        Crop(0, 0, 0, 32),
+        Crop(0, 40, 32, -8),
+        Crop(0, 0, math.nan, 32),
+        Crop(0, 0, math.inf, 32),
+    ],
+)
+def test_a_crop_that_is_not_inside_is_refused(file: bytes, crop: Crop) -> None:
+    with pytest.raises(ValueError, match="not inside the picture of height and width"):
+        _crops.render(file, (64, 96), crop, (8, 8), RGB, dtype=np.uint8)
+
+
 def test_floats_are_what_shows() -> None:
     spots: dict[str, Any] = {
         "center": [[30, 20], [60, 40]],

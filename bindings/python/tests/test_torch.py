@@ -103,6 +103,17 @@ def test_what_does_not_fit_is_refused(file: bytes) -> None:
         RandomResizedCrop(224, flip=2)
 
 
+@pytest.mark.skipif(not HAS_TORCH, reason="there is no torch")
+def test_tensors_are_on_the_cpu(file: bytes) -> None:
+    transform = RandomResizedCrop(20)
+    torch.set_default_device("meta")
+    try:
+        assert transform(file).device.type == "cpu"
+        assert decode_batch([file], transform).images.device.type == "cpu"
+    finally:
+        torch.set_default_device("cpu")
+
+
 def test_alpha_over_a_background() -> None:
     samples = np.dstack((draw(48, 32, 3), draw(48, 32, 1)))
     file = image_gip.encode(samples, bpp=4, effort=1)
@@ -129,8 +140,13 @@ def test_errors_of_each_picture(files: list[bytes]) -> None:
         with pytest.raises(kind) as other:
             decode_batch([files[0], wrong], Part((32, 48)), errors="return")
         assert other.value.__notes__ == ["picture 1 of 2"]
-    with pytest.raises(TypeError, match="must be several"):
-        decode_batch("a.gip", Part((32, 48)))
+    file = files[0]
+    one: list[Any] = ["a.gip", Path("a.gip"), file, bytearray(file), io.BytesIO(file)]
+    for sources in [*one, np.frombuffer(file, np.uint8)]:
+        with pytest.raises(TypeError, match="must be several"):
+            decode_batch(sources, Part((32, 48)), errors="return")
+    paths = np.array(["missing.gip"])
+    assert list(decode_batch(paths, Part((32, 48)), errors="return").errors) == [0]
 
 
 def test_sizes_are_whole_numbers_of_any_type(files: list[bytes]) -> None:

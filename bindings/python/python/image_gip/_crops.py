@@ -161,8 +161,13 @@ def render(
 
     Raises:
         GipError: The file was refused.
-        ValueError: `out` does not fit.
+        ValueError: `out` does not fit, or the crop is not inside the picture.
     """
+    for start, length, side in zip(crop[:2], crop[2:4], stored, strict=True):
+        # Sums of floats may be off by their last digit.
+        slack = 1e-9 * side
+        if not (length > 0 and start >= -slack and start + length <= side + slack):
+            raise ValueError(f"{crop} is not inside the picture of height and width {stored}")
     (height, top), (width, left) = (
         _axis(start, length, side, pixels)
         for start, length, side, pixels in zip(crop[:2], crop[2:4], stored, size, strict=True)

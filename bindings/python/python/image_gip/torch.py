@@ -12,6 +12,7 @@ torchvision, a size is (height, width), and tensors are channels x height x widt
 255, or float32 of 0.0 to 1.0. Random numbers are torch's, so that ``torch.manual_seed`` and the
 seeds of a ``DataLoader``'s workers hold. Transforms can be pickled, and release the interpreter
 lock while they decode. Pictures are as they are stored: `image_gip.info` has their orientation.
+Tensors are in the memory of the CPU, whatever torch's default device is.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ class Transform:
         return ()
 
     def crop(self, stored: Size, draws: Draws) -> Crop:
-        """The part that is shown of a picture of this stored height and width."""
+        """The part that is shown of a picture of this stored height and width, inside of it."""
         return Crop(0, 0, *stored)
 
     def output_size(self, stored: Size) -> Size:
@@ -104,7 +105,8 @@ class Transform:
         Raises:
             GipError: The file was refused; its subclasses say why.
             OSError: The file cannot be read.
-            ValueError: `out` does not fit, or the mode lacks a channel of the picture.
+            ValueError: `out` does not fit, the mode lacks a channel of the picture, or the crop is
+                not inside of it.
         """
         return self._apply(src, self.draw(), out)
 
@@ -124,7 +126,8 @@ class Transform:
         return tensor.copy_(tensor.flip(-1)) if crop.flip else tensor
 
     def _empty(self, size: Size) -> torch.Tensor:
-        return torch.empty((_CHANNELS[self.rendering.mode], *size), dtype=self.dtype)
+        shape = (_CHANNELS[self.rendering.mode], *size)
+        return torch.empty(shape, dtype=self.dtype, device="cpu")
 
 
 class RandomResizedCrop(Transform):
@@ -161,8 +164,9 @@ class RandomResizedCrop(Transform):
         self.flip, self.generator = flip, generator
 
     def draw(self) -> Draws:
-        numbers: list[float] = torch.rand(_crops.DRAWS, generator=self.generator).tolist()
-        return numbers
+        numbers = torch.rand(_crops.DRAWS, generator=self.generator, device="cpu")
+        drawn: list[float] = numbers.tolist()
+        return drawn
 
     def crop(self, stored: Size, draws: Draws) -> Crop:
         return _crops.random_resized(stored, self.scale, self.ratio, self.flip, draws)
@@ -264,14 +268,14 @@ def decode_batch(
         raise ValueError(f'errors is {errors!r}; it must be "raise" or "return"')
     if threads < 1:
         raise ValueError(f"threads is {threads}; it must be at least 1")
-    if isinstance(sources, str | bytes | PathLike):
+    if _is_file(sources):
         raise TypeError("sources is one file; it must be several")
     files = list(sources)
     if isinstance(transform, Resize) and transform.shorter is not None:
         raise ValueError("the results of Resize with one number differ in size")
     if out is None:
         one = transform._empty(transform.size)
-        out = torch.empty((len(files), *one.shape), dtype=one.dtype)
+        out = torch.empty((len(files), *one.shape), dtype=one.dtype, device="cpu")
     elif out.ndim != 4 or len(out) != len(files):
         shape = tuple(out.shape)
         raise ValueError(f"out has shape {shape}; it must be that of {len(files)} pictures")
@@ -345,6 +349,16 @@ def _file(value: Any) -> Source:
     if isinstance(value, Mapping):
         return value["path"] if value.get("bytes") is None else value["bytes"]
     return value
+
+
+def _is_file(sources: Any) -> bool:
+    """Whether this is one file, of whose bytes or lines each would be taken for a file."""
+    if isinstance(sources, str | PathLike) or hasattr(sources, "read"):
+        return True
+    try:
+        return memoryview(sources).format in ("B", "b", "c")
+    except TypeError:
+        return False
 
 
 def _shares_memory(pictures: torch.Tensor) -> bool:

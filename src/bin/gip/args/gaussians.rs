@@ -117,6 +117,31 @@ pub(crate) struct HeaderArgs {
     pub(crate) base_color: Vec<u16>,
 }
 
+impl HeaderArgs {
+    /// The base colour, in 1/65535 of a full sample, of a picture whose input says this depth: one number for all of the
+    /// channels, if there is one; `None` if it is not given.
+    ///
+    /// # Errors
+    /// When a sample has more bits than the picture.
+    pub(crate) fn base_color(
+        &self,
+        depth: Option<u8>,
+        channels: usize,
+    ) -> Result<Option<Vec<u16>>, WrongUsage> {
+        let (most, unit) =
+            if self.depth.or(depth) == Some(16) { (u16::MAX, 1) } else { (255, 257) };
+        if let Some(sample) = self.base_color.iter().find(|sample| **sample > most) {
+            return Err(WrongUsage(format!("--base-color {sample}; it must be 0 to {most}")));
+        }
+        let given: Vec<u16> = self.base_color.iter().map(|sample| sample * unit).collect();
+        Ok(match given[..] {
+            [] => None,
+            [sample] => Some(vec![sample; channels]),
+            _ => Some(given),
+        })
+    }
+}
+
 /// A format that Gaussians are exported to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum GaussianFormat {

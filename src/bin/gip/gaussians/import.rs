@@ -7,7 +7,7 @@ use image_gip::{
 };
 
 use super::format::format_of;
-use super::model::Imported;
+use super::model::{BYTE_ORDER_MARK, Imported};
 use super::{json, npz, ply};
 use crate::args::{self, GaussianFormat};
 use crate::errors::WrongUsage;
@@ -24,7 +24,7 @@ pub(crate) fn run(args: &args::Import) -> Result<()> {
     let context = || files::input_name(&args.input);
     let limits = args.limits.limits();
     let bytes = files::read(&args.input)?;
-    let mut imported = read(format, &bytes, &limits).with_context(context)?;
+    let mut imported = read(format, &bytes, &args.header, &limits).with_context(context)?;
     let channels = change(&mut imported, &args.header)?;
     let mut header = imported.fields.header(channels).with_context(context)?;
     header.parameterization = args.parameterization.into();
@@ -51,13 +51,21 @@ pub(crate) fn run(args: &args::Import) -> Result<()> {
     files::print(&format!("{name}: {count} Gaussians, {} bytes", file.len()), Some(&args.output))
 }
 
-fn read(format: GaussianFormat, bytes: &[u8], limits: &Limits) -> Result<Imported> {
-    let text = || str::from_utf8(bytes).context("it is not UTF-8");
+fn read(
+    format: GaussianFormat,
+    bytes: &[u8],
+    header: &args::HeaderArgs,
+    limits: &Limits,
+) -> Result<Imported> {
+    let text = || {
+        let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+        str::from_utf8(bytes).context("it is not UTF-8")
+    };
     match format {
         GaussianFormat::Npz => npz::read(bytes, limits.max_memory),
         GaussianFormat::Json => json::read_object(text()?),
         GaussianFormat::Jsonl => json::read_lines(text()?),
-        GaussianFormat::Ply => ply::read(bytes),
+        GaussianFormat::Ply => ply::read(bytes, header),
         GaussianFormat::Svg => {
             bail!(WrongUsage("SVG is not imported, as it does not have the numbers".into()))
         }
@@ -78,17 +86,10 @@ fn change(imported: &mut Imported, args: &args::HeaderArgs) -> Result<usize, Wro
         (fields.kernel, fields.cutoff) = (Some(kernel.name().into()), None);
     }
     fields.cutoff = args.cutoff.map(|cutoff| cutoff as f32).or(fields.cutoff);
-    let (most, unit) = if fields.depth == Some(16) { (u16::MAX, 1) } else { (255, 257) };
-    if let Some(sample) = args.base_color.iter().find(|sample| **sample > most) {
-        return Err(WrongUsage(format!("--base-color {sample}; it must be 0 to {most}")));
-    }
-    let given: Vec<u16> = args.base_color.iter().map(|sample| sample * unit).collect();
-    let of_base = if given.len() > 1 { given.len() } else { 3 };
+    let of_base = if args.base_color.len() > 1 { args.base_color.len() } else { 3 };
     let channels = imported.channels.unwrap_or(of_base);
-    match given[..] {
-        [] => {}
-        [sample] => fields.base_color = Some(vec![sample; channels]),
-        _ => fields.base_color = Some(given),
+    if let Some(base) = args.base_color(fields.depth, channels)? {
+        fields.base_color = Some(base);
     }
     Ok(channels)
 }

@@ -9,6 +9,9 @@ use crate::info::kernel_name;
 /// How far apart two descriptions of a covariance may be, in parts of its trace: more than floats are rounded.
 const TOLERANCE: f64 = 1e-5;
 
+/// What editors may write before a text in UTF-8.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
 /// Gaussians with the header that says how they are shown.
 #[derive(Debug)]
 pub(crate) struct Spots {

@@ -108,6 +108,7 @@ impl Array {
             }};
         }
         let numbers = match self.kind.trim_start_matches(['<', '>', '|', '=']) {
+            "f2" => read!(u16, half),
             "f4" => read!(f32, f64::from),
             "f8" => read!(f64, f64::from),
             "i1" => read!(i8, f64::from),
@@ -118,7 +119,9 @@ impl Array {
             "u2" => read!(u16, f64::from),
             "u4" => read!(u32, f64::from),
             "u8" => read!(u64, |number| number as f64),
-            kind => bail!("its type {kind} is not read: it must be f4, f8, or of whole numbers"),
+            kind => {
+                bail!("its type {kind} is not read: it must be f2, f4, f8, or of whole numbers")
+            }
         };
         Ok(if self.fortran { self.by_rows(&numbers) } else { numbers })
     }
@@ -164,5 +167,40 @@ impl Array {
             _ => bail!(wrong),
         };
         Ok(letters.into_iter().collect::<String>().trim_end_matches('\0').to_owned())
+    }
+}
+
+/// The number that the bits of a float of 16 bits stand for.
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
+    let size = match (exponent, fraction) {
+        (0, _) => fraction * (-24_f64).exp2(),
+        (31, 0.0) => f64::INFINITY,
+        (31, _) => f64::NAN,
+        _ => (1024.0 + fraction) * f64::from(exponent - 25).exp2(),
+    };
+    if bits >> 15 == 0 { size } else { -size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves() {
+        for (bits, number) in [
+            (0x0000, 0.0),
+            (0x0001, 5.960_464_477_539_063e-8),
+            (0x03FF, 6.097_555_160_522_461e-5),
+            (0x0400, 6.103_515_625e-5),
+            (0x3555, 0.333_251_953_125),
+            (0x3C00, 1.0),
+            (0xC000, -2.0),
+            (0x7BFF, 65504.0),
+            (0xFC00, f64::NEG_INFINITY),
+        ] {
+            assert_eq!(half(bits), number, "{bits:x}");
+        }
+        assert!(half(0x7C01).is_nan());
     }
 }

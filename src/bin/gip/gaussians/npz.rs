@@ -60,6 +60,22 @@ fn arrays(spots: &Spots) -> [(&'static str, Vec<u8>); 5] {
     ]
 }
 
+/// What the arrays are called that are read.
+const NAMES: [&str; 10] = [
+    "center",
+    "covariance",
+    "cholesky",
+    "color",
+    "base_color",
+    "width",
+    "height",
+    "depth",
+    "kernel",
+    "cutoff",
+];
+/// What tells that there is a texture.
+const TEXTURE: &str = "texture_center";
+
 /// The arrays of an archive by their names.
 struct Arrays(BTreeMap<String, Array>);
 
@@ -99,11 +115,19 @@ fn whole<T: TryFrom<u64>>(number: f64) -> Option<T> {
     is_whole.then(|| T::try_from(number as u64).ok()).flatten()
 }
 
-/// Reads an archive, whose arrays have at most so many bytes.
+/// Reads an archive, of which what is read has at most so many bytes.
 pub(crate) fn read(bytes: &[u8], most: u64) -> Result<Imported> {
     let mut arrays = Arrays(BTreeMap::new());
-    for (name, contents) in zip::read(bytes, most)? {
-        let name = name.strip_suffix(".npy").unwrap_or(&name).to_owned();
+    let array_of = |file: &str| file.strip_suffix(".npy").unwrap_or(file).to_owned();
+    let mut has_texture = false;
+    // Whatever else is there may be of any kind.
+    let is_read = |file: &str| {
+        let name = array_of(file);
+        has_texture |= name == TEXTURE;
+        NAMES.contains(&&*name)
+    };
+    for (file, contents) in zip::read(bytes, most, is_read)? {
+        let name = array_of(&file);
         let array = Array::parse(&contents).with_context(|| name.clone())?;
         arrays.0.insert(name, array);
     }
@@ -155,7 +179,7 @@ pub(crate) fn read(bytes: &[u8], most: u64) -> Result<Imported> {
     };
     let mut imported =
         Imported { fields, channels: Some(channels), gaussians, ..Imported::default() };
-    if arrays.0.contains_key("texture_center") {
+    if has_texture {
         imported.warnings.push("its texture is left out".into());
     }
     Ok(imported)

@@ -4,7 +4,8 @@
 use anyhow::{Context, Result, anyhow, bail};
 use image_gip::{Gaussian, Header, Kernel};
 
-use super::model::{Fields, Imported, Spots, amplitudes, factor_of};
+use super::model::{BYTE_ORDER_MARK, Fields, Imported, Spots, amplitudes, factor_of};
+use crate::args;
 
 /// The spherical harmonic of degree 0, by which viewers multiply `f_dc`; 0.5 is added then.
 const HARMONIC: f64 = 0.282_094_791_773_878_14;
@@ -163,14 +164,17 @@ struct PlyHeader {
     lines: usize,
 }
 
-/// Reads a PLY: of this tool, or of 3D Gaussians, which are looked at along z and added up.
-pub(crate) fn read(bytes: &[u8]) -> Result<Imported> {
-    let end = b"end_header";
+/// Reads a PLY: of this tool, or of 3D Gaussians, which are looked at along z and added up. Amplitudes are what the shown
+/// colours are over the base colour that the file says; else over that of the arguments.
+pub(crate) fn read(bytes: &[u8], args: &args::HeaderArgs) -> Result<Imported> {
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    // A comment may have the same word.
+    let end = b"\nend_header";
     let end = bytes.windows(end.len()).take(MAX_HEADER).position(|part| part == end);
-    let (text, rest) = bytes.split_at(end.context("not a PLY file: it has no end_header")?);
-    let text = str::from_utf8(text).context("its header is no text")?;
+    let (text, rest) = bytes.split_at(end.context("not a PLY file: it has no end_header")? + 1);
     let after = rest.iter().position(|&byte| byte == b'\n').context("it ends in its header")?;
-    let header = parse_header(text)?;
+    // Comments may have any encoding.
+    let header = parse_header(&String::from_utf8_lossy(text))?;
     let names: Vec<&str> = header.properties.iter().map(|(name, _)| &**name).collect();
     let at = |name: &str| names.iter().position(|&known| known == name);
     let required = |name: &str| at(name).with_context(|| format!("it has no property {name}"));
@@ -193,9 +197,14 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Imported> {
         imported.fields.kernel = Some("exponential".into());
         imported.fields.cutoff = Some(Kernel::PAPER.cutoff());
     }
+    let has_alpha = columns.alpha.is_some();
+    if imported.fields.base_color.is_none() {
+        let channels = if has_alpha { 4 } else { 3 };
+        imported.fields.base_color = args.base_color(imported.fields.depth, channels)?;
+    }
     let of_base = imported.fields.base_color.as_ref().map(Vec::len);
-    let channels = of_base.unwrap_or(if columns.alpha.is_some() { 4 } else { 3 });
-    if !(1..=4).contains(&channels) || channels.is_multiple_of(2) != columns.alpha.is_some() {
+    let channels = of_base.unwrap_or(if has_alpha { 4 } else { 3 });
+    if !(1..=4).contains(&channels) || channels.is_multiple_of(2) != has_alpha {
         bail!("base_color has {channels} numbers, which do not fit the properties");
     }
     imported.channels = Some(channels);
@@ -242,9 +251,17 @@ fn parse_header(text: &str) -> Result<PlyHeader> {
                 vertices = Some(count.parse().with_context(wrong)?);
             }
             ["element", ..] if vertices.is_some() => is_after = true,
+            ["element", name, _] => {
+                bail!(
+                    "its first element is {name}: only files that begin with their vertices are read"
+                )
+            }
             ["property", ..] if is_after => {}
             ["property", kind, name] if vertices.is_some() && properties.len() < MAX_PROPERTIES => {
                 properties.push((name.to_owned(), Scalar::named(kind).with_context(wrong)?));
+            }
+            ["property", "list", ..] => {
+                bail!("line {number} of its header: vertices with lists are not read")
             }
             _ => bail!(wrong()),
         }
@@ -311,9 +328,14 @@ impl<'a> Rows<'a> {
             }
             Encoding::Ascii => {
                 let lines = self.lines.as_mut().expect("they are text");
-                let line =
-                    lines.next().with_context(|| format!("it ends before vertex {index}"))?;
-                self.line += 1;
+                let mut next = || {
+                    self.line += 1;
+                    lines.next().with_context(|| format!("it ends before vertex {index}"))
+                };
+                let mut line = next()?;
+                while line.trim().is_empty() {
+                    line = next()?;
+                }
                 let (number, wanted) = (self.line, self.properties.len());
                 for word in line.split_whitespace() {
                     let wrong = || format!("line {number}: {word:?} is not a number");

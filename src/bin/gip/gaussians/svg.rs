@@ -2,7 +2,7 @@
 
 use core::fmt::Write;
 
-use image_gip::{DecodeError, Gaussian, Header, Kernel, Limits, Picture, RenderOptions};
+use image_gip::{DecodeError, Gaussian, Header, Kernel, LimitKind, Limits, Picture, RenderOptions};
 
 use super::model::Spots;
 
@@ -12,6 +12,10 @@ const PARTS: u32 = 64;
 const COLORS: [&str; 4] = ["#f00", "#0f0", "#00f", "#fff"];
 /// The class of all colours at once.
 const WHITE: usize = 3;
+/// An opacity below half a step of 16 bits shows nowhere.
+const LEAST_OPACITY: f64 = 1.0 / 131_072.0;
+/// About how many bytes a circle takes.
+const CIRCLE: f64 = 128.0;
 
 /// The picture. Colours and alpha are sums of their own; alpha is a mask.
 pub(crate) fn write(spots: &Spots, limits: &Limits) -> Result<String, DecodeError> {
@@ -81,6 +85,7 @@ fn layers(
 ) -> Result<String, DecodeError> {
     let (width, height) = (spots.header.width, spots.header.height);
     let slope = largest_sum(spots, channels, limits)?;
+    check_length(spots, channels, slope, limits)?;
     let size = format!("width=\"{width}\" height=\"{height}\"");
     let mut out = String::from("<g class=\"g\"");
     if slope > 1.0 {
@@ -121,8 +126,7 @@ fn circles(out: &mut String, gaussian: &Gaussian, amplitude: f64, class: usize, 
     let mut rest = amplitude;
     let radius = kernel.cutoff().sqrt();
     let ([x, y], [l11, l21, l22]) = (gaussian.center, gaussian.cholesky);
-    // An opacity below half a step of 16 bits shows nowhere.
-    while rest >= 1.0 / 131_072.0 {
+    while rest >= LEAST_OPACITY {
         let opacity = rest.min(1.0);
         rest -= opacity;
         let _ = writeln!(
@@ -131,6 +135,30 @@ fn circles(out: &mut String, gaussian: &Gaussian, amplitude: f64, class: usize, 
              fill-opacity=\"{opacity:.5}\"/>"
         );
     }
+}
+
+/// Refuses what takes more memory than is allowed: an amplitude of thousands takes thousands of circles.
+fn check_length(
+    spots: &Spots,
+    channels: &[(usize, usize)],
+    slope: f64,
+    limits: &Limits,
+) -> Result<(), DecodeError> {
+    let amplitudes = spots
+        .gaussians
+        .iter()
+        .flat_map(|gaussian| channels.iter().map(|&(channel, _)| gaussian.color[channel]));
+    let opacities = amplitudes.map(|amplitude| f64::from(amplitude.abs()) / slope);
+    let circles: f64 = opacities.filter(|sum| *sum >= LEAST_OPACITY).map(f64::ceil).sum();
+    let wanted = (circles * CIRCLE) as u64;
+    if wanted > limits.max_memory {
+        return Err(DecodeError::Limit {
+            kind: LimitKind::Memory,
+            wanted,
+            allowed: limits.max_memory,
+        });
+    }
+    Ok(())
 }
 
 /// The largest sum of base colour and positive amplitudes, at least 1.

@@ -68,8 +68,12 @@ impl Archive {
     }
 }
 
-/// The files of an archive with their names, which have at most so many bytes together.
-pub(crate) fn read(archive: &[u8], most: u64) -> Result<Vec<(String, Vec<u8>)>> {
+/// The wanted files of an archive with their names, which have at most so many bytes together.
+pub(crate) fn read(
+    archive: &[u8],
+    most: u64,
+    mut is_wanted: impl FnMut(&str) -> bool,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let end = (0..=archive.len().saturating_sub(END_LENGTH))
         .rev()
         .take(usize::from(u16::MAX) + 1)
@@ -93,6 +97,9 @@ pub(crate) fn read(archive: &[u8], most: u64) -> Result<Vec<(String, Vec<u8>)>> 
         let name_bytes = slice(archive, at + 46, name)?;
         let name_text = String::from_utf8_lossy(name_bytes).into_owned();
         at += 46 + name + extra + comment;
+        if !is_wanted(&name_text) {
+            continue;
+        }
 
         let context = || format!("{name_text} in the ZIP archive");
         if flags & 1 != 0 {

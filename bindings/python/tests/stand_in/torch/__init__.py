@@ -43,7 +43,12 @@ _default = Generator()
 manual_seed = _default.manual_seed
 
 
-def empty(shape: Sequence[int], dtype: Any, memory_format: str = contiguous_format) -> Tensor:
+def empty(
+    shape: Sequence[int],
+    dtype: Any,
+    device: str = "cpu",
+    memory_format: str = contiguous_format,
+) -> Tensor:
     if memory_format == channels_last:
         pictures, channels, height, width = shape
         samples = np.empty((pictures, height, width, channels), dtype)
@@ -51,7 +56,7 @@ def empty(shape: Sequence[int], dtype: Any, memory_format: str = contiguous_form
     return np.empty(shape, dtype).view(Tensor)
 
 
-def rand(count: int, generator: Generator | None = None) -> Any:
+def rand(count: int, generator: Generator | None = None, device: str = "cpu") -> Any:
     return (generator or _default).numbers.random(count)
 
 
