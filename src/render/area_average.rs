@@ -2,27 +2,21 @@
 //! (spec, section 9.5).
 
 use alloc::vec::Vec;
-use core::array;
 use core::ops::Range;
 
 use super::axis::Axis;
 use super::tile::PairPlane;
 use super::tile_grid::{PAIR_WIDTH, TILE_HEIGHT};
-use crate::simd::Backend;
 
 /// What the weight of a colour exceeds its alpha by, so that there is a colour where alpha is 0.
 const LEAST_WEIGHT: f32 = 1.0 / 65536.0;
-/// Most rows of the output that a row of tiles is in.
-const MOST_ROWS: usize = TILE_HEIGHT + 1;
 
-/// The averages of some rows of the output, in memory that is used again.
+/// The average of one row of the output at a time, in memory that is used again.
 #[derive(Debug, Default)]
 pub(crate) struct AreaAverage {
-    /// The rows that are not complete yet.
-    rows: Range<u32>,
-    /// What the present row of tiles is of these rows.
-    parts: Vec<Part>,
-    /// What the rows of the grid have added to each of these: [`MOST_ROWS`] x channels x width of pairs of tiles.
+    /// A row of tiles of the grid: channels x [`TILE_HEIGHT`] x width.
+    tiles: Vec<f32>,
+    /// What the rows of the grid add to the row of the output: channels x width of the grid.
     sums: Vec<f32>,
     /// A row of the output: channels x width.
     means: Vec<f32>,
@@ -30,16 +24,6 @@ pub(crate) struct AreaAverage {
     spans: Vec<Range<usize>>,
     /// What is the same of each pixel of the output and of each column of its span.
     overlaps: Vec<f32>,
-}
-
-/// The lines of a row of tiles that are in a row of the output.
-#[derive(Debug)]
-struct Part {
-    lines: Range<usize>,
-    /// How much of each line of the tiles is in it.
-    overlaps: [f32; TILE_HEIGHT],
-    /// Whether it has no further lines.
-    is_last: bool,
 }
 
 /// How a picture is averaged: its axes, the part that is rendered, and its channels.
@@ -58,29 +42,24 @@ impl Averaging {
         self.axes[0].span(self.columns.0..self.columns.0 + self.columns.1)
     }
 
-    /// The columns of all pairs of tiles.
-    fn width(&self) -> usize {
-        self.grid_columns().len().next_multiple_of(PAIR_WIDTH)
-    }
-
     /// The memory of an [`AreaAverage`] in bytes.
     pub(crate) fn memory(&self) -> u64 {
-        let (width, pixels) = (self.width() as u64, u64::from(self.columns.1));
-        let samples = (width * MOST_ROWS as u64 + pixels) * self.channels as u64;
+        let width = self.grid_columns().len() as u64;
+        let pixels = u64::from(self.columns.1);
+        let samples = (width * (TILE_HEIGHT as u64 + 1) + pixels) * self.channels as u64;
         // A column of the grid may be in two pixels of the output.
         let overlaps = width + pixels;
-        let others =
-            pixels * size_of::<Range<usize>>() as u64 + (MOST_ROWS * size_of::<Part>()) as u64;
-        (samples + overlaps) * size_of::<f32>() as u64 + others
+        (samples + overlaps) * size_of::<f32>() as u64 + pixels * size_of::<Range<usize>>() as u64
     }
 }
 
 impl AreaAverage {
-    /// Begins with some rows of the output.
-    pub(crate) fn begin(&mut self, averaging: &Averaging, rows: Range<u32>) {
-        self.rows = rows;
+    /// Begins with a strip of the output.
+    pub(crate) fn begin(&mut self, averaging: &Averaging) {
+        let width = averaging.grid_columns().len();
+        self.tiles.resize(averaging.channels * TILE_HEIGHT * width, 0.0);
         self.sums.clear();
-        self.sums.resize(MOST_ROWS * averaging.channels * averaging.width(), 0.0);
+        self.sums.resize(averaging.channels * width, 0.0);
         self.means.resize(averaging.channels * averaging.columns.1 as usize, 0.0);
         self.spans.clear();
         self.overlaps.clear();
@@ -92,103 +71,59 @@ impl AreaAverage {
         }
     }
 
-    /// Begins with a row of tiles, whose first line is `top` in the grid, and of which these lines count.
-    pub(crate) fn begin_tiles(&mut self, averaging: &Averaging, top: u32, lines: Range<u32>) {
-        let axis = averaging.axes[1];
-        self.parts.clear();
-        for row in self.rows.clone() {
-            let span = axis.span(row..row + 1);
-            let common = span.start.max(lines.start)..span.end.min(lines.end);
-            if common.is_empty() {
-                break;
+    /// Takes a pair of tiles whose first column is `x`: clamps the sums, and multiplies colours by
+    /// alpha.
+    pub(crate) fn take(&mut self, averaging: &Averaging, planes: &[PairPlane], x: usize) {
+        let width = self.sums.len() / averaging.channels;
+        let length = PAIR_WIDTH.min(width - x);
+        for row in 0..TILE_HEIGHT {
+            let mut weights = [1.0; PAIR_WIDTH];
+            if averaging.has_alpha {
+                let alpha = planes[averaging.channels - 1][row];
+                weights = alpha.map(|alpha| alpha.clamp(0.0, 1.0) + LEAST_WEIGHT);
             }
-            let of_tiles = (common.start - top) as usize..(common.end - top) as usize;
-            let overlap = |line| {
-                if of_tiles.contains(&line) { axis.overlap(row, top + line as u32) } else { 0.0 }
-            };
-            let overlaps = array::from_fn(overlap);
-            self.parts.push(Part { lines: of_tiles, overlaps, is_last: span.end <= lines.end });
-        }
-    }
-
-    /// Takes a pair of tiles whose first column is `x`: clamps the sums, multiplies colours by alpha, and adds each
-    /// line to the rows of the output that it is in.
-    pub(crate) fn take(
-        &mut self,
-        backend: Backend,
-        averaging: &Averaging,
-        planes: &[PairPlane],
-        x: usize,
-    ) {
-        backend.run(
-            #[inline(always)]
-            || self.add(averaging, planes, x),
-        );
-    }
-
-    #[inline(always)]
-    fn add(&mut self, averaging: &Averaging, planes: &[PairPlane], x: usize) {
-        let (width, channels) = (averaging.width(), averaging.channels);
-        for (channel, plane) in planes.iter().enumerate() {
-            // Loops, as closures of the library's functions would not be compiled for the SIMD level.
-            let mut values = *plane;
-            for value in values.as_flattened_mut() {
-                *value = value.clamp(0.0, 1.0);
-            }
-            if averaging.has_alpha && channel + 1 < channels {
-                let alphas = planes[channels - 1].as_flattened();
-                for (value, alpha) in values.as_flattened_mut().iter_mut().zip(alphas) {
-                    *value *= alpha.clamp(0.0, 1.0) + LEAST_WEIGHT;
+            for (channel, plane) in planes.iter().enumerate() {
+                let mut values = plane[row].map(|sum| sum.clamp(0.0, 1.0));
+                if !averaging.has_alpha || channel + 1 < averaging.channels {
+                    values.iter_mut().zip(&weights).for_each(|(value, weight)| *value *= weight);
                 }
-            }
-            for (row, part) in self.parts.iter().enumerate() {
-                let sums = &mut self.sums[(row * channels + channel) * width + x..];
-                let sums = sums.first_chunk_mut::<PAIR_WIDTH>().expect("rows have whole pairs");
-                let mut new = *sums;
-                let lines = values[part.lines.clone()].iter();
-                for (line, overlap) in lines.zip(&part.overlaps[part.lines.clone()]) {
-                    for at in 0..PAIR_WIDTH {
-                        new[at] += overlap * line[at];
-                    }
-                }
-                *sums = new;
+                let line = (channel * TILE_HEIGHT + row) * width + x;
+                self.tiles[line..line + length].copy_from_slice(&values[..length]);
             }
         }
     }
 
-    /// Ends with a row of tiles. Calls `write` with each row of the output that is complete, and the means of its
-    /// channels: channels x width.
-    pub(crate) fn end_tiles(
+    /// Adds a row of the grid that is in row `line` of the tiles, as much of it as is in a row of
+    /// the output. Returns that row if it is complete: channels x width.
+    pub(crate) fn add(
         &mut self,
-        backend: Backend,
         averaging: &Averaging,
-        write: &mut dyn FnMut(u32, &[f32]),
-    ) {
-        let complete = self.parts.iter().filter(|part| part.is_last).count();
-        for row in 0..complete {
-            backend.run(
-                #[inline(always)]
-                || self.finish(averaging, row),
-            );
-            write(self.rows.start, &self.means);
-            self.rows.start += 1;
+        line: usize,
+        of_grid: u32,
+        row: u32,
+    ) -> Option<&[f32]> {
+        let rows = averaging.axes[1];
+        let overlap = rows.overlap(row, of_grid);
+        let width = self.sums.len() / averaging.channels;
+        let lines = self.tiles.chunks_exact(width).skip(line).step_by(TILE_HEIGHT);
+        for (sums, values) in self.sums.chunks_exact_mut(width).zip(lines) {
+            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += overlap * value);
         }
-        // The next row of tiles goes on with what is not complete.
-        let length = averaging.channels * averaging.width();
-        let begun = complete * length..self.parts.len() * length;
-        self.sums.copy_within(begun.clone(), 0);
-        self.sums[begun.len()..begun.end].fill(0.0);
+        if of_grid + 1 < rows.span(row..row + 1).end {
+            return None;
+        }
+        self.finish(averaging);
+        Some(&self.means)
     }
 
-    /// Averages the sums of a row along the columns, and divides colours by alpha.
-    #[inline(always)]
-    fn finish(&mut self, averaging: &Averaging, row: usize) {
+    /// Averages the sums of a row along the columns, divides colours by alpha, and begins the next
+    /// row.
+    fn finish(&mut self, averaging: &Averaging) {
         let [columns, rows] = averaging.axes;
-        let (width, of_grid) = (averaging.columns.1 as usize, averaging.width());
-        let length = averaging.channels * of_grid;
-        let sums = &mut self.sums[row * length..][..length];
-        sums.iter_mut().for_each(|sum| *sum /= rows.grid() as f32);
-        for (means, sums) in self.means.chunks_exact_mut(width).zip(sums.chunks_exact(of_grid)) {
+        let (width, of_grid) = (averaging.columns.1 as usize, averaging.grid_columns().len());
+        self.sums.iter_mut().for_each(|sum| *sum /= rows.grid() as f32);
+        for (means, sums) in self.means.chunks_exact_mut(width).zip(self.sums.chunks_exact(of_grid))
+        {
             let mut overlaps = &self.overlaps[..];
             for (mean, span) in means.iter_mut().zip(&self.spans) {
                 let (of_pixel, others) = overlaps.split_at(span.len());
@@ -207,5 +142,6 @@ impl AreaAverage {
                     .for_each(|(color, alpha)| *color /= alpha + LEAST_WEIGHT);
             }
         }
+        self.sums.fill(0.0);
     }
 }

@@ -155,7 +155,8 @@ impl<'a> PreparedRender<'a> {
         let lines = axes[1].span(first..end);
         let (top, bottom) = ((lines.start - grid.y) as usize, (lines.end - grid.y) as usize);
         let Memory { rows, average } = memory;
-        average.begin(averaging, first..end);
+        average.begin(averaging);
+        let mut row = first;
         for band in top / BAND_HEIGHT..bottom.div_ceil(BAND_HEIGHT) {
             rows.band.prepare(&self.bands, band, &self.input, self.backend);
             for tiles in 0..self.bands.rows(band) {
@@ -164,14 +165,18 @@ impl<'a> PreparedRender<'a> {
                 if inside.is_empty() {
                     continue;
                 }
-                let inside = grid.y + inside.start as u32..grid.y + inside.end as u32;
-                average.begin_tiles(averaging, grid.y + y as u32, inside);
-                self.row(rows, band, tiles, &mut |planes, x| {
-                    average.take(self.backend, averaging, planes, x);
-                });
-                average.end_tiles(self.backend, averaging, &mut |row, means| {
-                    write((row - first) as usize, means);
-                });
+                self.row(rows, band, tiles, &mut |planes, x| average.take(averaging, planes, x));
+                for line in inside {
+                    let of_grid = grid.y + line as u32;
+                    // A row of the grid may be in two rows of the output.
+                    while row < end && axes[1].span(row..row + 1).contains(&of_grid) {
+                        let Some(means) = average.add(averaging, line - y, of_grid, row) else {
+                            break;
+                        };
+                        write((row - first) as usize, means);
+                        row += 1;
+                    }
+                }
             }
         }
     }
