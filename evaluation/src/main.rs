@@ -4,17 +4,23 @@ mod baselines;
 mod bench;
 mod blind;
 mod canvas;
+mod code;
 mod comparison;
 mod contents;
 mod curve;
+mod fetch;
 mod gip;
 mod kernel_benchmark;
 mod local_statistics;
+mod manifest;
 mod memory;
 mod metric;
+mod number;
+mod origins;
 mod pictures;
 mod plot;
 mod provenance;
+mod prune;
 mod python;
 mod report;
 mod sections;
@@ -41,7 +47,7 @@ use sections::{
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
 ///
-/// Nothing is measured twice on the same machine with the same version of the codec: an interrupted
+/// Nothing is measured twice on the same machine with the same code of the codec: an interrupted
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -54,9 +60,11 @@ struct Cli {
     command: Option<Command>,
 }
 
-/// What there is to do besides the report: the blind choice.
+/// What there is to do besides measuring: the blind choice, and what belongs to the report.
 #[derive(Debug, Subcommand)]
 enum Command {
+    Fetch(fetch::Args),
+    Prune(prune::Args),
     Triplets(triplets::Args),
     Choices(choices::Args),
 }
@@ -89,6 +97,8 @@ struct Args {
 fn main() -> Result<()> {
     let Cli { folders, report, command } = Cli::parse();
     match command {
+        Some(Command::Fetch(args)) => fetch::fetch(&args),
+        Some(Command::Prune(args)) => prune::prune(&args),
         Some(Command::Triplets(args)) => triplets::make(&args),
         Some(Command::Choices(args)) => choices::print(&args),
         None => {
@@ -102,6 +112,7 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+    store::tidy(&args.out)?;
     let mut bench = Bench::new(folders, args.out, args.quick, args.iterations, args.reference)?;
     bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
@@ -109,8 +120,16 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
         let text = measure(section, &mut bench)?;
         let path = bench.path("report.md");
-        report::update(&path, section, &format!("{}\n{text}", bench.provenance()))?;
+        let provenance = bench.provenance()?;
+        report::update(&path, section, &format!("{provenance}\n{text}"))?;
+        // All its stores are closed.
+        store::tidy(&bench.path(""))?;
         eprintln!("{} (after {:.0} s)", path.display(), start.elapsed().as_secs_f64());
+    }
+    let report = fs::read_to_string(bench.path("report.md"))?;
+    let stale = report::of_other_versions(&report, &bench.product);
+    if !stale.is_empty() {
+        eprintln!("not of this version, or missing: {}", report::names(&stale));
     }
     Ok(())
 }
