@@ -14,8 +14,8 @@ use super::key::{self, Shown, Triplet};
 use crate::canvas::{Canvas, LINE};
 use crate::table::Table;
 
-/// Of sheets as JPEG.
-const SHEET_QUALITY: u8 = 55;
+/// The most bytes of a sheet.
+const SHEET_BYTES: usize = 1_000_000;
 
 /// Prints what viewers chose, and gathers the triplets in which texture lost.
 ///
@@ -229,7 +229,7 @@ impl Round {
         for (name, lost) in sheets {
             let strips = lost.into_iter().map(|triplet| strip(triplet, triplets));
             let path = folder.join(name);
-            sheet(&strips.collect::<Result<Vec<_>>>()?).save_jpeg(&path, SHEET_QUALITY)?;
+            sheet(&strips.collect::<Result<Vec<_>>>()?).save_jpeg(&path, SHEET_BYTES)?;
             println!("{}", path.display());
         }
         Ok(())

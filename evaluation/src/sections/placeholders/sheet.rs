@@ -13,7 +13,7 @@ const PICTURES: usize = 6;
 /// They are side by side.
 const COLUMNS: u32 = 2;
 const GAP: u32 = 4;
-const QUALITY: u8 = 70;
+const BYTES: usize = 300_000;
 const NAME: &str = "sheet-placeholders.jpg";
 
 /// All placeholders of a picture, side by side: a row for each budget.
@@ -35,7 +35,7 @@ pub(super) fn make(bench: &mut Bench) -> Result<String> {
         let (name, original) = (picture.name.clone(), codecs::original(picture));
         blocks.push(Block { name, original, placeholders });
     }
-    draw(&blocks).save_jpeg(&bench.path(NAME), QUALITY)?;
+    draw(&blocks).save_jpeg(&bench.path(NAME), BYTES)?;
     Ok(format!(
         "\n![Placeholders of {count} pictures, with the bytes and the SSIMULACRA2 of each]({NAME})\n"
     ))
