@@ -1,12 +1,15 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
+use std::cell::RefCell;
 use std::fs;
+use std::mem;
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
 use crate::contents::Contents;
+use crate::figures::Figures;
 use crate::manifest::{Manifest, NAME};
 use crate::origins::Origins;
 use crate::pictures::{self, PictureSet, TestPicture};
@@ -68,6 +71,8 @@ pub(crate) struct Bench {
     manifest: Manifest,
     /// Names of pictures that the manifest does not list.
     unlisted: Vec<String>,
+    /// Of the section that is being measured.
+    figures: RefCell<Figures>,
 }
 
 impl Bench {
@@ -98,6 +103,7 @@ impl Bench {
             worker: None,
             manifest: Manifest::load()?,
             unlisted: Vec::new(),
+            figures: RefCell::default(),
         };
         bench.check_pictures()?;
         Ok(bench)
@@ -209,6 +215,17 @@ impl Bench {
         Ok((self.worker.insert(worker), versions))
     }
 
+    /// Names a figure of the section that is being measured, for texts that cite it: in `figures.csv` it has
+    /// the section's name and a slash before its own.
+    pub(crate) fn figure(&self, name: impl Into<String>, value: f64, unit: &str) {
+        self.figures.borrow_mut().add(name.into(), value, unit);
+    }
+
+    /// Writes the figures that were named, in place of all that the section had.
+    pub(crate) fn write_figures(&self, section: &str) -> Result<()> {
+        mem::take(&mut *self.figures.borrow_mut()).update(&self.folder, section)
+    }
+
     /// Where the measurements come from: the list at the head of every section.
     pub(crate) fn provenance(&self) -> Result<String> {
         // All sections of a version name the same commit, whatever else was committed between them.
@@ -305,5 +322,18 @@ mod tests {
         image::RgbImage::new(3, 2).save(images.path().join("kodim01.png")).expect("it is written");
         let refusal = open(images.path(), report.path()).expect_err("it is black").to_string();
         assert!(refusal.contains("is not the kodim01 that pictures.csv lists"), "{refusal}");
+    }
+
+    #[test]
+    fn figures_have_the_name_of_their_section() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
+        let bench = open(images.path(), report.path()).expect("there is a picture");
+        bench.figure("a/b", 0.5, "s");
+        bench.write_figures("decode").expect("it is written");
+        bench.write_figures("rate").expect("it is written");
+        let figures = Figures::load(report.path()).expect("a table");
+        assert!(figures.get("decode/a/b").is_some() && figures.get("rate/a/b").is_none());
     }
 }

@@ -4,11 +4,13 @@ mod baselines;
 mod bench;
 mod blind;
 mod canvas;
+mod check;
 mod code;
 mod comparison;
 mod contents;
 mod curve;
 mod fetch;
+mod figures;
 mod gip;
 mod kernel_benchmark;
 mod local_statistics;
@@ -22,6 +24,7 @@ mod plot;
 mod provenance;
 mod prune;
 mod python;
+mod readme;
 mod report;
 mod sections;
 mod store;
@@ -64,6 +67,8 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Fetch(fetch::Args),
+    Check(check::Args),
+    Readme(readme::Args),
     Prune(prune::Args),
     Triplets(triplets::Args),
     Choices(choices::Args),
@@ -98,6 +103,8 @@ fn main() -> Result<()> {
     let Cli { folders, report, command } = Cli::parse();
     match command {
         Some(Command::Fetch(args)) => fetch::fetch(&args),
+        Some(Command::Check(args)) => check::check(&args),
+        Some(Command::Readme(args)) => readme::check(&args),
         Some(Command::Prune(args)) => prune::prune(&args),
         Some(Command::Triplets(args)) => triplets::make(&args),
         Some(Command::Choices(args)) => choices::print(&args),
@@ -122,6 +129,7 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
         let path = bench.path("report.md");
         let provenance = bench.provenance()?;
         report::update(&path, section, &format!("{provenance}\n{text}"))?;
+        bench.write_figures(&section.to_string())?;
         // All its stores are closed.
         store::tidy(&bench.path(""))?;
         eprintln!("{} (after {:.0} s)", path.display(), start.elapsed().as_secs_f64());
@@ -169,6 +177,8 @@ mod tests {
         let args = ["evaluation", "triplets", "--pictures", "a", "--pictures", "b", "--out", "c"];
         let cli = Cli::try_parse_from(args).expect("it is as the README has it");
         assert!(matches!(cli.command, Some(Command::Triplets(_))));
+        let cli = Cli::try_parse_from(["evaluation", "readme", "--write"]);
+        assert!(matches!(cli.expect("as the README has it").command, Some(Command::Readme(_))));
         let cli = Cli::try_parse_from(["evaluation", "choices", "a"]);
         assert!(matches!(cli.expect("as the README has it").command, Some(Command::Choices(_))));
     }

@@ -179,6 +179,18 @@ mod tests {
     }
 
     #[test]
+    fn the_committed_report_is_small() {
+        let folder = Path::new(crate::provenance::FOLDER).join("report");
+        let bytes = |end: &str| -> u64 {
+            let files = fs::read_dir(&folder).expect("a folder").flatten();
+            let files = files.filter(|file| file.file_name().to_string_lossy().ends_with(end));
+            files.map(|file| file.metadata().expect("it is there").len()).sum()
+        };
+        assert!((1..=1_500_000).contains(&bytes(".jpg")), "sheets: {}", bytes(".jpg"));
+        assert!(bytes(".csv") <= 2_000_000, "measurements: {}", bytes(".csv"));
+    }
+
+    #[test]
     fn titles_differ() {
         // A section is found by its title.
         for (index, section) in Section::ALL.iter().enumerate() {

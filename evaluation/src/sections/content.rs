@@ -82,6 +82,8 @@ fn kinds_of_content(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
                 })?);
             }
             let [gaussians, bytes, psnr, seconds] = means(&all);
+            bench.figure(format!("{name}/{kind}/bytes"), bytes, "bytes");
+            bench.figure(format!("{name}/{kind}/PSNR"), psnr, "dB");
             if bytes > largest.0 {
                 largest = (bytes, *kind);
             }
@@ -149,6 +151,7 @@ fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut larger = Vec::new();
     for (name, [bytes, psnr]) in &rows {
         let share = rgb.map(|rgb| bytes / rgb - 1.0);
+        bench.figure(format!("{name}/against RGB"), 100.0 * share.unwrap_or(f64::NAN), "%");
         if share.is_some_and(|share| share > 0.0) {
             larger.push(*name);
         }

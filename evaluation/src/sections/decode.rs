@@ -63,7 +63,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     for rate in RATES {
         all.push(against_others(bench, &mut files, &pictures, rate)?);
     }
-    text.push_str(&ratios(&all));
+    text.push_str(&ratios(bench, &all));
     text.push_str(&breakdown(&all, &pictures));
     text.push_str(&region(bench)?);
     Ok(text)
@@ -407,7 +407,7 @@ fn theirs(
 }
 
 /// Tables of all decoders' times with one thread, and of our time divided by theirs.
-fn ratios(all: &[RateResults]) -> String {
+fn ratios(bench: &Bench, all: &[RateResults]) -> String {
     let mut text = String::from("\n### One thread\n");
     for RateResults { rate, rows, .. } in all {
         let mut table = Table::new(&[
@@ -421,6 +421,9 @@ fn ratios(all: &[RateResults]) -> String {
         ]);
         for row in rows {
             let [least, largest] = min_and_max(row.points.iter().map(|point| point[3]));
+            let name = |figure: &str| format!("{}/{rate} bpp/{figure}", row.decoder);
+            bench.figure(name("ms"), 1000.0 * row.mean(2), "ms");
+            bench.figure(name("ours to theirs"), row.ratio(), "");
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),

@@ -71,10 +71,15 @@ fn crops(
     let mut measured = Measured::new(command);
     let mut table =
         Table::new(&["", "SSIMULACRA2", "bytes", "crops a second", "with two processes"]);
+    let mut ours = f64::NAN;
     for reader in READERS {
         let key = [set, &pictures.len().to_string(), reader];
         let [ssimulacra2, bytes, one, two] =
             store.get(&bench.product, key, || measured.row(reader))?;
+        // The first reader is ours.
+        ours = if ours.is_nan() { one } else { ours };
+        bench.figure(format!("{set}/{reader}/crops"), one, "crops a second");
+        bench.figure(format!("{set}/{reader}/ours to theirs"), ours / one, "");
         let numbers = [format!("{ssimulacra2:.1}"), format!("{bytes:.0}"), format!("{one:.0}")];
         table.row(&[&[reader.to_owned()], &numbers[..], &[format!("{two:.0}")]].concat());
     }
@@ -104,6 +109,7 @@ fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
                 store.get(&bench.product, key, || measured.row(learned))?;
             // Without a file, they are the same for each quality.
             if bytes > 0.0 || index == 0 {
+                bench.figure(format!("{learned}/{quality}/accuracy"), accuracies[0], "%");
                 let bytes = if bytes > 0.0 { format!("{bytes:.0}") } else { "-".into() };
                 let accuracies = accuracies.map(|accuracy| format!("{accuracy:.1}"));
                 table.row(&[&[learned.to_owned(), bytes], &accuracies[..]].concat());

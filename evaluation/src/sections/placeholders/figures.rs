@@ -45,6 +45,14 @@ pub(super) fn measure(bench: &mut Bench) -> Result<String> {
     for set in bench.sets() {
         let of_codec = |codec| figures(bench, &mut store, codec, &set);
         let all = Codec::ALL.into_iter().map(of_codec).collect::<Result<Vec<_>>>()?;
+        for (codec, at_budgets) in Codec::ALL.into_iter().zip(&all) {
+            for (budget, figures) in BUDGETS.iter().zip(at_budgets) {
+                let scores = figures.iter().map(|[_, ssimulacra2, _]| *ssimulacra2);
+                let score = mean(scores.filter(|score| !score.is_nan())).unwrap_or(f64::NAN);
+                let name = format!("{}/{}/{budget} bytes", set.name, codec.name());
+                bench.figure(name, score, "SSIMULACRA2");
+            }
+        }
         text.push_str(&format!("\n### Placeholders: {}\n{}", set.name, table(&all)));
     }
     Ok(text)
