@@ -17,11 +17,11 @@ use crate::store::{Source, Store};
 use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
-const QUICK_PICTURES: usize = 4;
+const QUICK_PICTURES: usize = 2;
 const QUICK_LARGE_PICTURES: usize = 1;
 /// Iterations of the published methods, if no others are asked for.
 const ITERATIONS: u32 = 3_000;
-const QUICK_ITERATIONS: u32 = 2_000;
+const QUICK_ITERATIONS: u32 = 1_000;
 
 /// Where the pictures are.
 #[derive(Debug, clap::Args)]

@@ -80,13 +80,13 @@ struct Args {
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
-    /// Four pictures of each set and fewer settings: twenty minutes on two cores.
+    /// Two pictures of each set and fewer settings: ten minutes on two cores.
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].
     #[arg(long, value_enum, value_name = "SECTION")]
     only: Vec<Section>,
-    /// Iterations of the published methods [default: 3000, quick: 2000; the paper: 50000].
+    /// Iterations of the published methods [default: 3000, quick: 1000; the paper: 50000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     iterations: Option<u32>,
     /// CSV with measurements of the same baselines by other programs, to compare ours with; it

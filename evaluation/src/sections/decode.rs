@@ -26,7 +26,7 @@ use crate::versions::nearest;
 const RATES: [f64; 3] = [0.25, 0.5, 1.0];
 /// How many pictures are decoded.
 const PICTURES: usize = 8;
-const QUICK_PICTURES: usize = 2;
+const QUICK_PICTURES: usize = 1;
 /// Parts of our decoder are timed as medians over so many runs.
 const REPEATS: usize = 15;
 /// Decoders that are compared take turns, because the speed of a machine drifts: so many turns of

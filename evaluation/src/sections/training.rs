@@ -14,7 +14,7 @@ use crate::table::Table;
 
 /// The pictures that crops are made of.
 const PICTURES: usize = 8;
-const QUICK_PICTURES: usize = 2;
+const QUICK_PICTURES: usize = 1;
 /// What crops are read by, as the program calls it.
 const READERS: [&str; 7] = [
     "gip",
@@ -29,6 +29,7 @@ const READERS: [&str; 7] = [
 const LEARNED: [&str; 3] = ["the pictures", "gip", "JPEG"];
 /// Qualities of JPEG whose bytes all have.
 const QUALITIES: [&str; 2] = ["10", "30"];
+const QUICK_QUALITIES: [&str; 1] = ["30"];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let programs = Path::new(FOLDER).join("../bindings/python");
@@ -95,11 +96,12 @@ fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
         ["bytes", "accuracy", "lowest", "highest"],
     )?;
     let mut table = Table::new(&["learned from", "bytes", "accuracy in %", "lowest", "highest"]);
-    for (index, quality) in QUALITIES.into_iter().enumerate() {
+    let qualities: &[&str] = if bench.quick { &QUICK_QUALITIES } else { &QUALITIES };
+    for (index, &quality) in qualities.iter().enumerate() {
         let mut command = run("learning.py");
         command.args(["--quality", quality]);
         if bench.quick {
-            command.args(["--pictures", "900", "--epochs", "10", "--seeds", "1"]);
+            command.args(["--pictures", "300", "--epochs", "4", "--seeds", "1"]);
         }
         let mut measured = Measured::new(command);
         let extent = if bench.quick { "quick" } else { "full" };

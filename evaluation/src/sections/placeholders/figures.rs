@@ -9,6 +9,9 @@ use crate::pictures::PictureSet;
 use crate::store::Store;
 use crate::table::{Table, mean, median};
 
+/// How many pictures of a set a quick run takes.
+const QUICK_PICTURES: usize = 1;
+
 /// What the CSV file has of a placeholder at each of the budgets; NaN where there is none.
 const COLUMNS: [&str; 12] = [
     "bytes_100",
@@ -71,7 +74,8 @@ fn figures(
         Codec::Baseline(_) => bench.baselines()?.1,
     };
     let mut at_budgets = vec![Vec::new(); BUDGETS.len()];
-    for picture in &set.pictures {
+    let taken = if bench.quick { QUICK_PICTURES } else { usize::MAX };
+    for picture in set.pictures.iter().take(taken) {
         let values = store.get(&version, [codec.name(), &picture.name], || {
             let placeholders = codec.placeholders(bench, picture)?;
             let figures = placeholders.map(|placeholder| {
