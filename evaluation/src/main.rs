@@ -182,4 +182,30 @@ mod tests {
         let cli = Cli::try_parse_from(["evaluation", "choices", "a"]);
         assert!(matches!(cli.expect("as the README has it").command, Some(Command::Choices(_))));
     }
+
+    #[test]
+    fn a_second_run_measures_nothing_and_writes_the_same_bytes() {
+        let (pictures, out) = (tempfile::tempdir(), tempfile::tempdir());
+        let (pictures, out) = (pictures.expect("a folder"), out.expect("a folder"));
+        let pixel = |x: u32, y: u32| image::Rgb([(x * 15) as u8, (y * 13) as u8, 90]);
+        let picture = image::RgbImage::from_fn(16, 16, pixel);
+        picture.save(pictures.path().join("a.png")).expect("it is written");
+        let run = || {
+            let folders = ["--kodak", pictures.path().to_str().expect("it is text")];
+            let report = ["--out", out.path().to_str().expect("it is text"), "--quick"];
+            let args = [&["evaluation"], &folders[..], &report, &["--only", "monotony"]].concat();
+            let cli = Cli::try_parse_from(args).expect("it is as the README has it");
+            write_report(&cli.folders.expect("given"), cli.report.expect("given"))
+                .expect("it is measured");
+            let names = ["report.md", "monotony.csv", "origins.csv", "figures.csv", "images.csv"];
+            names.map(|name| fs::read_to_string(out.path().join(name)).expect(name))
+        };
+        let files = run();
+        let [report, monotony, origins, figures, _] = &files;
+        assert!(report.contains("\n## More bits, more effort\n"), "{report}");
+        assert!(monotony.lines().is_sorted_by(|a, b| a.starts_with("origin,") || a < b));
+        assert_eq!(origins.lines().count(), 3, "of the codec, and of pictures");
+        assert!(figures.contains("\nmonotony/pictures,1.0,pictures\n"), "{figures}");
+        assert_eq!(run(), files);
+    }
 }
