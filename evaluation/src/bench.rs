@@ -1,22 +1,27 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
+use std::cell::RefCell;
 use std::fs;
+use std::mem;
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
 use crate::contents::Contents;
+use crate::figures::Figures;
+use crate::manifest::{Manifest, NAME};
+use crate::origins::Origins;
 use crate::pictures::{self, PictureSet, TestPicture};
-use crate::store::Store;
+use crate::store::{Source, Store};
 use crate::{gip, provenance};
 
 /// How many pictures a quick run takes.
-const QUICK_PICTURES: usize = 4;
+const QUICK_PICTURES: usize = 2;
 const QUICK_LARGE_PICTURES: usize = 1;
 /// Iterations of the published methods.
 const ITERATIONS: u32 = 3_000;
-const QUICK_ITERATIONS: u32 = 2_000;
+const QUICK_ITERATIONS: u32 = 1_000;
 
 /// Where the pictures are.
 #[derive(Debug, clap::Args)]
@@ -62,9 +67,14 @@ pub(crate) struct Bench {
     pub(crate) readme_picture: Option<PathBuf>,
     /// The version of our codec.
     pub(crate) product: String,
-    machine: String,
+    source: Source,
     folder: PathBuf,
     worker: Option<Worker>,
+    manifest: Manifest,
+    /// Names of pictures that the manifest does not list.
+    unlisted: Vec<String>,
+    /// Of the section that is being measured.
+    figures: RefCell<Figures>,
 }
 
 impl Bench {
@@ -79,7 +89,7 @@ impl Bench {
         let others = |folder: &Option<PathBuf>, few| {
             folder.as_ref().map_or(Ok(Vec::new()), |folder| load(folder, few))
         };
-        let bench = Self {
+        let mut bench = Self {
             pictures: load(&folders.kodak, QUICK_PICTURES)?,
             photos: others(&folders.photos, QUICK_PICTURES)?,
             large: others(&folders.large, QUICK_LARGE_PICTURES)?,
@@ -90,20 +100,34 @@ impl Bench {
             is_long,
             reference,
             readme_picture: None,
-            product: provenance::product(),
-            machine: provenance::machine(),
+            product: provenance::product()?,
+            source: Source { machine: provenance::machine(), commit: provenance::commit() },
             folder,
             worker: None,
+            manifest: Manifest::load()?,
+            unlisted: Vec::new(),
+            figures: RefCell::default(),
         };
         bench.check_pictures()?;
         Ok(bench)
     }
 
-    /// Makes sure that the folder has no measurements of another picture with the same name.
-    fn check_pictures(&self) -> Result<()> {
+    /// Makes sure that pictures are those of the manifest, and of others that the folder has no measurements
+    /// of another picture with the same name.
+    fn check_pictures(&mut self) -> Result<()> {
+        let mut unlisted = Vec::new();
+        for (set, pictures) in self.folders() {
+            for picture in pictures {
+                if !self.manifest.has(set, picture)? {
+                    unlisted.push(picture);
+                }
+            }
+        }
+        if unlisted.is_empty() {
+            return Ok(());
+        }
         let mut store = self.store("images.csv", ["image"], ["width", "height", "crc32"])?;
-        let photographs = self.pictures.iter().chain(&self.photos).chain(&self.large);
-        for picture in photographs.chain(&self.screens) {
+        for picture in &unlisted {
             let crc = f64::from(crc32fast::hash(&picture.rgb));
             let known = [picture.width.into(), picture.height.into(), crc];
             ensure!(
@@ -113,7 +137,18 @@ impl Bench {
                 picture.name
             );
         }
+        self.unlisted = unlisted.into_iter().map(|picture| picture.name.clone()).collect();
         Ok(())
+    }
+
+    /// The pictures of each folder, by the manifest's names of the sets.
+    fn folders(&self) -> [(&'static str, &[TestPicture]); 4] {
+        [
+            ("kodak", &self.pictures),
+            ("photos", &self.photos),
+            ("large", &self.large),
+            ("screens", &self.screens),
+        ]
     }
 
     /// The sets of pictures, the first of which is [`Self::pictures`].
@@ -148,7 +183,7 @@ impl Bench {
         keys: [&str; K],
         values: [&str; V],
     ) -> Result<Store<K, V>> {
-        Store::open(&self.path(name), &self.machine, keys, values)
+        Store::open(&self.path(name), &self.source, keys, values)
     }
 
     /// A file that takes long to make: from the folder of files of this version of our codec, or
@@ -183,24 +218,42 @@ impl Bench {
         Ok((self.worker.insert(worker), versions))
     }
 
+    /// Names a figure of the section that is being measured, for texts that cite it: in `figures.csv` it has
+    /// the section's name and a slash before its own.
+    pub(crate) fn figure(&self, name: impl Into<String>, value: f64, unit: &str) {
+        self.figures.borrow_mut().add(name.into(), value, unit);
+    }
+
+    /// Writes the figures that were named, in place of all that the section had.
+    pub(crate) fn write_figures(&self, section: &str) -> Result<()> {
+        mem::take(&mut *self.figures.borrow_mut()).update(&self.folder, section)
+    }
+
     /// Where the measurements come from: the list at the head of every section.
-    pub(crate) fn provenance(&self) -> String {
-        let names = |pictures: &[TestPicture]| {
-            let names: Vec<&str> = pictures.iter().map(|picture| picture.name.as_str()).collect();
-            format!("{}: {}", names.len(), names.join(", "))
-        };
+    pub(crate) fn provenance(&self) -> Result<String> {
+        // All sections of a version name the same commit, whatever else was committed between them.
+        let first = Origins::of(&self.folder).commit(&self.product)?;
         let mut list = format!(
-            "- Machine: {}\n- Codec: commit {} (checked out: {}), {}\n- Seed: {}\n- Pictures, of \
-             which some tables take fewer and say so: {}\n",
-            self.machine,
+            "- Machine: {}\n- Codec: commit {}, {}, {}\n- Seed: {}\n",
+            self.source.machine,
+            first.as_ref().unwrap_or(&self.source.commit),
             self.product,
-            provenance::commit(),
             provenance::compiler(),
             gip::SEED,
-            names(&self.pictures),
         );
-        if !self.photos.is_empty() {
-            list.push_str(&format!("- Photos, where tables name them: {}\n", names(&self.photos)));
+        let sets = self.folders().into_iter().filter(|(_, pictures)| !pictures.is_empty());
+        let counts = sets.map(|(set, pictures)| {
+            format!("{set} {} of {}", pictures.len(), self.manifest.count(set))
+        });
+        list.push_str(&format!(
+            "- Pictures, of which some tables take fewer and say so: {} ([{NAME}](../{NAME}))\n",
+            counts.collect::<Vec<_>>().join(", ")
+        ));
+        if !self.unlisted.is_empty() {
+            list.push_str(&format!(
+                "- Pictures that are not listed: {}\n",
+                self.unlisted.join(", ")
+            ));
         }
         if let Some(worker) = &self.worker {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
@@ -208,7 +261,7 @@ impl Bench {
         if self.quick {
             list.push_str("- A quick run: few pictures and settings\n");
         }
-        list
+        Ok(list)
     }
 }
 
@@ -259,5 +312,31 @@ mod tests {
         assert!(open_gray(1).is_ok());
         let refusal = open_gray(2).expect_err("it is another picture").to_string();
         assert!(refusal.contains("another picture called a"), "{refusal}");
+    }
+    #[test]
+    fn pictures_that_are_not_listed_are_named() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
+        let bench = open(images.path(), report.path()).expect("there is a picture");
+        let provenance = bench.provenance().expect("it is known");
+        assert!(provenance.contains("- Pictures that are not listed: a\n"), "{provenance}");
+        assert!(provenance.contains(&bench.product), "{provenance}");
+        image::RgbImage::new(3, 2).save(images.path().join("kodim01.png")).expect("it is written");
+        let refusal = open(images.path(), report.path()).expect_err("it is black").to_string();
+        assert!(refusal.contains("is not the kodim01 that pictures.csv lists"), "{refusal}");
+    }
+
+    #[test]
+    fn figures_have_the_name_of_their_section() {
+        let (images, report) = (tempfile::tempdir(), tempfile::tempdir());
+        let (images, report) = (images.expect("a folder"), report.expect("a folder"));
+        image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
+        let bench = open(images.path(), report.path()).expect("there is a picture");
+        bench.figure("a/b", 0.5, "s");
+        bench.write_figures("decode").expect("it is written");
+        bench.write_figures("rate").expect("it is written");
+        let figures = Figures::load(report.path()).expect("a table");
+        assert!(figures.get("decode/a/b").is_some() && figures.get("rate/a/b").is_none());
     }
 }

@@ -1,11 +1,10 @@
 //! Pictures made of pictures and lines of text.
 
 use std::convert::Infallible;
-use std::fs::File;
-use std::io::BufWriter;
+use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use embedded_graphics::mono_font::{MonoTextStyle, ascii};
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::{
@@ -17,6 +16,9 @@ use image::{Rgb, RgbImage, imageops};
 
 /// The height of a line of text in pixels.
 pub(crate) const LINE: u32 = 12;
+
+/// Of JPEGs, from two bits per pixel to what still shows the differences that the sheets are about.
+const QUALITIES: [u8; 7] = [88, 80, 75, 70, 65, 60, 55];
 
 /// A white canvas.
 #[derive(Debug)]
@@ -46,11 +48,20 @@ impl Canvas {
         self.0.save(path).with_context(|| format!("cannot write {}", path.display()))
     }
 
-    pub(crate) fn save_jpeg(&self, path: &Path, quality: u8) -> Result<()> {
-        let file =
-            File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
-        JpegEncoder::new_with_quality(BufWriter::new(file), quality).encode_image(&self.0)?;
-        Ok(())
+    /// Writes a JPEG of at most so many bytes, at the best of some qualities that allows it.
+    ///
+    /// # Errors
+    /// When none of them does.
+    pub(crate) fn save_jpeg(&self, path: &Path, most: usize) -> Result<()> {
+        for quality in QUALITIES {
+            let mut bytes = Vec::new();
+            JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(&self.0)?;
+            if bytes.len() <= most {
+                return fs::write(path, bytes)
+                    .with_context(|| format!("cannot write {}", path.display()));
+            }
+        }
+        bail!("{} is too large for {most} bytes", path.display())
     }
 }
 
@@ -91,5 +102,23 @@ mod tests {
         assert!((10..60).contains(&dark), "{dark}");
         assert_eq!(canvas.0.get_pixel(19, 11).0, [9; 3]);
         assert_eq!(canvas.0.get_pixel(14, 11).0, [255; 3]);
+    }
+
+    #[test]
+    fn a_jpeg_has_at_most_the_bytes_that_it_may_have() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.jpg");
+        let mut canvas = Canvas::new(64, 64);
+        let mut random = fastrand::Rng::with_seed(0);
+        let noise = (0..64 * 64 * 3).map(|_| random.u8(..)).collect();
+        canvas.paste(&RgbImage::from_raw(64, 64, noise).expect("as many samples"), (0, 0));
+        let save = |most| {
+            canvas.save_jpeg(&path, most).map(|()| fs::metadata(&path).expect("it is there").len())
+        };
+        let best = save(1 << 20).expect("it is enough");
+        let less = save(best as usize - 1).expect("a lower quality has less");
+        assert!(less < best && less > best / 2, "{less} of {best}");
+        fs::remove_file(&path).expect("it is there");
+        assert!(save(100).is_err() && !path.exists());
     }
 }

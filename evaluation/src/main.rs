@@ -4,18 +4,27 @@ mod baselines;
 mod bench;
 mod blind;
 mod canvas;
+mod check;
+mod code;
 mod comparison;
 mod contents;
 mod curve;
+mod fetch;
+mod figures;
 mod gip;
 mod kernel_benchmark;
 mod local_statistics;
+mod manifest;
 mod memory;
 mod metric;
+mod number;
+mod origins;
 mod pictures;
 mod plot;
 mod provenance;
+mod prune;
 mod python;
+mod readme;
 mod report;
 mod sections;
 mod store;
@@ -41,7 +50,7 @@ use sections::{
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
 /// single measurement.
 ///
-/// Nothing is measured twice on the same machine with the same version of the codec: an interrupted
+/// Nothing is measured twice on the same machine with the same code of the codec: an interrupted
 /// run continues, and a finished one only writes the report again.
 #[derive(Debug, Parser)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -54,9 +63,13 @@ struct Cli {
     command: Option<Command>,
 }
 
-/// What there is to do besides the report: the blind choice.
+/// What there is to do besides measuring: the blind choice, and what belongs to the report.
 #[derive(Debug, Subcommand)]
 enum Command {
+    Fetch(fetch::Args),
+    Check(check::Args),
+    Readme(readme::Args),
+    Prune(prune::Args),
     Triplets(triplets::Args),
     Choices(choices::Args),
 }
@@ -67,7 +80,7 @@ struct Args {
     /// Folder for the report; it is made if it is missing.
     #[arg(long, value_name = "REPORT_DIR")]
     out: PathBuf,
-    /// Four pictures of each set and fewer settings: twenty minutes on two cores.
+    /// Two pictures of each set and fewer settings: ten minutes on two cores.
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].
@@ -89,6 +102,10 @@ struct Args {
 fn main() -> Result<()> {
     let Cli { folders, report, command } = Cli::parse();
     match command {
+        Some(Command::Fetch(args)) => fetch::fetch(&args),
+        Some(Command::Check(args)) => check::check(&args),
+        Some(Command::Readme(args)) => readme::check(&args),
+        Some(Command::Prune(args)) => prune::prune(&args),
         Some(Command::Triplets(args)) => triplets::make(&args),
         Some(Command::Choices(args)) => choices::print(&args),
         None => {
@@ -102,6 +119,7 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+    store::tidy(&args.out)?;
     let mut bench = Bench::new(folders, args.out, args.quick, args.long, args.reference)?;
     bench.readme_picture = args.readme_picture;
     let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
@@ -109,8 +127,17 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
         let text = measure(section, &mut bench)?;
         let path = bench.path("report.md");
-        report::update(&path, section, &format!("{}\n{text}", bench.provenance()))?;
+        let provenance = bench.provenance()?;
+        report::update(&path, section, &format!("{provenance}\n{text}"))?;
+        bench.write_figures(&section.to_string())?;
+        // All its stores are closed.
+        store::tidy(&bench.path(""))?;
         eprintln!("{} (after {:.0} s)", path.display(), start.elapsed().as_secs_f64());
+    }
+    let report = fs::read_to_string(bench.path("report.md"))?;
+    let stale = report::of_other_versions(&report, &bench.product);
+    if !stale.is_empty() {
+        eprintln!("not of this version, or missing: {}", report::names(&stale));
     }
     Ok(())
 }
@@ -150,7 +177,35 @@ mod tests {
         let args = ["evaluation", "triplets", "--pictures", "a", "--pictures", "b", "--out", "c"];
         let cli = Cli::try_parse_from(args).expect("it is as the README has it");
         assert!(matches!(cli.command, Some(Command::Triplets(_))));
+        let cli = Cli::try_parse_from(["evaluation", "readme", "--write"]);
+        assert!(matches!(cli.expect("as the README has it").command, Some(Command::Readme(_))));
         let cli = Cli::try_parse_from(["evaluation", "choices", "a"]);
         assert!(matches!(cli.expect("as the README has it").command, Some(Command::Choices(_))));
+    }
+
+    #[test]
+    fn a_second_run_measures_nothing_and_writes_the_same_bytes() {
+        let (pictures, out) = (tempfile::tempdir(), tempfile::tempdir());
+        let (pictures, out) = (pictures.expect("a folder"), out.expect("a folder"));
+        let pixel = |x: u32, y: u32| image::Rgb([(x * 15) as u8, (y * 13) as u8, 90]);
+        let picture = image::RgbImage::from_fn(16, 16, pixel);
+        picture.save(pictures.path().join("a.png")).expect("it is written");
+        let run = || {
+            let folders = ["--kodak", pictures.path().to_str().expect("it is text")];
+            let report = ["--out", out.path().to_str().expect("it is text"), "--quick"];
+            let args = [&["evaluation"], &folders[..], &report, &["--only", "monotony"]].concat();
+            let cli = Cli::try_parse_from(args).expect("it is as the README has it");
+            write_report(&cli.folders.expect("given"), cli.report.expect("given"))
+                .expect("it is measured");
+            let names = ["report.md", "monotony.csv", "origins.csv", "figures.csv", "images.csv"];
+            names.map(|name| fs::read_to_string(out.path().join(name)).expect(name))
+        };
+        let files = run();
+        let [report, monotony, origins, figures, _] = &files;
+        assert!(report.contains("\n## More bits, more effort\n"), "{report}");
+        assert!(monotony.lines().is_sorted_by(|a, b| a.starts_with("origin,") || a < b));
+        assert_eq!(origins.lines().count(), 3, "of the codec, and of pictures");
+        assert!(figures.contains("\nmonotony/pictures,1.0,pictures\n"), "{figures}");
+        assert_eq!(run(), files);
     }
 }

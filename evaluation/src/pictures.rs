@@ -152,7 +152,8 @@ pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPict
     (0..count).map(|index| open(&paths[index * paths.len() / count])).collect()
 }
 
-fn open(path: &Path) -> Result<TestPicture> {
+/// The picture of a file.
+pub(crate) fn open(path: &Path) -> Result<TestPicture> {
     let image = image::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let image = image.into_rgb8();
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,14 +1,18 @@
 //! Which version was measured, and on which machine.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::available_parallelism;
 
+use anyhow::Result;
+
+use crate::code;
+
 /// The crate's folder in the repository.
 pub(crate) const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
-/// The files of the product, relative to [`FOLDER`].
-const PRODUCT: [&str; 2] = ["../src", "../Cargo.toml"];
+/// What the version of our codec begins with.
+const PRODUCT: &str = "gip-";
 
 /// Processor, number of cores, system.
 pub(crate) fn machine() -> String {
@@ -22,34 +26,25 @@ pub(crate) fn cores() -> usize {
     available_parallelism().map_or(1, Into::into)
 }
 
-/// The commit that last changed the product, with a checksum of its files if they differ from it.
-pub(crate) fn product() -> String {
-    let checksum = || {
-        let mut hasher = crc32fast::Hasher::new();
-        PRODUCT.iter().for_each(|path| hash(&Path::new(FOLDER).join(path), &mut hasher));
-        format!("{:08x}", hasher.finalize())
-    };
-    let Some(commit) = git(&["log", "-1", "--format=%h", "--abbrev=10"], &PRODUCT) else {
-        return format!("a copy outside of git, {}", checksum());
-    };
-    let changes = git(&["status", "--porcelain"], &PRODUCT).unwrap_or_default();
-    if changes.is_empty() { commit } else { format!("{commit}+{}", checksum()) }
+/// The version of our codec: what can change a result, as a checksum.
+pub(crate) fn product() -> Result<String> {
+    let folder = Path::new(FOLDER);
+    let checksum = code::checksum(&folder.join("../src"), &folder.join("Cargo.lock"), "image-gip")?;
+    Ok(format!("{PRODUCT}{checksum:08x}"))
 }
 
-/// Hashes a file, or all files of a folder in the order of their names.
-fn hash(path: &Path, hasher: &mut crc32fast::Hasher) {
-    if let Ok(folder) = fs::read_dir(path) {
-        let mut paths: Vec<PathBuf> = folder.flatten().map(|entry| entry.path()).collect();
-        paths.sort();
-        paths.iter().for_each(|path| hash(path, hasher));
-    } else if let Ok(bytes) = fs::read(path) {
-        hasher.update(&bytes);
-    }
+/// Whether a version of measurements is that of another version of our codec than this one.
+pub(crate) fn is_of_another(version: &str, product: &str) -> bool {
+    version.contains(PRODUCT) && !version.contains(product)
 }
 
-/// The commit that is checked out.
+/// The commit that is checked out, and whether the product differs from it.
 pub(crate) fn commit() -> String {
-    git(&["log", "-1", "--format=%H"], &[]).unwrap_or_else(|| "none: a copy outside of git".into())
+    let Some(commit) = git(&["log", "-1", "--format=%h", "--abbrev=10"], &[]) else {
+        return "none: a copy outside of git".into();
+    };
+    let changes = git(&["status", "--porcelain"], &["../src"]).unwrap_or_default();
+    if changes.is_empty() { commit } else { format!("{commit} with changes") }
 }
 
 /// The version of the compiler.
@@ -72,19 +67,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn checksums_follow_every_file_of_a_folder() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let checksum = || {
-            let mut hasher = crc32fast::Hasher::new();
-            hash(folder.path(), &mut hasher);
-            hasher.finalize()
-        };
-        fs::create_dir(folder.path().join("inner")).expect("a folder");
-        let file = folder.path().join("inner/file");
-        fs::write(&file, "one").expect("it is written");
-        let one = checksum();
-        assert_eq!(checksum(), one);
-        fs::write(&file, "two").expect("it is written");
-        assert_ne!(checksum(), one);
+    fn versions_of_baselines_stay_and_those_of_other_codecs_do_not() {
+        let product = product().expect("the source is there");
+        assert_eq!(product.len(), PRODUCT.len() + 8);
+        assert!(!is_of_another(&product, &product));
+        assert!(!is_of_another("libwebp 1.6.0", &product));
+        assert!(!is_of_another(&format!("libwebp 1.6.0, beside {product}"), &product));
+        assert!(is_of_another("libwebp 1.6.0, beside gip-other", &product));
+        assert!(is_of_another("gip-other", &product));
     }
 }

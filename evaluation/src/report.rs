@@ -9,8 +9,8 @@ use clap::ValueEnum;
 const TITLE: &str = "\
 # image-gip, measured
 
-Written by `evaluation/`, whose README has the command. A run also writes every single \
-measurement to CSV files in this folder. Sizes are those of whole files. PSNR is over all samples \
+Written by `evaluation/`, whose README has the command. Every single measurement is in the CSV files of \
+this folder, and the pictures are those of [`pictures.csv`](../pictures.csv). Sizes are those of whole files. PSNR is over all samples \
 of the decoded 8-bit RGB picture, unless stated otherwise.
 ";
 
@@ -107,6 +107,17 @@ pub(crate) fn update(path: &Path, section: Section, text: &str) -> Result<()> {
     Ok(())
 }
 
+/// The sections of a report that are missing or of another version of our codec than this one.
+pub(crate) fn of_other_versions(report: &str, product: &str) -> Vec<Section> {
+    let is_of_it = |section| text_of(report, section).is_some_and(|text| text.contains(product));
+    Section::ALL.into_iter().filter(|&section| !is_of_it(section)).collect()
+}
+
+/// The names of sections in a sentence.
+pub(crate) fn names(sections: &[Section]) -> String {
+    sections.iter().map(Section::to_string).collect::<Vec<_>>().join(", ")
+}
+
 /// A report with a section as `text` has it, and all others as they were.
 fn with(report: &str, section: Section, text: &str) -> String {
     let mut all = TITLE.to_owned();
@@ -155,6 +166,28 @@ mod tests {
         assert_eq!(report(Section::Content, "flat"), expected("smaller"));
         let files = fs::read_dir(folder.path()).expect("a folder").count();
         assert_eq!(files, 1, "nothing is left beside the report");
+    }
+
+    #[test]
+    fn sections_of_other_versions_are_named() {
+        let report = with("", Section::Decode, "- Codec: commit a, gip-1\n");
+        let report = with(&report, Section::Rate, "- Codec: commit a, gip-2\n");
+        let stale = of_other_versions(&report, "gip-1");
+        assert_eq!(stale.len(), Section::ALL.len() - 1);
+        assert!(!stale.contains(&Section::Decode) && stale.contains(&Section::Rate));
+        assert_eq!(names(&[Section::Rate, Section::Decode]), "rate, decode");
+    }
+
+    #[test]
+    fn the_committed_report_is_small() {
+        let folder = Path::new(crate::provenance::FOLDER).join("report");
+        let bytes = |end: &str| -> u64 {
+            let files = fs::read_dir(&folder).expect("a folder").flatten();
+            let files = files.filter(|file| file.file_name().to_string_lossy().ends_with(end));
+            files.map(|file| file.metadata().expect("it is there").len()).sum()
+        };
+        assert!((1..=1_500_000).contains(&bytes(".jpg")), "sheets: {}", bytes(".jpg"));
+        assert!(bytes(".csv") <= 2_000_000, "measurements: {}", bytes(".csv"));
     }
 
     #[test]

@@ -1,41 +1,51 @@
 //! Measurements on disk: one CSV per kind. Each measurement is appended as it is made, and is not
-//! made again.
+//! made again. [`tidy`] brings the files of a folder into the order in which they are committed.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-/// The first columns: a measurement is valid for one machine and one version of what was measured.
-/// Rows of other machines and versions stay in the file but are not used.
-const PROVENANCE: [&str; 2] = ["machine", "version"];
+use crate::number::rounded;
+use crate::origins::{self, Origins};
+
+/// Whose measurements are made: they are valid for one machine and one version of what is measured.
+/// Rows of others stay in the files but are not used.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    pub(crate) machine: String,
+    /// The commit that is checked out.
+    pub(crate) commit: String,
+}
 
 /// Measurements of one kind: `K` columns say what was measured, `V` columns what came out.
 #[derive(Debug)]
 pub(crate) struct Store<const K: usize, const V: usize> {
     file: File,
     rows: HashMap<Vec<String>, [f64; V]>,
-    machine: String,
+    source: Source,
+    origins: Origins,
+    /// Versions of which this has written measurements.
+    noted: HashSet<String>,
 }
 
 impl<const K: usize, const V: usize> Store<K, V> {
     /// Reads what is there already. A last row that was cut short by an interruption is dropped.
     pub(crate) fn open(
         path: &Path,
-        machine: &str,
+        source: &Source,
         keys: [&str; K],
         values: [&str; V],
     ) -> Result<Self> {
         let mut file =
             OpenOptions::new().read(true).append(true).create(true).truncate(false).open(path)?;
         let mut text = fs::read_to_string(path)?;
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        text.truncate(whole);
-        file.set_len(whole as u64)?;
+        text.truncate(whole(&text));
+        file.set_len(text.len() as u64)?;
 
-        let header = [PROVENANCE.as_slice(), &keys, &values].concat();
+        let header = [&[origins::COLUMN], keys.as_slice(), &values].concat();
         if text.is_empty() {
             file.write_all(&record(&header)?)?;
         }
@@ -49,7 +59,7 @@ impl<const K: usize, const V: usize> Store<K, V> {
         for row in reader.records() {
             let row = row?;
             let fields: Vec<&str> = row.iter().collect();
-            let (key, numbers) = fields.split_at(PROVENANCE.len() + K);
+            let (key, numbers) = fields.split_at(1 + K);
             let mut values = [0.0; V];
             for (value, number) in values.iter_mut().zip(numbers) {
                 *value = number
@@ -58,36 +68,98 @@ impl<const K: usize, const V: usize> Store<K, V> {
             }
             rows.insert(key.iter().map(|&field| field.to_owned()).collect(), values);
         }
-        Ok(Self { file, rows, machine: machine.to_owned() })
+        let origins = Origins::of(path.parent().unwrap_or(Path::new("")));
+        Ok(Self { file, rows, source: source.clone(), origins, noted: HashSet::new() })
     }
 
-    /// The measurement under a key, if there is one.
-    pub(crate) fn find(&self, version: &str, key: [&str; K]) -> Option<[f64; V]> {
-        let key: Vec<String> =
-            [self.machine.as_str(), version].into_iter().chain(key).map(str::to_owned).collect();
-        self.rows.get(&key).copied()
+    /// The measurement under a key, if it was made.
+    pub(crate) fn known(&self, version: &str, key: [&str; K]) -> Option<[f64; V]> {
+        self.rows.get(&self.row(version, key)).copied()
     }
 
-    /// The measurement under a key: from the file, or else made now and appended to it.
+    /// The columns before the values.
+    fn row(&self, version: &str, key: [&str; K]) -> Vec<String> {
+        let origin = origins::key(&self.source.machine, version);
+        [origin].into_iter().chain(key.map(str::to_owned)).collect()
+    }
+
+    /// The measurement under a key: from the file, or else made now and appended to it. It has the digits
+    /// that the file has, whether it was just made or not.
     pub(crate) fn get(
         &mut self,
         version: &str,
         key: [&str; K],
         measure: impl FnOnce() -> Result<[f64; V]>,
     ) -> Result<[f64; V]> {
-        let key: Vec<String> =
-            [self.machine.as_str(), version].into_iter().chain(key).map(str::to_owned).collect();
-        if let Some(values) = self.rows.get(&key) {
-            return Ok(*values);
+        if let Some(values) = self.known(version, key) {
+            return Ok(values);
         }
-        eprintln!("{}", key[PROVENANCE.len()..].join("  "));
-        let values = measure().with_context(|| key[PROVENANCE.len()..].join(", "))?;
+        let key = self.row(version, key);
+        eprintln!("{}", key[1..].join("  "));
+        let values = measure().with_context(|| key[1..].join(", "))?.map(rounded);
+        if self.noted.insert(version.to_owned()) {
+            let Source { machine, commit } = &self.source;
+            self.origins.note(machine, version, commit)?;
+        }
         let numbers = values.map(|value| value.to_string());
         // One call, so that an interruption leaves at most one torn row.
         self.file.write_all(&record(key.iter().chain(&numbers))?)?;
         self.rows.insert(key, values);
         Ok(values)
     }
+}
+
+/// Sorts the rows of all stores of a folder, so that the same measurements are the same bytes in whatever
+/// order they were made. No store of the folder may be open.
+pub(crate) fn tidy(folder: &Path) -> Result<()> {
+    rewrite(folder, |_| true)
+}
+
+/// Removes what is of versions that a filter does not let pass, and does what [`tidy`] does.
+pub(crate) fn keep(folder: &Path, pass: impl Fn(&str) -> bool) -> Result<()> {
+    let kept: HashSet<String> = Origins::of(folder).keys(pass)?.into_iter().collect();
+    rewrite(folder, |origin| kept.contains(origin))
+}
+
+/// The stores of a folder with the rows of those origins that a filter lets pass.
+fn rewrite(folder: &Path, pass: impl Fn(&str) -> bool) -> Result<()> {
+    for path in files(folder)? {
+        let text = fs::read_to_string(&path)?;
+        let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole(&text)]);
+        let header = reader.headers()?.clone();
+        if header.get(0) != Some(origins::COLUMN) {
+            continue;
+        }
+        let unreadable = || format!("cannot read {}", path.display());
+        let rows = reader.records().collect::<Result<Vec<_>, _>>().with_context(unreadable)?;
+        let mut rows: Vec<Vec<&str>> = rows.iter().map(|row| row.iter().collect()).collect();
+        rows.retain(|row| pass(row[0]));
+        rows.sort_unstable();
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&header)?;
+        rows.iter().try_for_each(|row| writer.write_record(row))?;
+        let sorted = writer.into_inner()?;
+        if sorted != text.as_bytes() {
+            // Renamed when it is whole, so that an interruption loses nothing.
+            let new = path.with_extension("csv.new");
+            fs::write(&new, sorted)?;
+            fs::rename(new, path)?;
+        }
+    }
+    Ok(())
+}
+
+/// The tables of a folder.
+fn files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let paths = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
+    let mut paths = paths.collect::<Result<Vec<_>>>()?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
+    Ok(paths)
+}
+
+/// How many bytes of a text are whole lines.
+fn whole(text: &str) -> usize {
+    text.rfind('\n').map_or(0, |end| end + 1)
 }
 
 fn record<T: AsRef<[u8]>>(fields: impl IntoIterator<Item = T>) -> Result<Vec<u8>> {
@@ -101,7 +173,8 @@ mod tests {
     use super::*;
 
     fn open(path: &Path, machine: &str) -> Store<2, 2> {
-        Store::open(path, machine, ["codec", "image"], ["bytes", "psnr"]).expect("it opens")
+        let source = Source { machine: machine.into(), commit: "abc".into() };
+        Store::open(path, &source, ["codec", "image"], ["bytes", "psnr"]).expect("it opens")
     }
 
     fn get(store: &mut Store<2, 2>, version: &str, image: &str, value: f64) -> [f64; 2] {
@@ -118,6 +191,15 @@ mod tests {
         assert_eq!(get(&mut again, "1", "a", 9.0), [0.1, f64::INFINITY]);
         assert_eq!(get(&mut again, "1", "b", 9.0), [9.0, f64::INFINITY]);
         assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 3);
+    }
+
+    #[test]
+    fn a_measurement_has_the_digits_of_its_row_at_once() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        let first = get(&mut open(&path, "here"), "1", "a", 1.0 / 7.0);
+        assert_eq!(first[0], 0.142_857_1);
+        assert_eq!(get(&mut open(&path, "here"), "1", "a", 9.0), first);
     }
 
     #[test]
@@ -160,6 +242,44 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("rate.csv");
         drop(open(&path, "here"));
-        assert!(Store::<1, 1>::open(&path, "here", ["codec"], ["bytes"]).is_err());
+        let source = Source { machine: "here".into(), commit: "abc".into() };
+        assert!(Store::<1, 1>::open(&path, &source, ["codec"], ["bytes"]).is_err());
+    }
+
+    /// The files of a folder after some measurements, made in this order, and [`tidy`].
+    fn tidied(measurements: &[(&str, &str, f64)]) -> Vec<String> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        for (machine, image, value) in measurements {
+            get(&mut open(&path, machine), "1", image, *value);
+        }
+        fs::write(folder.path().join("other.csv"), "b,a\n2,1\n1,2\n").expect("it is written");
+        tidy(folder.path()).expect("all are tables");
+        assert_eq!(get(&mut open(&path, "here"), "1", "a", 9.0)[0], 0.5, "it is kept");
+        let names = ["rate.csv", "origins.csv", "other.csv"].into_iter();
+        let read = |name| fs::read_to_string(folder.path().join(name)).expect("text");
+        names.map(read).collect()
+    }
+
+    #[test]
+    fn the_same_measurements_are_the_same_bytes() {
+        let measurements = [("there", "b", 1.5), ("here", "c", 3.0), ("here", "a", 0.5)];
+        let files = tidied(&measurements);
+        let backwards: Vec<_> = measurements.into_iter().rev().collect();
+        assert_eq!(files, tidied(&backwards));
+        assert_eq!(files[0].lines().count(), 4);
+        assert_eq!(files[2], "b,a\n2,1\n1,2\n", "what is no store stays as it is");
+    }
+
+    #[test]
+    fn what_is_of_other_versions_can_be_removed() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        get(&mut open(&path, "here"), "old", "a", 1.0);
+        get(&mut open(&path, "here"), "new", "a", 2.0);
+        keep(folder.path(), |version| version == "new").expect("all are tables");
+        assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 2);
+        assert_eq!(get(&mut open(&path, "here"), "new", "a", 9.0)[0], 2.0);
+        assert_eq!(get(&mut open(&path, "here"), "old", "a", 9.0)[0], 9.0);
     }
 }

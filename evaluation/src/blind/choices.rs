@@ -14,8 +14,8 @@ use super::key::{self, Shown, Triplet};
 use crate::canvas::{Canvas, LINE};
 use crate::table::Table;
 
-/// Of sheets as JPEG.
-const SHEET_QUALITY: u8 = 55;
+/// The most bytes of a sheet.
+const SHEET_BYTES: usize = 1_000_000;
 
 /// Prints what viewers chose, and gathers the triplets in which texture lost.
 ///
@@ -43,20 +43,43 @@ pub(crate) fn print(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The tables of all rounds: of the folders of `folder` that have a key, in the order of their names.
-/// Empty if there are none.
+/// The tables of all rounds in a folder. Empty if there are none.
 pub(crate) fn report(folder: &Path) -> Result<String> {
+    let tables = rounds(folder)?.into_iter();
+    Ok(tables.map(|(name, round)| format!("\n#### Round {name}\n{}", round.tables())).collect())
+}
+
+/// The share of texture in the decided answers of all rounds in a folder, with names such as
+/// `1/plain/0.25 bpp`: of the round, of what it was compared with, and of the rate.
+pub(crate) fn shares(folder: &Path) -> Result<Vec<(String, f64)>> {
+    let mut shares = Vec::new();
+    for (name, round) in rounds(folder)? {
+        let mut tables: Vec<(Shown, f64)> =
+            round.triplets.iter().map(|triplet| (triplet.other(), triplet.bpp)).collect();
+        tables.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        tables.dedup();
+        for (other, rate) in tables {
+            if let Some(share) = round.tally(other, |triplet, _| triplet.bpp == rate).share() {
+                shares.push((format!("{name}/{other}/{rate} bpp"), share));
+            }
+        }
+    }
+    Ok(shares)
+}
+
+/// The rounds of those folders of `folder` that have a key, in the order of their names.
+fn rounds(folder: &Path) -> Result<Vec<(String, Round)>> {
     let Ok(entries) = fs::read_dir(folder) else {
-        return Ok(String::new());
+        return Ok(Vec::new());
     };
     let mut rounds: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     rounds.retain(|path| path.join("key.csv").exists());
     rounds.sort();
-    let tables = rounds.iter().map(|path| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        Ok(format!("\n#### Round {name}\n{}", Round::load(path)?.tables()))
+    let named = rounds.iter().map(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok((name, Round::load(path)?))
     });
-    tables.collect()
+    named.collect()
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -229,7 +252,7 @@ impl Round {
         for (name, lost) in sheets {
             let strips = lost.into_iter().map(|triplet| strip(triplet, triplets));
             let path = folder.join(name);
-            sheet(&strips.collect::<Result<Vec<_>>>()?).save_jpeg(&path, SHEET_QUALITY)?;
+            sheet(&strips.collect::<Result<Vec<_>>>()?).save_jpeg(&path, SHEET_BYTES)?;
             println!("{}", path.display());
         }
         Ok(())
@@ -273,17 +296,22 @@ struct Tally {
 }
 
 impl Tally {
+    /// Of texture in the decided answers, if there are any.
+    fn share(self) -> Option<f64> {
+        let decided = self.textured + self.other;
+        (decided > 0).then(|| f64::from(self.textured) / f64::from(decided))
+    }
+
     fn cells(self, name: &str) -> Vec<String> {
         let decided = self.textured + self.other;
-        let (share, interval) = if decided == 0 {
-            ("-".to_owned(), "-".to_owned())
-        } else {
+        let (share, interval) = if let Some(share) = self.share() {
             let (low, high) = interval(self.textured, decided);
-            let share = f64::from(self.textured) / f64::from(decided);
             (
                 format!("{:.0} %", 100.0 * share),
                 format!("{:.0} to {:.0} %", 100.0 * low, 100.0 * high),
             )
+        } else {
+            ("-".to_owned(), "-".to_owned())
         };
         let counts = [self.triplets as u32, decided + self.same, self.same, decided, self.textured];
         let mut cells = vec![name.to_owned()];
@@ -324,8 +352,14 @@ triplet,picture,content,x,y,width,height,scale,bpp,left,right,left_bpp,right_bpp
         assert_eq!(plain, Tally { triplets: 2, textured: 2, other: 1, same: 0 });
         let avif = round.tally(Shown::Avif, |_, _| true);
         assert_eq!(avif, Tally { triplets: 1, textured: 0, other: 0, same: 1 });
-        let text = report(folder.path().parent().expect("it has one")).expect("it is readable");
+        let rounds = folder.path().parent().expect("it has one");
+        let text = report(rounds).expect("it is readable");
         let round = folder.path().file_name().expect("a name").to_string_lossy();
+        let shares = shares(rounds).expect("it is readable");
+        let of_round = |(name, _): &&(String, f64)| name.starts_with(&*round);
+        let shares: Vec<_> = shares.iter().filter(of_round).collect();
+        // Of the answers about AVIF none is decided.
+        assert_eq!(shares, [&(format!("{round}/plain/0.25 bpp"), 2.0 / 3.0)]);
         assert!(text.contains(&format!("#### Round {round}\n")), "{text}");
         for row in [
             "| 0.25 bpp | 2 | 3 | 0 | 3 | 2 | 67 % | 9 to 99 % |",

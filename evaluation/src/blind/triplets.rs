@@ -159,7 +159,7 @@ fn plan(
                 right,
                 left_bpp: 0.0,
                 right_bpp: 0.0,
-                version: provenance::product(),
+                version: provenance::product()?,
             });
         }
     }

@@ -13,6 +13,7 @@ use crate::table::{Table, mean, percent};
 const SIDE: u32 = 256;
 /// How many photographs are cut out of the pictures.
 const PHOTOS: usize = 8;
+const QUICK_PHOTOS: usize = 2;
 /// Standard deviations, in 8-bit steps, of the noise on a photograph and on plain gray.
 const GRAIN: f64 = 8.0;
 const NOISE: f64 = 20.0;
@@ -26,7 +27,8 @@ const PHOTOGRAPH: &str = "photograph";
 const GAUSSIANS: u32 = 1000;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let photos: Vec<TestPicture> = bench.sample(PHOTOS).iter().map(middle).collect();
+    let photos = bench.sample(if bench.quick { QUICK_PHOTOS } else { PHOTOS });
+    let photos: Vec<TestPicture> = photos.iter().map(middle).collect();
     let mut text = format!(
         "Compared with each other: pictures of {SIDE} x {SIDE} pixels, synthetic ones and the \
          middle of the photographs (means; {}). Effort {}.\n",
@@ -82,6 +84,8 @@ fn kinds_of_content(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
                 })?);
             }
             let [gaussians, bytes, psnr, seconds] = means(&all);
+            bench.figure(format!("{name}/{kind}/bytes"), bytes, "bytes");
+            bench.figure(format!("{name}/{kind}/PSNR"), psnr, "dB");
             if bytes > largest.0 {
                 largest = (bytes, *kind);
             }
@@ -149,6 +153,7 @@ fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
     let mut larger = Vec::new();
     for (name, [bytes, psnr]) in &rows {
         let share = rgb.map(|rgb| bytes / rgb - 1.0);
+        bench.figure(format!("{name}/against RGB"), 100.0 * share.unwrap_or(f64::NAN), "%");
         if share.is_some_and(|share| share > 0.0) {
             larger.push(*name);
         }

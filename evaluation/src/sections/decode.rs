@@ -26,7 +26,7 @@ use crate::versions::nearest;
 const RATES: [f64; 3] = [0.25, 0.5, 1.0];
 /// How many pictures are decoded.
 const PICTURES: usize = 8;
-const QUICK_PICTURES: usize = 2;
+const QUICK_PICTURES: usize = 1;
 /// Parts of our decoder are timed as medians over so many runs.
 const REPEATS: usize = 15;
 /// Decoders that are compared take turns, because the speed of a machine drifts: so many turns of
@@ -63,7 +63,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     for rate in RATES {
         all.push(against_others(bench, &mut files, &pictures, rate)?);
     }
-    text.push_str(&ratios(&all));
+    text.push_str(&ratios(bench, &all));
     text.push_str(&breakdown(&all, &pictures));
     text.push_str(&region(bench)?);
     Ok(text)
@@ -407,7 +407,7 @@ fn theirs(
 }
 
 /// Tables of all decoders' times with one thread, and of our time divided by theirs.
-fn ratios(all: &[RateResults]) -> String {
+fn ratios(bench: &Bench, all: &[RateResults]) -> String {
     let mut text = String::from("\n### One thread\n");
     for RateResults { rate, rows, .. } in all {
         let mut table = Table::new(&[
@@ -421,6 +421,9 @@ fn ratios(all: &[RateResults]) -> String {
         ]);
         for row in rows {
             let [least, largest] = min_and_max(row.points.iter().map(|point| point[3]));
+            let name = |figure: &str| format!("{}/{rate} bpp/{figure}", row.decoder);
+            bench.figure(name("ms"), 1000.0 * row.mean(2), "ms");
+            bench.figure(name("ours to theirs"), row.ratio(), "");
             table.row(&[
                 row.decoder.to_owned(),
                 format!("{:.3}", row.mean(0)),

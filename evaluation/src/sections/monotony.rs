@@ -67,6 +67,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     }
     let mut falls: Vec<Fall<'_>> = files.iter().flat_map(Files::falls).collect();
     falls.sort_by(|a, b| b.by.total_cmp(&a.by));
+    bench.figure("pictures", pictures.len() as f64, "pictures");
+    bench.figure("falls", falls.len() as f64, "files");
+    bench.figure("worst", falls.first().map_or(0.0, |fall| fall.by), "dB");
     let mut text = format!(
         "Compared: {} pictures at {rates:?} bits per pixel and efforts {EFFORTS:?}. A picture falls if its \
          PSNR is more than {TOLERANCE} dB below that of a file with fewer bits and the same effort, or with \

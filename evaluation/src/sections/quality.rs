@@ -51,6 +51,11 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     if sets.len() > 1 {
         text.push_str(&format!("\n### Quality: all\n{}", table(qualities, &all)));
     }
+    for (quality, files) in qualities.iter().zip(&all) {
+        let scores = Scores::new(files);
+        bench.figure(format!("{quality}/least"), scores.least.1, "SSIMULACRA2");
+        bench.figure(format!("{quality}/largest"), scores.largest.1, "SSIMULACRA2");
+    }
     text.push_str(&verdict(qualities, &all));
     Ok(text)
 }

@@ -162,7 +162,7 @@ fn as_long_as_the_paper(
             let mut rows = Vec::new();
             for picture in &pictures {
                 let key = [*name, &rounds, &count.to_string(), &picture.name];
-                let values = match store.find(&bench.product, key) {
+                let values = match store.known(&bench.product, key) {
                     Some(values) => values,
                     None if !bench.is_long => return Ok(String::new()),
                     None => store.get(&bench.product, key, || fit(method, count, picture))?,

@@ -23,10 +23,10 @@ const OTHERS: [&str; 2] = ["AVIF", "WebP"];
 /// The side of a crop in pixels. Crops are shown pixel by pixel.
 const SIDE: u32 = 160;
 const GAP: u32 = 4;
-/// Of sheets as JPEG: two bits per pixel, several times as many as the files have that they show.
-const SHEET_QUALITY: u8 = 75;
+/// The most bytes of a sheet of a set.
+const SHEET_BYTES: usize = 600_000;
 /// Of the README's picture.
-const README_QUALITY: u8 = 88;
+const README_BYTES: usize = 600_000;
 /// Our files without their texture.
 const PLAIN: &str = "no texture";
 /// Of the crops of each picture, in the order of [`Strips`].
@@ -35,8 +35,9 @@ const TITLES: [&str; 3] = [
     "where gip compares best with AVIF, at equal bytes",
     "where gip adds most texture, at equal bytes (codec, bits per pixel: SSIMULACRA2)",
 ];
-/// How many of these kinds are in a sheet. All are in the README's picture, so many crops of each.
+/// How many of these kinds are in a sheet, so many crops of each. All are in the README's picture.
 const SHEET_KINDS: usize = 2;
+const SHEET_CROPS: usize = 9;
 const README_CROPS: usize = 3;
 /// Where the pictures come from.
 const LICENCE: &str = "Photographs: Kodak (released by Eastman Kodak for unrestricted use); gb82 \
@@ -48,8 +49,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          texture and without it, and of {} (as in the section about rate) at the quality whose file \
          is nearest to ours in size. \
          From each picture the {SIDE} x {SIDE} pixels where we compare worst and those where we \
-         compare best with {}, by the map of SSIMULACRA2; pixel by pixel, each with the rate and \
-         the SSIMULACRA2 of the whole file. {LICENCE}.\n",
+         compare best with {}, by the map of SSIMULACRA2. The tables have all of them; a sheet shows, \
+         pixel by pixel, the {SHEET_CROPS} where we compare worst and the {SHEET_CROPS} where we compare best, \
+         each with the rate and the SSIMULACRA2 of the whole file. {LICENCE}.\n",
         gip::EFFORT,
         OTHERS.join(" and "),
         OTHERS[0],
@@ -59,13 +61,13 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         let of_set = set.pictures.iter().map(|picture| strips_of(bench, picture));
         let of_set = of_set.collect::<Result<Vec<_>>>()?;
         let name = format!("sheet-{}.jpg", set.name).to_lowercase();
-        sheet(&of_set).save_jpeg(&bench.path(&name), SHEET_QUALITY)?;
+        sheet(&of_set).save_jpeg(&bench.path(&name), SHEET_BYTES)?;
         text.push_str(&format!("\n### Sheet: {}\n\n![{0}: crops]({name})\n", set.name));
         text.push_str(&table(&of_set));
         strips.extend(of_set);
     }
     if let Some(path) = &bench.readme_picture {
-        readme_picture(strips, path)?;
+        readme_picture(&strips, path)?;
     }
     Ok(text)
 }
@@ -166,17 +168,26 @@ fn draw(canvas: &mut Canvas, strip: &Strip, (x, y): (u32, u32)) {
     }
 }
 
-/// A row for each picture, its worst crop on the left and its best on the right.
+/// The crops of a kind, of all pictures, that are furthest from what others show; the first is the furthest.
+fn furthest(pictures: &[Strips], kind: usize, most: usize) -> Vec<&Strip> {
+    let mut strips: Vec<&Strip> = pictures.iter().map(|picture| &picture.strips[kind]).collect();
+    // The worst are those with the least mean.
+    let sign = if kind == 0 { -1.0 } else { 1.0 };
+    strips.sort_by(|a, b| (sign * b.crop.mean).total_cmp(&(sign * a.crop.mean)));
+    strips.truncate(most);
+    strips
+}
+
+/// The worst crops on the left and the best on the right.
 fn sheet(pictures: &[Strips]) -> Canvas {
     let (width, height) = strip_size();
     let columns = [0, width + 3 * GAP];
-    let mut canvas = Canvas::new(columns[1] + width, 2 * LINE + pictures.len() as u32 * height);
-    for (title, x) in TITLES.iter().zip(columns) {
-        canvas.write(title, (x + GAP, 0));
-    }
-    for (index, picture) in pictures.iter().enumerate() {
-        for (strip, x) in picture.strips.iter().zip(columns) {
-            draw(&mut canvas, strip, (x, 2 * LINE + index as u32 * height));
+    let rows = pictures.len().min(SHEET_CROPS) as u32;
+    let mut canvas = Canvas::new(columns[1] + width, 2 * LINE + rows * height);
+    for (kind, x) in columns.into_iter().enumerate() {
+        canvas.write(TITLES[kind], (x + GAP, 0));
+        for (row, strip) in (0..).zip(furthest(pictures, kind, SHEET_CROPS)) {
+            draw(&mut canvas, strip, (x, 2 * LINE + row * height));
         }
     }
     canvas
@@ -207,29 +218,46 @@ fn table(pictures: &[Strips]) -> String {
 }
 
 /// The README's picture: of all pictures the crops with most texture, and those in which we compare worst and best.
-fn readme_picture(pictures: Vec<Strips>, path: &Path) -> Result<()> {
-    let [mut worst, mut best, mut textured] = [const { Vec::new() }; 3];
-    for Strips { strips, .. } in pictures {
-        let strips = [&mut worst, &mut best, &mut textured].into_iter().zip(strips);
-        strips.for_each(|(kind, strip)| kind.push(strip));
-    }
-    worst.sort_by(|a, b| a.crop.mean.total_cmp(&b.crop.mean));
-    best.sort_by(|a, b| b.crop.mean.total_cmp(&a.crop.mean));
-    textured.sort_by(|a, b| b.crop.mean.total_cmp(&a.crop.mean));
+fn readme_picture(pictures: &[Strips], path: &Path) -> Result<()> {
     let (width, height) = strip_size();
-    let kinds = [(TITLES[2], textured), (TITLES[0], worst), (TITLES[1], best)];
-    let rows: usize = kinds.iter().map(|(_, strips)| strips.len().min(README_CROPS)).sum();
+    let kinds = [2, 0, 1].map(|kind| (TITLES[kind], furthest(pictures, kind, README_CROPS)));
+    let rows: usize = kinds.iter().map(|(_, strips)| strips.len()).sum();
     let lines = 2 * kinds.len() as u32 + 1;
     let mut canvas = Canvas::new(width, rows as u32 * height + lines * LINE);
     let mut y = 0;
     for (title, strips) in kinds {
         canvas.write(title, (GAP, y));
         y += 2 * LINE;
-        for strip in strips.iter().take(README_CROPS) {
+        for strip in strips {
             draw(&mut canvas, strip, (0, y));
             y += height;
         }
     }
     canvas.write(LICENCE, (GAP, y));
-    canvas.save_jpeg(path, README_QUALITY)
+    canvas.save_jpeg(path, README_BYTES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_has_the_furthest_crops_and_few_of_them() {
+        let strips = |index: i32| {
+            let strip = |mean: i32| Strip {
+                picture: format!("{index}"),
+                crop: Crop { x: 0, y: 0, mean: mean.into() },
+                tiles: Vec::new(),
+            };
+            Strips { strips: [strip(-index), strip(index * 7 % 20), strip(0)], scores: Vec::new() }
+        };
+        let pictures: Vec<Strips> = (0..20).map(strips).collect();
+        let names = |kind, most| -> Vec<&str> {
+            furthest(&pictures, kind, most).iter().map(|strip| strip.picture.as_str()).collect()
+        };
+        assert_eq!(names(0, 3), ["19", "18", "17"]);
+        // 7 x 17, 7 x 14 and 7 x 11 leave 19, 18 and 17.
+        assert_eq!(names(1, 3), ["17", "14", "11"]);
+        assert_eq!(names(1, 30).len(), 20);
+    }
 }

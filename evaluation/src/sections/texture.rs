@@ -1,8 +1,6 @@
 //! Texture: what figures that see it say, beside those that compare pixel by pixel, and what people
 //! chose.
 
-use std::array;
-
 use anyhow::Result;
 use image_gip::Encoder;
 
@@ -18,6 +16,9 @@ use crate::store::Store;
 use crate::table::{Table, mean};
 use crate::versions::{self, RATES, Version};
 
+/// The rates of a quick run.
+const QUICK_RATES: [f64; 2] = [0.25, 1.0];
+
 /// A name, and the encoder at an effort.
 type Ours = (&'static str, fn(u8) -> Encoder);
 /// With texture as by default, and without.
@@ -32,14 +33,18 @@ const ROUNDS: &str = "blind";
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut store = FigureStore::open(bench)?;
     let mut text = introduction();
+    let rates: &[f64] = if bench.quick { &QUICK_RATES } else { &RATES };
     for set in bench.sets() {
-        let codecs = codecs(bench, &mut store, &set)?;
-        for (index, rate) in RATES.iter().enumerate() {
+        let codecs = codecs(bench, &mut store, &set, rates)?;
+        for (index, rate) in rates.iter().enumerate() {
             text.push_str(&format!("\n### Texture: {}, {rate} bpp\n", set.name));
-            text.push_str(&means(&codecs, index));
+            text.push_str(&means(bench, set.name, &codecs, (index, *rate)));
         }
         text.push_str(&format!("\n### Local deviations by picture: {}\n", set.name));
-        text.push_str(&by_picture(&set, &codecs, &bench.contents));
+        text.push_str(&by_picture(&set, &codecs, &bench.contents, rates));
+    }
+    for (name, share) in choices::shares(&bench.path(ROUNDS))? {
+        bench.figure(format!("{ROUNDS}/{name}"), 100.0 * share, "%");
     }
     let rounds = choices::report(&bench.path(ROUNDS))?;
     if !rounds.is_empty() {
@@ -150,29 +155,34 @@ impl FigureStore {
 /// A codec on all pictures of a set.
 struct Codec {
     name: &'static str,
-    /// For each of [`RATES`], the figures of each picture.
+    /// For each of the rates, the figures of each picture.
     figures: Vec<Vec<Figures>>,
 }
 
 /// [`OURS`], and then [`OTHERS`].
-fn codecs(bench: &mut Bench, store: &mut FigureStore, set: &PictureSet) -> Result<Vec<Codec>> {
+fn codecs(
+    bench: &mut Bench,
+    store: &mut FigureStore,
+    set: &PictureSet,
+    rates: &[f64],
+) -> Result<Vec<Codec>> {
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let beside = timing_version(&product, &versions);
     let mut codecs = Vec::new();
     for (name, encoder) in OURS {
-        let figures = at_rates(set, |_, rate, picture| {
-            store.get(&product, name, RATES[rate], picture, || {
-                Version::ours(encoder(gip::EFFORT), picture, RATES[rate])
+        let figures = at_rates(set, rates, |_, rate, picture| {
+            store.get(&product, name, rates[rate], picture, || {
+                Version::ours(encoder(gip::EFFORT), picture, rates[rate])
             })
         })?;
         codecs.push(Codec { name, figures });
     }
     for name in OTHERS {
         let baseline = versions::baseline_called(name)?;
-        let figures = at_rates(set, |index, rate, picture| {
+        let figures = at_rates(set, rates, |index, rate, picture| {
             let bytes = codecs[0].figures[rate][index].bytes;
-            store.get(&beside, baseline.id, RATES[rate], picture, || {
+            store.get(&beside, baseline.id, rates[rate], picture, || {
                 Version::baseline(worker, baseline, picture, bytes)
             })
         })?;
@@ -184,9 +194,10 @@ fn codecs(bench: &mut Bench, store: &mut FigureStore, set: &PictureSet) -> Resul
 /// What `get` says, of the indices of picture and rate, for each rate and picture.
 fn at_rates(
     set: &PictureSet,
+    rates: &[f64],
     mut get: impl FnMut(usize, usize, &TestPicture) -> Result<Figures>,
 ) -> Result<Vec<Vec<Figures>>> {
-    (0..RATES.len())
+    (0..rates.len())
         .map(|rate| {
             let pictures = set.pictures.iter().enumerate();
             pictures.map(|(index, picture)| get(index, rate, picture)).collect()
@@ -194,20 +205,28 @@ fn at_rates(
         .collect()
 }
 
-/// Means over the pictures at one rate, and who is better than ours.
-fn means(codecs: &[Codec], rate: usize) -> String {
+/// Means over the pictures at one rate, and who is better than ours. `rate` is its index and the rate.
+fn means(bench: &Bench, set: &str, codecs: &[Codec], rate: (usize, f64)) -> String {
     let mut columns = vec!["codec", "bpp", "Gaussians of texture", "of the bytes", "tex", "wd"];
     columns.extend(Metric::ALL.map(Metric::with_unit));
     let mut table = Table::new(&columns);
     let mut compared: Vec<NamedFigures> = Vec::new();
     for Codec { name, figures } in codecs {
-        let figures = &figures[rate];
+        let figures = &figures[rate.0];
         let of = |figure: fn(&Figures) -> f64| mean(figures.iter().map(figure)).unwrap_or(f64::NAN);
         let (tex, wd) = (of(|file| file.tex), of(|file| file.wd));
         let levels = Metric::ALL.map(|metric| {
             let levels = figures.iter().map(|file| metric.level(&file.distortion));
             metric.mean(levels).unwrap_or(f64::NAN)
         });
+        let cite = |figure: &str, value: f64| {
+            bench.figure(format!("{set}/{name}/{} bpp/{figure}", rate.1), value, "");
+        };
+        cite("tex", tex);
+        cite("wd", wd);
+        for (metric, level) in Metric::ALL.iter().zip(levels) {
+            cite(metric.name(), metric.shown(level));
+        }
         let mut cells = vec![
             (*name).to_owned(),
             format!("{:.3}", of(|file| file.rate)),
@@ -226,19 +245,20 @@ fn means(codecs: &[Codec], rate: usize) -> String {
 }
 
 /// The error of local deviations of each picture, and means by content.
-fn by_picture(set: &PictureSet, codecs: &[Codec], contents: &Contents) -> String {
+fn by_picture(set: &PictureSet, codecs: &[Codec], contents: &Contents, rates: &[f64]) -> String {
     let mut columns = vec!["picture".to_owned(), "content".to_owned()];
-    columns.extend(RATES.map(|rate| format!("{rate} bpp")));
+    columns.extend(rates.iter().map(|rate| format!("{rate} bpp")));
     let mut table = Table::new(&columns);
     // Of the pictures with these indices, for each rate.
-    let cells = |indices: &[usize]| {
-        array::from_fn::<_, { RATES.len() }, _>(|rate| {
+    let cells = |indices: &[usize]| -> Vec<String> {
+        let all = (0..rates.len()).map(|rate| {
             let [ours, plain, rival] = [0, 1, RIVAL].map(|codec| {
                 let all = &codecs[codec].figures[rate];
                 mean(indices.iter().map(|&index| all[index].tex)).unwrap_or(f64::NAN)
             });
             format!("{ours:.3} / {plain:.3} / {rival:.3} ({:.0} %)", 100.0 * ours / plain)
-        })
+        });
+        all.collect()
     };
     let names: Vec<&str> = set.pictures.iter().map(|picture| picture.name.as_str()).collect();
     for (index, name) in names.iter().enumerate() {

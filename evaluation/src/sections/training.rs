@@ -14,7 +14,7 @@ use crate::table::Table;
 
 /// The pictures that crops are made of.
 const PICTURES: usize = 8;
-const QUICK_PICTURES: usize = 2;
+const QUICK_PICTURES: usize = 1;
 /// What crops are read by, as the program calls it.
 const READERS: [&str; 7] = [
     "gip",
@@ -29,6 +29,7 @@ const READERS: [&str; 7] = [
 const LEARNED: [&str; 3] = ["the pictures", "gip", "JPEG"];
 /// Qualities of JPEG whose bytes all have.
 const QUALITIES: [&str; 2] = ["10", "30"];
+const QUICK_QUALITIES: [&str; 1] = ["30"];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let programs = Path::new(FOLDER).join("../bindings/python");
@@ -71,10 +72,15 @@ fn crops(
     let mut measured = Measured::new(command);
     let mut table =
         Table::new(&["", "SSIMULACRA2", "bytes", "crops a second", "with two processes"]);
+    let mut ours = f64::NAN;
     for reader in READERS {
         let key = [set, &pictures.len().to_string(), reader];
         let [ssimulacra2, bytes, one, two] =
             store.get(&bench.product, key, || measured.row(reader))?;
+        // The first reader is ours.
+        ours = if ours.is_nan() { one } else { ours };
+        bench.figure(format!("{set}/{reader}/crops"), one, "crops a second");
+        bench.figure(format!("{set}/{reader}/ours to theirs"), ours / one, "");
         let numbers = [format!("{ssimulacra2:.1}"), format!("{bytes:.0}"), format!("{one:.0}")];
         table.row(&[&[reader.to_owned()], &numbers[..], &[format!("{two:.0}")]].concat());
     }
@@ -90,11 +96,12 @@ fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
         ["bytes", "accuracy", "lowest", "highest"],
     )?;
     let mut table = Table::new(&["learned from", "bytes", "accuracy in %", "lowest", "highest"]);
-    for (index, quality) in QUALITIES.into_iter().enumerate() {
+    let qualities: &[&str] = if bench.quick { &QUICK_QUALITIES } else { &QUALITIES };
+    for (index, &quality) in qualities.iter().enumerate() {
         let mut command = run("learning.py");
         command.args(["--quality", quality]);
         if bench.quick {
-            command.args(["--pictures", "900", "--epochs", "10", "--seeds", "1"]);
+            command.args(["--pictures", "300", "--epochs", "4", "--seeds", "1"]);
         }
         let mut measured = Measured::new(command);
         let extent = if bench.quick { "quick" } else { "full" };
@@ -104,6 +111,7 @@ fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
                 store.get(&bench.product, key, || measured.row(learned))?;
             // Without a file, they are the same for each quality.
             if bytes > 0.0 || index == 0 {
+                bench.figure(format!("{learned}/{quality}/accuracy"), accuracies[0], "%");
                 let bytes = if bytes > 0.0 { format!("{bytes:.0}") } else { "-".into() };
                 let accuracies = accuracies.map(|accuracy| format!("{accuracy:.1}"));
                 table.row(&[&[learned.to_owned(), bytes], &accuracies[..]].concat());

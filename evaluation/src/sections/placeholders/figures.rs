@@ -9,6 +9,9 @@ use crate::pictures::PictureSet;
 use crate::store::Store;
 use crate::table::{Table, mean, median};
 
+/// How many pictures of a set a quick run takes.
+const QUICK_PICTURES: usize = 1;
+
 /// What the CSV file has of a placeholder at each of the budgets; NaN where there is none.
 const COLUMNS: [&str; 12] = [
     "bytes_100",
@@ -45,6 +48,14 @@ pub(super) fn measure(bench: &mut Bench) -> Result<String> {
     for set in bench.sets() {
         let of_codec = |codec| figures(bench, &mut store, codec, &set);
         let all = Codec::ALL.into_iter().map(of_codec).collect::<Result<Vec<_>>>()?;
+        for (codec, at_budgets) in Codec::ALL.into_iter().zip(&all) {
+            for (budget, figures) in BUDGETS.iter().zip(at_budgets) {
+                let scores = figures.iter().map(|[_, ssimulacra2, _]| *ssimulacra2);
+                let score = mean(scores.filter(|score| !score.is_nan())).unwrap_or(f64::NAN);
+                let name = format!("{}/{}/{budget} bytes", set.name, codec.name());
+                bench.figure(name, score, "SSIMULACRA2");
+            }
+        }
         text.push_str(&format!("\n### Placeholders: {}\n{}", set.name, table(&all)));
     }
     Ok(text)
@@ -63,7 +74,8 @@ fn figures(
         Codec::Baseline(_) => bench.baselines()?.1,
     };
     let mut at_budgets = vec![Vec::new(); BUDGETS.len()];
-    for picture in &set.pictures {
+    let taken = if bench.quick { QUICK_PICTURES } else { usize::MAX };
+    for picture in set.pictures.iter().take(taken) {
         let values = store.get(&version, [codec.name(), &picture.name], || {
             let placeholders = codec.placeholders(bench, picture)?;
             let figures = placeholders.map(|placeholder| {

@@ -10,10 +10,11 @@ use crate::pictures::TestPicture;
 
 /// How many pictures are shown, of those that are at least as wide as high.
 const PICTURES: usize = 6;
+const QUICK_PICTURES: usize = 1;
 /// They are side by side.
 const COLUMNS: u32 = 2;
 const GAP: u32 = 4;
-const QUALITY: u8 = 70;
+const BYTES: usize = 300_000;
 const NAME: &str = "sheet-placeholders.jpg";
 
 /// All placeholders of a picture, side by side: a row for each budget.
@@ -27,7 +28,7 @@ struct Block {
 pub(super) fn make(bench: &mut Bench) -> Result<String> {
     let wide = |picture: &&TestPicture| picture.width >= picture.height;
     let wide: Vec<TestPicture> = bench.pictures.iter().filter(wide).cloned().collect();
-    let count = PICTURES.min(wide.len());
+    let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(wide.len());
     let mut blocks = Vec::new();
     for picture in (0..count).map(|index| &wide[index * wide.len() / count]) {
         let of_codec = |codec: Codec| codec.placeholders(bench, picture);
@@ -35,7 +36,7 @@ pub(super) fn make(bench: &mut Bench) -> Result<String> {
         let (name, original) = (picture.name.clone(), codecs::original(picture));
         blocks.push(Block { name, original, placeholders });
     }
-    draw(&blocks).save_jpeg(&bench.path(NAME), QUALITY)?;
+    draw(&blocks).save_jpeg(&bench.path(NAME), BYTES)?;
     Ok(format!(
         "\n![Placeholders of {count} pictures, with the bytes and the SSIMULACRA2 of each]({NAME})\n"
     ))
