@@ -61,6 +61,16 @@ impl<const K: usize, const V: usize> Store<K, V> {
         Ok(Self { file, rows, machine: machine.to_owned() })
     }
 
+    /// The measurement under a key, if it was made.
+    pub(crate) fn known(&self, version: &str, key: [&str; K]) -> Option<[f64; V]> {
+        self.rows.get(&self.row(version, key)).copied()
+    }
+
+    /// The columns before the values.
+    fn row(&self, version: &str, key: [&str; K]) -> Vec<String> {
+        [self.machine.as_str(), version].into_iter().chain(key).map(str::to_owned).collect()
+    }
+
     /// The measurement under a key: from the file, or else made now and appended to it.
     pub(crate) fn get(
         &mut self,
@@ -68,11 +78,10 @@ impl<const K: usize, const V: usize> Store<K, V> {
         key: [&str; K],
         measure: impl FnOnce() -> Result<[f64; V]>,
     ) -> Result<[f64; V]> {
-        let key: Vec<String> =
-            [self.machine.as_str(), version].into_iter().chain(key).map(str::to_owned).collect();
-        if let Some(values) = self.rows.get(&key) {
-            return Ok(*values);
+        if let Some(values) = self.known(version, key) {
+            return Ok(values);
         }
+        let key = self.row(version, key);
         eprintln!("{}", key[PROVENANCE.len()..].join("  "));
         let values = measure().with_context(|| key[PROVENANCE.len()..].join(", "))?;
         let numbers = values.map(|value| value.to_string());
@@ -108,6 +117,8 @@ mod tests {
         let machine = "A \"quick\" one, 2 cores";
         assert_eq!(get(&mut open(&path, machine), "1", "a", 0.1), [0.1, f64::INFINITY]);
         let mut again = open(&path, machine);
+        assert_eq!(again.known("1", ["gip", "a"]), Some([0.1, f64::INFINITY]));
+        assert_eq!(again.known("1", ["gip", "b"]), None);
         assert_eq!(get(&mut again, "1", "a", 9.0), [0.1, f64::INFINITY]);
         assert_eq!(get(&mut again, "1", "b", 9.0), [9.0, f64::INFINITY]);
         assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 3);

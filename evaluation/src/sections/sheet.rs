@@ -134,7 +134,7 @@ fn ours(bench: &Bench, picture: &TestPicture) -> Result<Vec<u8>> {
     let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
     bench.file(&name, || {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
-        Ok(gip::file(encoder, picture)?.bytes)
+        Ok(gip::file(encoder, picture, Threads::Pool)?.bytes)
     })
 }
 

@@ -35,7 +35,7 @@ pub(super) fn measure(bench: &mut Bench) -> Result<String> {
          of the picture over squares of eight pixels. A ThumbHash has 20 to 25 bytes; its 32 pixels \
          are enlarged. A BlurHash has as many components as fit, at most 9 x 9, and is decoded at this \
          size. WebP, AVIF (at speed 6, and at speed 0 in 4:4:4) and JPEG XL are given the picture at \
-         sixteen sizes, at all of their qualities, and are enlarged. (Bicubic enlargement; smaller \
+         sixteen sizes, at fifteen qualities, and are enlarged. (Bicubic enlargement; smaller \
          pictures are by Lanczos's filter.) Of all files that fit, they show the one that is best \
          by SSIMULACRA2.\n",
         BUDGETS.map(|budget| budget.to_string()).join(", "),

@@ -1,0 +1,135 @@
+//! What losses look like.
+
+use std::fs;
+
+use anyhow::Result;
+use image::{RgbImage, imageops};
+use image_gip::{Target, Threads};
+
+use super::Case;
+use crate::bench::Bench;
+use crate::canvas::{Canvas, LINE};
+use crate::gip;
+use crate::metric::Metric;
+use crate::pictures::TestPicture;
+use crate::sections::crops::{Crop, extremes};
+use crate::sections::ranges::short;
+use crate::versions::{self, Version};
+use crate::visual;
+
+/// How many of the pictures with the largest losses by each metric may be in the sheet.
+pub(super) const OF_EACH: usize = 4;
+/// How many of them are, pictures that are in it already left out.
+const NEW_OF_EACH: usize = 2;
+const COLUMNS: u32 = 2;
+/// Of our files, in bits per pixel; the others have as many bytes.
+const RATE: f64 = 0.5;
+const OTHERS: [&str; 2] = ["AVIF", "JPEG XL"];
+/// Of a crop, in pixels.
+const SIDE: u32 = 160;
+const GAP: u32 = 4;
+/// The original, ours, and the others.
+const TILES: u32 = 2 + OTHERS.len() as u32;
+const NAME: &str = "sheet-losses.jpg";
+/// The most bytes that the sheet may have, and JPEG qualities to try.
+const BUDGET: u64 = 300_000;
+const QUALITIES: [u8; 8] = [88, 84, 80, 75, 70, 65, 60, 50];
+
+/// One crop as the original and all codecs show it, with captions.
+struct Strip(Vec<(String, RgbImage)>);
+
+/// Writes the sheet of the worst pictures of each metric, and says what is in it.
+pub(super) fn make(bench: &mut Bench, worst: &[(Metric, Vec<&Case>)]) -> Result<String> {
+    let mut strips = Vec::new();
+    let mut shown: Vec<&str> = Vec::new();
+    for (metric, cases) in worst {
+        let mut new = 0;
+        for case in cases {
+            let name = case.picture.name.as_str();
+            if new < NEW_OF_EACH && !shown.contains(&name) {
+                shown.push(name);
+                new += 1;
+                strips.push(strip(bench, *metric, &case.picture)?);
+            }
+        }
+    }
+    let canvas = draw(&strips);
+    let path = bench.path(NAME);
+    for quality in QUALITIES {
+        canvas.save_jpeg(&path, quality)?;
+        if fs::metadata(&path)?.len() <= BUDGET {
+            break;
+        }
+    }
+    Ok(format!(
+        "\n### Sheet: losses\n\nOf the {OF_EACH} worst pictures by each metric, those {NEW_OF_EACH} that no metric before \
+         has shown: the {SIDE} x {SIDE} pixels where ours is furthest behind {} (by the map of SSIMULACRA2; for \
+         PSNR, by squared error), our file of {RATE} bits per pixel and others of as many bytes; with the \
+         metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
+         we lose]({NAME})\n",
+        OTHERS[0]
+    ))
+}
+
+fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture) -> Result<Strip> {
+    let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
+    let file = gip::file(encoder, picture, Threads::Pool)?;
+    let mut versions = vec![(gip::NAME, Version::of_file(&file.bytes, Some(file.report))?)];
+    let bytes = versions[0].1.bytes;
+    for name in OTHERS {
+        let (worker, _) = bench.baselines()?;
+        let baseline = versions::baseline_called(name)?;
+        versions.push((name, Version::baseline(worker, baseline, picture, bytes)?));
+    }
+    let [(_, ours), (_, rival), ..] = &versions[..] else { unreachable!("there are three") };
+    let ahead = error(picture, rival, metric)?.into_iter().zip(error(picture, ours, metric)?);
+    let ahead: Vec<f64> = ahead.map(|(rival, ours)| rival - ours).collect();
+    let side = SIDE.min(picture.width).min(picture.height);
+    let [crop, _] = extremes(&ahead, picture.width, side);
+    let mut tiles = vec![(short(&picture.name).to_owned(), cut(picture, &picture.rgb, crop, side))];
+    for (name, version) in &versions {
+        let level = metric.level(&picture.distortion(&version.samples)?);
+        let caption = format!(
+            "{name} {:.2}: {} {:.4}",
+            picture.rate(version.bytes),
+            metric.name(),
+            metric.shown(level)
+        );
+        tiles.push((caption, cut(picture, &version.samples, crop, side)));
+    }
+    Ok(Strip(tiles))
+}
+
+/// For each pixel, how far a version is from the source.
+fn error(picture: &TestPicture, version: &Version, metric: Metric) -> Result<Vec<f64>> {
+    let (source, decoded) = (&picture.rgb, &version.samples);
+    if metric == Metric::Psnr {
+        let squares = source.iter().zip(decoded).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
+        let squares: Vec<f64> = squares.collect();
+        return Ok(squares.chunks_exact(3).map(|pixel| pixel.iter().sum()).collect());
+    }
+    let map = visual::ssimulacra2_map(source, decoded, picture.width, picture.height)?;
+    Ok(map.into_iter().map(f64::from).collect())
+}
+
+fn cut(picture: &TestPicture, samples: &[u8], crop: Crop, side: u32) -> RgbImage {
+    let whole = RgbImage::from_raw(picture.width, picture.height, samples.to_vec());
+    let whole = whole.expect("as many samples as the picture has");
+    imageops::crop_imm(&whole, crop.x, crop.y, side, side).to_image()
+}
+
+/// Strips in columns, from left to right and from top to bottom.
+fn draw(strips: &[Strip]) -> Canvas {
+    let (width, height) = (GAP + TILES * (SIDE + GAP), LINE + SIDE + GAP);
+    let rows = (strips.len() as u32).div_ceil(COLUMNS);
+    let mut canvas = Canvas::new(COLUMNS * (width + GAP), rows.max(1) * height);
+    for (index, Strip(tiles)) in strips.iter().enumerate() {
+        let (column, row) = (index as u32 % COLUMNS, index as u32 / COLUMNS);
+        for (tile, (caption, picture)) in tiles.iter().enumerate() {
+            let x = column * (width + GAP) + GAP + tile as u32 * (SIDE + GAP);
+            canvas.write(caption, (x, row * height));
+            canvas.paste(picture, (x, row * height + LINE));
+        }
+    }
+    canvas
+}
