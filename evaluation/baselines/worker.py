@@ -105,7 +105,7 @@ def svt_av1():
     def encode(image, quality, threads):
         out = io.BytesIO()
         # From the constant quality factor 63 to 1.
-        more = {"crf": str(63 - round(quality * 0.62)), "preset": "2"}
+        more = {"crf": str(63 - round(quality * 0.62)), "preset": "4"}
         more["svtav1-params"] = f"avif=1:tune=3:lp={threads}"
         with av.open(out, "w", format="avif") as file:
             stream = file.add_stream("libsvtav1", rate=1, options=more)

@@ -18,8 +18,8 @@ pub(crate) struct Baseline {
     pub(crate) id: &'static str,
     pub(crate) name: &'static str,
     /// From small files to large ones: from 0.1 bits per pixel, or the least that the codec can
-    /// write, to 2 bits per pixel on all but the smoothest photographs, in steps of about one and a
-    /// half times the size.
+    /// write, to 2 bits per pixel on all but the smoothest photographs, in steps of less than twice
+    /// the size.
     pub(crate) settings: &'static [&'static str],
 }
 
@@ -28,12 +28,12 @@ pub(crate) const BASELINES: [Baseline; 7] = [
     Baseline {
         id: "jpeg420prog",
         name: "JPEG",
-        settings: &["1", "5", "10", "20", "36", "58", "80", "90", "95", "98"],
+        settings: &["1", "7", "16", "30", "58", "80", "90", "96"],
     },
     Baseline {
         id: "jpegli",
         name: "jpegli",
-        settings: &["1", "10", "20", "35", "54", "70", "84", "92", "97"],
+        settings: &["1", "14", "30", "50", "70", "84", "92", "97"],
     },
     Baseline {
         id: "jp2",
@@ -43,19 +43,19 @@ pub(crate) const BASELINES: [Baseline; 7] = [
     Baseline {
         id: "webp_m6",
         name: "WebP",
-        settings: &["0", "3", "10", "20", "40", "64", "83", "90", "95", "99"],
+        settings: &["0", "6", "15", "32", "56", "78", "90", "97"],
     },
     Baseline { id: "avif420_s6", name: "AVIF", settings: &AVIF_SETTINGS },
     Baseline { id: "avif420_s6_psnr", name: "AVIF tune=psnr", settings: &AVIF_SETTINGS },
     Baseline { id: "jxl_e7", name: "JPEG XL", settings: &JXL_DISTANCES },
 ];
 
-const AVIF_SETTINGS: [&str; 10] = ["1", "15", "30", "40", "50", "60", "70", "80", "90", "97"];
+const AVIF_SETTINGS: [&str; 8] = ["1", "20", "35", "50", "60", "70", "82", "94"];
 /// From distance 20 on libjxl halves the resolution.
-const JXL_DISTANCES: [&str; 9] = ["25", "14", "8.5", "5", "3", "2", "1.25", "0.7", "0.4"];
-const HEIC_SETTINGS: [&str; 10] = ["1", "8", "16", "24", "32", "40", "48", "56", "65", "75"];
+const JXL_DISTANCES: [&str; 8] = ["25", "14", "8.5", "5", "3", "1.75", "1", "0.5"];
+const HEIC_SETTINGS: [&str; 8] = ["1", "12", "20", "28", "36", "45", "55", "68"];
 /// Fewer, for it takes its time.
-const BEST_AVIF_SETTINGS: [&str; 7] = ["1", "20", "35", "50", "65", "80", "92"];
+const BEST_AVIF_SETTINGS: [&str; 6] = ["5", "30", "50", "65", "80", "92"];
 
 /// More codecs for the sections about rates alone.
 const RIVALS: [Baseline; 4] = [
@@ -100,7 +100,7 @@ distance 20 on it halves the resolution.";
 
 /// The same of those that are no baselines.
 pub(crate) const RIVALS_DESCRIPTION: &str = "AVIF tune=ssimulacra2 is the same with that tuning; \
-AVIF by SVT-AV1 is that encoder's preset 2 for still pictures with its tuning for images (tune=iq), \
+AVIF by SVT-AV1 is that encoder's preset 4 for still pictures with its tuning for images (tune=iq), \
 4:2:0 of 10 bits; AVIF, its best, is aom at speed 2 in 4:4:4, on each picture with the tuning that is \
 best by the metric in question, iq or ssimulacra2 (speed 0 takes more than three times as long for \
 files that are hardly smaller); JPEG XL effort 9 is the same at that effort; HEIC is x265's preset \

@@ -7,6 +7,7 @@ use super::ranges::HIGH;
 use super::rate_store::RateStore;
 use crate::baselines::{self, BEST_AVIF};
 use crate::bench::Bench;
+use crate::gip;
 use crate::pictures::PictureSet;
 
 /// Codecs on one set of pictures.
@@ -55,11 +56,16 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
     for Comparison { set, others, .. } in &mut comparisons {
         let of_set = |variant: &&Variant| is_in(set.name, variant.name);
         for variant in variants.iter().filter(of_set) {
-            others.push(Codec::ours(store, &product, variant, &set.pictures, extent(quick))?);
+            // They are for a comparison with ours, which fewer rates are enough for.
+            let extent = Extent { step: VARIANT_STEP, ..extent(quick) };
+            others.push(Codec::ours(store, &product, variant, &set.pictures, extent)?);
         }
     }
     Ok(comparisons)
 }
+
+/// Other ways to run our encoder are measured at one in so many rates.
+const VARIANT_STEP: usize = 2;
 
 /// Beyond the highest range nothing is compared.
 fn extent(quick: bool) -> Extent {
@@ -68,8 +74,32 @@ fn extent(quick: bool) -> Extent {
 
 /// On the large pictures, each of which takes as long as seven of Kodak's, only these are measured.
 const ON_LARGE: [&str; 5] = ["WebP", "AVIF", "JPEG XL", "HEIC", BEST_AVIF[0].name];
+/// These are measured on the photographs alone, and the last of them on the first set alone.
+const ON_PHOTOGRAPHS: [&str; 4] = [gip::PLAIN_NAME, gip::PSNR_NAME, "JPEG", "AVIF tune=psnr"];
 
 /// Whether a codec is measured on a set.
 fn is_in(set: &str, codec: &str) -> bool {
-    set != "large" || ON_LARGE.contains(&codec)
+    match set {
+        "Kodak" => true,
+        "photos" => codec != ON_PHOTOGRAPHS[3],
+        "large" => ON_LARGE.contains(&codec),
+        _ => !ON_PHOTOGRAPHS.contains(&codec),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_codec_is_on_the_first_set_and_ours_beside_the_best_on_all() {
+        for (rival, _) in baselines::rivals() {
+            assert!(is_in("Kodak", rival.name), "{}", rival.name);
+        }
+        assert!(ON_LARGE.iter().all(|name| baselines::rivals().any(|(r, _)| r.name == *name)));
+        for set in ["Kodak", "photos", "large", "screens"] {
+            assert!(is_in(set, BEST_AVIF[0].name), "{set}");
+        }
+        assert!(!is_in("large", gip::PSNR_NAME) && !is_in("screens", gip::PLAIN_NAME));
+    }
 }
