@@ -18,7 +18,7 @@ pub(crate) struct Baseline {
     pub(crate) id: &'static str,
     pub(crate) name: &'static str,
     /// From small files to large ones: from 0.1 bits per pixel, or the least that the codec can
-    /// write, to 2 bits per pixel on all but the smoothest photographs, in steps of less than twice
+    /// write, to 2 bits per pixel on all but the smoothest pictures, in steps of less than twice
     /// the size.
     pub(crate) settings: &'static [&'static str],
 }
@@ -28,12 +28,12 @@ pub(crate) const BASELINES: [Baseline; 7] = [
     Baseline {
         id: "jpeg420prog",
         name: "JPEG",
-        settings: &["1", "7", "16", "30", "58", "80", "90", "96"],
+        settings: &["1", "7", "16", "30", "58", "80", "90", "96", "100"],
     },
     Baseline {
         id: "jpegli",
         name: "jpegli",
-        settings: &["1", "14", "30", "50", "70", "84", "92", "97"],
+        settings: &["1", "14", "30", "50", "70", "84", "92", "97", "100"],
     },
     Baseline {
         id: "jp2",
@@ -43,19 +43,19 @@ pub(crate) const BASELINES: [Baseline; 7] = [
     Baseline {
         id: "webp_m6",
         name: "WebP",
-        settings: &["0", "6", "15", "32", "56", "78", "90", "97"],
+        settings: &["0", "6", "15", "32", "56", "78", "90", "97", "100"],
     },
     Baseline { id: "avif420_s6", name: "AVIF", settings: &AVIF_SETTINGS },
     Baseline { id: "avif420_s6_psnr", name: "AVIF tune=psnr", settings: &AVIF_SETTINGS },
     Baseline { id: "jxl_e7", name: "JPEG XL", settings: &JXL_DISTANCES },
 ];
 
-const AVIF_SETTINGS: [&str; 8] = ["1", "20", "35", "50", "60", "70", "82", "94"];
+const AVIF_SETTINGS: [&str; 9] = ["1", "20", "35", "50", "60", "70", "82", "94", "100"];
 /// From distance 20 on libjxl halves the resolution.
-const JXL_DISTANCES: [&str; 8] = ["25", "14", "8.5", "5", "3", "1.75", "1", "0.5"];
-const HEIC_SETTINGS: [&str; 8] = ["1", "12", "20", "28", "36", "45", "55", "68"];
+const JXL_DISTANCES: [&str; 9] = ["25", "14", "8.5", "5", "3", "1.75", "1", "0.5", "0.2"];
+const HEIC_SETTINGS: [&str; 9] = ["1", "12", "20", "28", "36", "45", "55", "68", "85"];
 /// Fewer, for it takes its time.
-const BEST_AVIF_SETTINGS: [&str; 6] = ["5", "30", "50", "65", "80", "92"];
+const BEST_AVIF_SETTINGS: [&str; 7] = ["5", "30", "50", "65", "80", "92", "100"];
 
 /// More codecs for the sections about rates alone.
 const RIVALS: [Baseline; 4] = [

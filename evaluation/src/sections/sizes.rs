@@ -145,13 +145,14 @@ pub(super) fn claim(bench: &mut Bench) -> Result<String> {
             let by = ways[0].level(metric) - other.level(metric);
             format!("{by:+.2} against {}", other.name)
         };
-        claims.push(format!("{}: {}, {}", show.title(), by(&ways[1]), by(&ways[3])));
+        let title = format!("{} ({} bpp)", show.title(), rates[1]);
+        claims.push(format!("{title}: {}, {}", by(&ways[1]), by(&ways[3])));
     }
     if claims.is_empty() {
-        return Ok("\n- **At other sizes**: not measured with this version.\n".to_owned());
+        return Ok("- **At other sizes**: not measured with this version.\n".to_owned());
     }
     Ok(format!(
-        "\n- **At other sizes**, what rendering there is worth in {}: {}.\n",
+        "- **At other sizes**, what rendering there is worth in {}: {}.\n",
         Metric::Ssimulacra2.name(),
         claims.join("; ")
     ))

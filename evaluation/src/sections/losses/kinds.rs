@@ -3,11 +3,12 @@
 use super::Case;
 use super::source::{EDGE, Source};
 use crate::metric::Metric;
-use crate::sections::ranges::{MIDDLE, Outcome, RANGES, short};
+use crate::sections::ranges::{Outcome, RANGES, short};
 use crate::table::{Table, mean, percent};
 
-/// What a class of content is to a codec of Gaussians. The figures beside it are made.
-const KINDS: [(&str, &str, &str); 6] = [
+/// Classes of content with their names, and what each is to a codec of Gaussians. The figures beside it
+/// are made.
+pub(super) const KINDS: [(&str, &str, &str); 6] = [
     (
         "text",
         "Text",
@@ -92,15 +93,14 @@ pub(super) fn tables(cases: &[Case]) -> String {
     text
 }
 
-/// How the BD-rate at middle rates goes with figures of the source.
+/// How the BD-rate goes with figures of the source.
 fn correlations(cases: &[Case]) -> String {
-    let mut columns = vec!["rank correlation of the BD-rate at middle rates with".to_owned()];
+    let mut columns = vec!["rank correlation of the BD-rate with".to_owned()];
     columns.extend(Source::NAMES.map(str::to_owned));
     let mut table = Table::new(&columns);
-    let middle = RANGES.iter().position(|range| range.name == MIDDLE.name).expect("it is there");
     for metric in Metric::ALL {
         let mut cells = vec![metric.name().to_owned()];
-        let known = cases.iter().filter_map(|case| Some((case.rate(metric, middle)?, case.source)));
+        let known = cases.iter().filter_map(|case| Some((case.telling(metric)?.1, case.source)));
         let (rates, known): (Vec<f64>, Vec<Source>) = known.unzip();
         cells.extend([0, 1, 2].map(|index| {
             let figures: Vec<f64> = known.iter().map(|source| source.values()[index]).collect();
@@ -112,7 +112,8 @@ fn correlations(cases: &[Case]) -> String {
         "\nMean, and in brackets the pictures won. *Flat*: the share of pixels that equal their right and \
          lower neighbours; *edges*: that of pixels whose luma differs from one of these by {EDGE} levels or more; \
          *grain*: the median strength of the finest detail, in levels. Above 0: the more of it, the \
-         larger our files are beside the others'.\n{}",
+         larger our files are beside the others', at middle rates or, where there are none, at low or high \
+         ones.\n{}",
         table.finish()
     )
 }
@@ -143,10 +144,11 @@ pub(super) fn paragraphs(cases: &[Case]) -> String {
             continue;
         }
         let [flat, edges, grain] = sources(&cases);
-        let ranges = RANGES.iter().enumerate().map(|(index, range)| {
+        let ranges = RANGES.iter().enumerate().filter_map(|(index, range)| {
             let of = |metric| outcome(&cases, metric, index);
             let (seen, squared) = (of(Metric::Ssimulacra2), of(Metric::Psnr));
-            format!(
+            let found = seen.compared + squared.compared > 0;
+            let figures = format!(
                 "at {} rates {} by SSIMULACRA2 ({} of {} won) and {} by PSNR ({})",
                 range.name,
                 percent(seen.mean),
@@ -154,11 +156,12 @@ pub(super) fn paragraphs(cases: &[Case]) -> String {
                 seen.compared,
                 percent(squared.mean),
                 squared.won,
-            )
+            );
+            found.then_some(figures)
         });
         let ranges: Vec<String> = ranges.collect();
         text.push_str(&format!(
-            "\n**{name}** ({} pictures; {:.0} % flat, {:.1} % edges, grain {grain:.1}): {}. {}{why}\n",
+            "\n**{name}** (pictures: {}; {:.0} % flat, {:.1} % edges, grain {grain:.1}): {}. {}{why}\n",
             cases.len(),
             100.0 * flat,
             100.0 * edges,
@@ -169,21 +172,23 @@ pub(super) fn paragraphs(cases: &[Case]) -> String {
     text
 }
 
-/// A sentence about the picture with the largest BD-rate of all metrics at middle rates, if it is lost.
+/// A sentence about the picture with the largest BD-rate of all metrics, if it is lost.
 fn worst(cases: &[&Case]) -> String {
-    let middle = RANGES.iter().position(|range| range.name == MIDDLE.name).expect("it is there");
-    let all = Metric::ALL.into_iter().filter_map(|metric| {
-        let (index, rate) = outcome(cases, metric, middle).worst?;
-        Some((metric, index, rate))
+    let all = cases.iter().flat_map(|case| {
+        Metric::ALL.into_iter().filter_map(move |metric| {
+            let (range, rate) = case.telling(metric)?;
+            Some((*case, metric, range, rate))
+        })
     });
-    match all.max_by(|a, b| a.2.total_cmp(&b.2)) {
-        Some((metric, index, rate)) if rate > 0.0 => format!(
-            "The largest loss at middle rates is {}, {} by {}. ",
-            short(&cases[index].picture.name),
+    match all.max_by(|a, b| a.3.total_cmp(&b.3)) {
+        Some((case, metric, range, rate)) if rate > 0.0 => format!(
+            "The largest loss is {}, {} by {} at {} rates. ",
+            short(&case.picture.name),
             percent(Some(rate)),
-            metric.name()
+            metric.name(),
+            RANGES[range].name,
         ),
-        _ => "No picture is lost at middle rates. ".to_owned(),
+        _ => "No picture is lost. ".to_owned(),
     }
 }
 
@@ -206,11 +211,11 @@ mod tests {
     fn a_paragraph_has_the_figures_of_its_class() {
         let cases = [case("a", "text", 0.5), case("b", "text", -0.1), case("c", "face", -0.2)];
         let text = paragraphs(&cases);
-        assert!(text.contains("**Text** (2 pictures; 100 % flat"), "{text}");
+        assert!(text.contains("**Text** (pictures: 2; 100 % flat"), "{text}");
         assert!(text.contains("at middle rates +20.0 % by SSIMULACRA2 (1 of 2 won)"), "{text}");
-        assert!(text.contains("The largest loss at middle rates is a, +50.0 % by"), "{text}");
+        assert!(text.contains("The largest loss is a, +50.0 % by PSNR at middle"), "{text}");
         let faces = text.split("**Faces**").nth(1).expect("it is there");
-        assert!(faces.contains("No picture is lost at middle rates."), "{faces}");
+        assert!(faces.contains("No picture is lost."), "{faces}");
         assert!(!text.contains("**Line art**"), "{text}");
         assert!(tables(&cases).contains("| Text | 2 | +20.0 % (1/2) |"), "{}", tables(&cases));
     }

@@ -8,7 +8,7 @@ mod source;
 use anyhow::Result;
 
 use super::comparisons::{Comparison, compare};
-use super::ranges::{MIDDLE, RANGES, bd_rates, short};
+use super::ranges::{RANGES, bd_rates, short};
 use super::rate_store::RateStore;
 use crate::bench::Bench;
 use crate::gip;
@@ -19,6 +19,9 @@ use source::Source;
 
 /// How many pictures are named for each metric.
 const NAMED: usize = 6;
+
+/// The indices of the ranges in the order in which one stands for a picture: middle, low, high.
+const TELLING: [usize; RANGES.len()] = [1, 0, 2];
 
 /// A picture with its BD-rates against the strongest other codec.
 struct Case {
@@ -34,6 +37,12 @@ impl Case {
     fn rate(&self, metric: Metric, range: usize) -> Option<f64> {
         let index = Metric::ALL.iter().position(|each| *each == metric);
         self.rates[index.expect("all metrics are there")][range]
+    }
+
+    /// The BD-rate at middle rates or, for screenshots whose files are smaller or larger, at others:
+    /// the index of the range, and the BD-rate.
+    fn telling(&self, metric: Metric) -> Option<(usize, f64)> {
+        TELLING.into_iter().find_map(|range| Some((range, self.rate(metric, range)?)))
     }
 }
 
@@ -52,7 +61,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     text.push_str(&kinds::paragraphs(&cases));
     text.push_str(&noise::measure(bench, &mut store)?);
     text.push_str(&format!("\n### The largest losses\n{}", largest(&cases)));
-    text.push_str(&sheet::make(bench, &worst(&cases, sheet::OF_EACH))?);
+    text.push_str(&sheet::make(bench, &cases)?);
     Ok(text)
 }
 
@@ -71,16 +80,12 @@ fn cases(comparison: &Comparison, bench: &Bench) -> Vec<Case> {
         .collect()
 }
 
-/// For each metric so many pictures with the largest BD-rates at middle rates, the largest first.
-fn worst(cases: &[Case], count: usize) -> Vec<(Metric, Vec<&Case>)> {
-    let middle = RANGES.iter().position(|range| range.name == MIDDLE.name).expect("it is there");
-    let of_metric = |metric: Metric| {
-        let known = cases.iter().filter_map(|case| Some((case, case.rate(metric, middle)?)));
-        let mut known: Vec<(&Case, f64)> = known.collect();
-        known.sort_by(|a, b| b.1.total_cmp(&a.1));
-        (metric, known.into_iter().take(count).map(|(case, _)| case).collect())
-    };
-    Metric::ALL.map(of_metric).into()
+/// The pictures with the largest BD-rates by a metric, the largest first.
+fn worst(cases: &[Case], metric: Metric) -> Vec<&Case> {
+    let known = cases.iter().filter_map(|case| Some((case, case.telling(metric)?.1)));
+    let mut known: Vec<(&Case, f64)> = known.collect();
+    known.sort_by(|a, b| b.1.total_cmp(&a.1));
+    known.into_iter().map(|(case, _)| case).collect()
 }
 
 /// The pictures that lose most by each metric.
@@ -88,8 +93,8 @@ fn largest(cases: &[Case]) -> String {
     let mut columns = vec!["metric, picture".to_owned(), "set".to_owned(), "content".to_owned()];
     columns.extend(RANGES.map(|range| range.title()));
     let mut table = Table::new(&columns);
-    for (metric, worst) in worst(cases, NAMED) {
-        for case in worst {
+    for metric in Metric::ALL {
+        for case in worst(cases, metric).into_iter().take(NAMED) {
             let name = format!("{}, {}", metric.name(), short(&case.picture.name));
             let mut cells = vec![name, case.set.to_owned(), case.content.clone()];
             cells.extend((0..RANGES.len()).map(|range| percent(case.rate(metric, range))));
@@ -97,7 +102,8 @@ fn largest(cases: &[Case]) -> String {
         }
     }
     format!(
-        "\nThe {NAMED} pictures of all sets with the largest BD-rates at middle rates, by metric.\n{}",
+        "\nThe {NAMED} pictures of all sets with the largest BD-rates by each metric, at middle rates or, where \
+         there are none, at low or high ones.\n{}",
         table.finish()
     )
 }
@@ -117,10 +123,13 @@ mod tests {
     #[test]
     fn the_worst_come_first() {
         let cases = [case("a", "text", 0.1), case("b", "face", -0.2), case("c", "text", 0.3)];
-        let worst = worst(&cases, 2);
-        assert_eq!(worst.len(), Metric::ALL.len());
-        let names: Vec<&str> = worst[0].1.iter().map(|case| case.picture.name.as_str()).collect();
-        assert_eq!(names, ["c", "a"]);
+        let worst = worst(&cases, Metric::Cvvdp);
+        let names: Vec<&str> = worst.iter().map(|case| case.picture.name.as_str()).collect();
+        assert_eq!(names, ["c", "a", "b"]);
+        assert_eq!(TELLING.map(|range| RANGES[range].name), ["middle", "low", "high"]);
+        let mut high_alone = case("d", "text", 0.1);
+        high_alone.rates = Metric::ALL.map(|_| [None, None, Some(0.7)]);
+        assert_eq!(high_alone.telling(Metric::Psnr), Some((2, 0.7)));
         let text = largest(&cases);
         assert!(text.contains("| PSNR, c | Kodak | text | - | +30.0 % | +60.0 % |"), "{text}");
     }

@@ -1,12 +1,13 @@
 //! What losses look like.
 
-use std::fs;
+use std::{fs, ptr};
 
 use anyhow::Result;
 use image::{RgbImage, imageops};
 use image_gip::{Target, Threads};
 
-use super::Case;
+use super::kinds::KINDS;
+use super::{Case, worst};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
@@ -17,10 +18,6 @@ use crate::sections::ranges::short;
 use crate::versions::{self, Version};
 use crate::visual;
 
-/// How many of the pictures with the largest losses by each metric may be in the sheet.
-pub(super) const OF_EACH: usize = 4;
-/// How many of them are, pictures that are in it already left out.
-const NEW_OF_EACH: usize = 2;
 const COLUMNS: u32 = 2;
 /// Of our files, in bits per pixel; the others have as many bytes.
 const RATE: f64 = 0.5;
@@ -38,20 +35,12 @@ const QUALITIES: [u8; 8] = [88, 84, 80, 75, 70, 65, 60, 50];
 /// One crop as the original and all codecs show it, with captions.
 struct Strip(Vec<(String, RgbImage)>);
 
-/// Writes the sheet of the worst pictures of each metric, and says what is in it.
-pub(super) fn make(bench: &mut Bench, worst: &[(Metric, Vec<&Case>)]) -> Result<String> {
+/// Writes the sheet of the worst picture by each metric and of each class of content, and says what
+/// is in it.
+pub(super) fn make(bench: &mut Bench, cases: &[Case]) -> Result<String> {
     let mut strips = Vec::new();
-    let mut shown: Vec<&str> = Vec::new();
-    for (metric, cases) in worst {
-        let mut new = 0;
-        for case in cases {
-            let name = case.picture.name.as_str();
-            if new < NEW_OF_EACH && !shown.contains(&name) {
-                shown.push(name);
-                new += 1;
-                strips.push(strip(bench, *metric, &case.picture)?);
-            }
-        }
+    for (case, metric) in chosen(cases) {
+        strips.push(strip(bench, metric, &case.picture)?);
     }
     let canvas = draw(&strips);
     let path = bench.path(NAME);
@@ -62,13 +51,32 @@ pub(super) fn make(bench: &mut Bench, worst: &[(Metric, Vec<&Case>)]) -> Result<
         }
     }
     Ok(format!(
-        "\n### Sheet: losses\n\nOf the {OF_EACH} worst pictures by each metric, those {NEW_OF_EACH} that no metric before \
-         has shown: the {SIDE} x {SIDE} pixels where ours is furthest behind {} (by the map of SSIMULACRA2; for \
-         PSNR, by squared error), our file of {RATE} bits per pixel and others of as many bytes; with the \
-         metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
+        "\n### Sheet: losses\n\nThe picture with the largest BD-rate by each metric, and then of each class of content by \
+         {}, each picture once: the {SIDE} x {SIDE} pixels where ours is furthest behind {} (by the map of SSIMULACRA2; for \
+         PSNR, by squared error), in our file of {RATE} bits per pixel and in others of as many bytes; with the \
+         rate and the metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
          we lose]({NAME})\n",
+        Metric::Ssimulacra2.name(),
         OTHERS[0]
     ))
+}
+
+/// The pictures of the sheet, each with the metric that it is there for.
+fn chosen(cases: &[Case]) -> Vec<(&Case, Metric)> {
+    let mut chosen: Vec<(&Case, Metric)> = Vec::new();
+    let of_metrics = Metric::ALL.map(|metric| (metric, worst(cases, metric)));
+    let of_kinds = KINDS.iter().map(|(kind, ..)| {
+        let mut all = worst(cases, Metric::Ssimulacra2);
+        all.retain(|case| case.content == *kind);
+        (Metric::Ssimulacra2, all)
+    });
+    for (metric, all) in of_metrics.into_iter().chain(of_kinds) {
+        let is_new = |case: &&&Case| chosen.iter().all(|(shown, _)| !ptr::eq(*shown, **case));
+        if let Some(case) = all.iter().find(is_new) {
+            chosen.push((case, metric));
+        }
+    }
+    chosen
 }
 
 fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture) -> Result<Strip> {
@@ -86,15 +94,13 @@ fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture) -> Result<Str
     let ahead: Vec<f64> = ahead.map(|(rival, ours)| rival - ours).collect();
     let side = SIDE.min(picture.width).min(picture.height);
     let [crop, _] = extremes(&ahead, picture.width, side);
-    let mut tiles = vec![(short(&picture.name).to_owned(), cut(picture, &picture.rgb, crop, side))];
+    // Captions have room for 26 letters, so names end where their first part does.
+    let name = picture.name.split('-').next().unwrap_or_default();
+    let caption = format!("{}: {}", short(name), metric.name());
+    let mut tiles = vec![(caption, cut(picture, &picture.rgb, crop, side))];
     for (name, version) in &versions {
-        let level = metric.level(&picture.distortion(&version.samples)?);
-        let caption = format!(
-            "{name} {:.2}: {} {:.4}",
-            picture.rate(version.bytes),
-            metric.name(),
-            metric.shown(level)
-        );
+        let level = metric.shown(metric.level(&picture.distortion(&version.samples)?));
+        let caption = format!("{name} {:.2} bpp: {level:.2}", picture.rate(version.bytes));
         tiles.push((caption, cut(picture, &version.samples, crop, side)));
     }
     Ok(Strip(tiles))
@@ -132,4 +138,28 @@ fn draw(strips: &[Strip]) -> Canvas {
         }
     }
     canvas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sections::losses::tests::case;
+
+    #[test]
+    fn every_metric_and_every_class_has_another_picture() {
+        let cases = [
+            case("a", "text", 0.1),
+            case("b", "face", 0.9),
+            case("c", "face", 0.8),
+            case("d", "face", 0.7),
+            case("e", "face", 0.6),
+            case("f", "face", 0.5),
+            case("g", "drawing", -0.5),
+        ];
+        let chosen = chosen(&cases);
+        let names: Vec<&str> = chosen.iter().map(|(case, _)| case.picture.name.as_str()).collect();
+        assert_eq!(names, ["b", "c", "d", "e", "f", "a", "g"]);
+        assert_eq!(chosen[4].1, Metric::Psnr);
+        assert_eq!(chosen[6].1, Metric::Ssimulacra2);
+    }
 }

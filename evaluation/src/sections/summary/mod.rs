@@ -8,6 +8,7 @@ use anyhow::Result;
 
 use super::comparisons::compare;
 use super::rate_store::RateStore;
+use super::sizes;
 use crate::bench::Bench;
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
@@ -17,8 +18,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         "Every number of this page is made from the measurements of the sections that follow, which say how \
          it was measured.\n\n",
     );
-    text.push_str(&rates::claims(bench, &comparisons)?);
-    text.push_str(&super::sizes::claim(bench)?);
+    text.push_str(&rates::claims(&comparisons));
+    text.push_str(&sizes::claim(bench)?);
     text.push_str(&times::claims(bench)?);
+    text.push_str(&rates::pictures(bench, &comparisons)?);
     Ok(text)
 }

@@ -17,9 +17,14 @@ const METRIC: Metric = Metric::Ssimulacra2;
 const CURVES: &str = "summary-curves.svg";
 const PICTURES: &str = "summary-pictures.svg";
 
-pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> Result<String> {
-    let (photographs, others): (Vec<&Comparison>, Vec<&Comparison>) =
-        comparisons.iter().partition(|comparison| comparison.set.name != "screens");
+/// Sets of photographs, and others.
+fn parted(comparisons: &[Comparison]) -> (Vec<&Comparison>, Vec<&Comparison>) {
+    comparisons.iter().partition(|comparison| comparison.set.name != "screens")
+}
+
+/// A list of claims.
+pub(super) fn claims(comparisons: &[Comparison]) -> String {
+    let (photographs, others) = parted(comparisons);
     let anchor = comparisons[0].best_avif().name;
     let mut text = String::new();
     for range in RANGES {
@@ -33,7 +38,7 @@ pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> Result<String
     }
     if !others.is_empty() {
         let each = RANGES.map(|range| {
-            let outcome = of(&others, anchor, METRIC, range).0;
+            let (outcome, _) = of(&others, anchor, METRIC, range);
             format!("{} at {} rates", percent(outcome.mean), range.name)
         });
         text.push_str(&format!(
@@ -43,17 +48,21 @@ pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> Result<String
         ));
     }
     text.push_str(&format!("- {}\n", lost(&photographs, anchor)));
-    text.push_str(&format!(
-        "\nHow much larger (+) or smaller (-) our files of photographs are at equal {}, and pictures won:\n{}",
+    text
+}
+
+/// The table of all codecs, and two plots.
+pub(super) fn pictures(bench: &Bench, comparisons: &[Comparison]) -> Result<String> {
+    let (photographs, _) = parted(comparisons);
+    let anchor = comparisons[0].best_avif().name;
+    Ok(format!(
+        "\nHow much larger (+) or smaller (-) our files of photographs are at equal {}, and pictures \
+         won:\n{}\n![Quality over rate]({})\n\n![Every photograph]({})\n",
         METRIC.name(),
-        table(&photographs)
-    ));
-    text.push_str(&format!(
-        "\n![Quality over rate]({})\n\n![Every photograph]({})\n",
+        table(&photographs),
         curves(bench, comparisons)?,
-        pictures(bench, &photographs, anchor)?
-    ));
-    Ok(text)
+        every_photograph(bench, &photographs, anchor)?
+    ))
 }
 
 /// The BD-rates of all pictures of some sets against the codec of a name, with their names.
@@ -133,7 +142,11 @@ fn curves(bench: &Bench, comparisons: &[Comparison]) -> Result<&'static str> {
 }
 
 /// The mean BD-rate over all ranges of every photograph, in order, by each metric.
-fn pictures(bench: &Bench, photographs: &[&Comparison], anchor: &str) -> Result<&'static str> {
+fn every_photograph(
+    bench: &Bench,
+    photographs: &[&Comparison],
+    anchor: &str,
+) -> Result<&'static str> {
     let series = Metric::ALL.map(|metric| {
         let of_ranges = RANGES.map(|range| of(photographs, anchor, metric, range).1);
         let of_picture = |index: usize| mean(of_ranges.iter().filter_map(|of| of[index].1));

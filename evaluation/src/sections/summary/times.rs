@@ -57,7 +57,7 @@ pub(super) fn claims(bench: &mut Bench) -> Result<String> {
     });
     let against: Vec<String> = against.collect();
     Ok(format!(
-        "\n- **Time** at {RATE} with one thread: {:.2} s to encode at effort {}, {:.1} ms to decode. Our times to \
+        "- **Time** at {RATE} with one thread: {:.2} s to encode at effort {}, {:.1} ms to decode. Our times to \
          encode and to decode divided by the others': {}.\n\n![Encoding and decoding time]({PLOT})\n",
         ours.times[0],
         gip::EFFORT,
