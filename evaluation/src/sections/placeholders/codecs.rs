@@ -1,14 +1,14 @@
 //! What codecs can do with a few hundred bytes.
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use image::imageops::{self, FilterType};
 use image::{DynamicImage, RgbImage};
 use image_gip::{Target, Threads, metrics};
 
-use crate::baselines::SLOWEST_AVIF;
-use crate::bench::Bench;
+use crate::baselines::{SLOWEST_AVIF, Worker};
 use crate::pictures::TestPicture;
 use crate::{gip, versions, visual};
 
@@ -69,16 +69,18 @@ impl Codec {
     }
 
     /// Our file at the default effort; of others the best by SSIMULACRA2, with all their settings.
+    /// `scratch` is a folder for passing files to the worker.
     pub(super) fn placeholders(
         self,
-        bench: &mut Bench,
+        worker: &mut Worker,
+        scratch: &Path,
         picture: &TestPicture,
     ) -> Result<Placeholders> {
         match self {
             Self::Gip => ours(picture),
             Self::ThumbHash => thumb_hash(picture),
             Self::BlurHash => blur_hash(picture),
-            Self::Baseline(name) => baseline(bench, name, picture),
+            Self::Baseline(name) => baseline(worker, scratch, name, picture),
         }
     }
 }
@@ -163,14 +165,19 @@ fn opaque([width, height]: [u32; 2], rgba: &[u8]) -> RgbImage {
     RgbImage::from_raw(width, height, samples).expect("they are of this size")
 }
 
-fn baseline(bench: &mut Bench, name: &str, picture: &TestPicture) -> Result<Placeholders> {
+fn baseline(
+    worker: &mut Worker,
+    scratch: &Path,
+    name: &str,
+    picture: &TestPicture,
+) -> Result<Placeholders> {
     let mut baselines = vec![versions::baseline_called(name)?];
     if name == TRIED_SLOWLY {
         baselines.push(&SLOWEST_AVIF);
     }
     let (whole, original) = (image_of(picture), original(picture));
-    let path = bench.path("placeholder.png");
-    let (worker, _) = bench.baselines()?;
+    // The worker may have another working directory.
+    let path = std::path::absolute(scratch.join(format!("placeholder of {}.png", picture.name)))?;
     let mut placeholders = Placeholders::default();
     for longer in SIDES {
         let scale = f64::from(longer) / f64::from(picture.width.max(picture.height));
