@@ -222,28 +222,29 @@ pub(super) fn series(comparison: &Comparison, metric: Metric) -> Vec<Series> {
     series.collect()
 }
 
-/// Writes the BD-rate of each picture against each other codec, in a CSV.
+/// Writes the BD-rates of each picture, in a CSV with a column for each other codec: those of the
+/// first set, which has them all.
 fn write_by_picture(bench: &Bench, comparisons: &[Comparison]) -> Result<()> {
     let path = bench.path(BY_PICTURE);
     let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
     let mut csv = csv::Writer::from_writer(file);
-    csv.write_record(["set", "picture", "metric", "rates", "against", "bd_rate"])?;
-    for Comparison { set, ours, others } in comparisons {
+    let others: Vec<&str> = comparisons[0].others.iter().map(|codec| codec.name).collect();
+    csv.write_record(["set", "picture", "metric", "rates"].iter().chain(&others))?;
+    for comparison in comparisons {
         for metric in Metric::ALL {
             for range in RANGES {
-                for other in others {
-                    let rates = bd_rates(ours, other, metric, range);
-                    for (picture, rate) in set.pictures.iter().zip(rates) {
-                        let rate = rate.map_or_else(String::new, |rate| format!("{rate:.4}"));
-                        csv.write_record([
-                            set.name,
-                            &picture.name,
-                            metric.name(),
-                            range.name,
-                            other.name,
-                            &rate,
-                        ])?;
-                    }
+                let all = others.iter().map(|name| {
+                    let other = comparison.other(name)?;
+                    Some(bd_rates(&comparison.ours, other, metric, range))
+                });
+                let all: Vec<Option<Vec<Option<f64>>>> = all.collect();
+                for (index, picture) in comparison.set.pictures.iter().enumerate() {
+                    let key = [comparison.set.name, &picture.name, metric.name(), range.name];
+                    let rates = all.iter().map(|rates| {
+                        let rate = rates.as_ref().and_then(|rates| rates[index]);
+                        rate.map_or_else(String::new, |rate| format!("{rate:.3}"))
+                    });
+                    csv.write_record(key.into_iter().map(str::to_owned).chain(rates))?;
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! Measurements of whole files, by every codec at every setting: `rate.csv`.
 
+use std::cmp::Reverse;
+
 use anyhow::{Context, Result};
 use image_gip::{Encoder, Threads};
 
@@ -121,7 +123,7 @@ impl RateStore {
             let known = settings.iter().map(|setting| self.known(version, codec, setting, picture));
             jobs.push((picture, known.collect()));
         }
-        jobs.sort_by(|(a, _), (b, _)| b.rgb.len().cmp(&a.rgb.len()));
+        jobs.sort_by_key(|(picture, _)| Reverse(picture.rgb.len()));
         let work = |worker: &mut W,
                     (picture, known): &(&TestPicture, Vec<Option<Point>>),
                     emit: &mut dyn FnMut((String, String, Point))| {

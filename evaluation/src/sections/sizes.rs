@@ -330,7 +330,7 @@ impl FileStore {
             }
             Ok(())
         })?;
-        fs::remove_dir(folder)?;
+        fs::remove_dir_all(folder)?;
         Ok(())
     }
 
