@@ -14,13 +14,14 @@ use crate::gip;
 use crate::metric::Metric;
 use crate::pictures::TestPicture;
 use crate::sections::crops::{Crop, extremes};
-use crate::sections::ranges::short;
+use crate::sections::ranges::{RANGES, short};
 use crate::versions::{self, Version};
 use crate::visual;
 
 const COLUMNS: u32 = 2;
-/// Of our files, in bits per pixel; the others have as many bytes.
-const RATE: f64 = 0.5;
+/// Of our files, in bits per pixel, by the range that stands for the picture; the others have as many
+/// bytes.
+const RATES: [f64; RANGES.len()] = [0.2, 0.5, 1.3];
 const OTHERS: [&str; 2] = ["AVIF", "JPEG XL"];
 /// Of a crop, in pixels.
 const SIDE: u32 = 160;
@@ -40,7 +41,8 @@ struct Strip(Vec<(String, RgbImage)>);
 pub(super) fn make(bench: &mut Bench, cases: &[Case]) -> Result<String> {
     let mut strips = Vec::new();
     for (case, metric) in chosen(cases) {
-        strips.push(strip(bench, metric, &case.picture)?);
+        let rate = case.telling(metric).map_or(RATES[0], |(range, _)| RATES[range]);
+        strips.push(strip(bench, metric, &case.picture, rate)?);
     }
     let canvas = draw(&strips);
     let path = bench.path(NAME);
@@ -53,11 +55,12 @@ pub(super) fn make(bench: &mut Bench, cases: &[Case]) -> Result<String> {
     Ok(format!(
         "\n### Sheet: losses\n\nThe picture with the largest BD-rate by each metric, and then of each class of content by \
          {}, each picture once: the {SIDE} x {SIDE} pixels where ours is furthest behind {} (by the map of SSIMULACRA2; for \
-         PSNR, by squared error), in our file of {RATE} bits per pixel and in others of as many bytes; with the \
-         rate and the metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
+         PSNR, by squared error), in our file of {} bits per pixel (where low, middle or high \
+         rates stand for the picture) and in others of as many bytes; with the rate and the metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
          we lose]({NAME})\n",
         Metric::Ssimulacra2.name(),
-        OTHERS[0]
+        OTHERS[0],
+        RATES.map(|rate| rate.to_string()).join(", "),
     ))
 }
 
@@ -79,8 +82,8 @@ fn chosen(cases: &[Case]) -> Vec<(&Case, Metric)> {
     chosen
 }
 
-fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture) -> Result<Strip> {
-    let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
+fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture, rate: f64) -> Result<Strip> {
+    let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
     let file = gip::file(encoder, picture, Threads::Pool)?;
     let mut versions = vec![(gip::NAME, Version::of_file(&file.bytes, Some(file.report))?)];
     let bytes = versions[0].1.bytes;
