@@ -56,7 +56,7 @@ const AVIF_SETTINGS: [&str; 9] = ["1", "20", "35", "50", "60", "70", "82", "94",
 const JXL_DISTANCES: [&str; 9] = ["25", "14", "8.5", "5", "3", "1.75", "1", "0.5", "0.2"];
 const HEIC_SETTINGS: [&str; 9] = ["1", "12", "20", "28", "36", "45", "55", "68", "85"];
 /// Fewer, for it takes its time.
-const BEST_AVIF_SETTINGS: [&str; 7] = ["5", "30", "50", "65", "80", "92", "99"];
+const BEST_AVIF_SETTINGS: [&str; 6] = ["5", "30", "52", "72", "93", "99"];
 
 /// More codecs for the sections about rates alone.
 const RIVALS: [Baseline; 4] = [

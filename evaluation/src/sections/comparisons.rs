@@ -49,7 +49,10 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
         let (workers, versions) = bench.workers()?;
         let rivals = baselines::rivals().filter(|(rival, _)| is_in(set.name, rival.name));
         let others = rivals.map(|rival| {
-            Codec::baseline(store, workers, &versions, rival, &set.pictures, of_others)
+            // It has few settings anyway.
+            let is_best = rival.0.name == BEST_AVIF[0].name;
+            let extent = if is_best { extent(quick, 1) } else { of_others };
+            Codec::baseline(store, workers, &versions, rival, &set.pictures, extent)
         });
         let others = others.collect::<Result<_>>()?;
         comparisons.push(Comparison { set, ours, others });
