@@ -18,7 +18,8 @@ pub(crate) struct Baseline {
     pub(crate) id: &'static str,
     pub(crate) name: &'static str,
     /// From small files to large ones: from 0.1 bits per pixel, or the least that the codec can
-    /// write, to 1.7 bits per pixel on all but the smoothest photographs.
+    /// write, to 2 bits per pixel on all but the smoothest pictures, in steps of less than twice
+    /// the size.
     pub(crate) settings: &'static [&'static str],
 }
 
@@ -27,45 +28,64 @@ pub(crate) const BASELINES: [Baseline; 7] = [
     Baseline {
         id: "jpeg420prog",
         name: "JPEG",
-        settings: &["1", "5", "10", "16", "25", "36", "50", "66", "80", "90", "95", "98"],
+        settings: &["1", "7", "16", "30", "58", "80", "90", "96", "100"],
     },
     Baseline {
         id: "jpegli",
         name: "jpegli",
-        settings: &["1", "10", "20", "30", "42", "54", "66", "76", "84", "90", "95", "99"],
+        settings: &["1", "14", "30", "50", "70", "84", "92", "97", "100"],
     },
     Baseline {
         id: "jp2",
         name: "JPEG 2000",
-        settings: &[
-            "0.08", "0.1", "0.15", "0.2", "0.25", "0.35", "0.5", "0.75", "1.0", "1.25", "1.5",
-            "1.75",
-        ],
+        settings: &["0.1", "0.2", "0.42", "0.75", "1.0", "1.5", "2.0"],
     },
     Baseline {
         id: "webp_m6",
         name: "WebP",
-        settings: &["0", "6", "10", "15", "20", "32", "48", "64", "78", "87", "93", "97", "100"],
+        settings: &["0", "6", "15", "32", "56", "78", "90", "97", "100"],
     },
     Baseline { id: "avif420_s6", name: "AVIF", settings: &AVIF_SETTINGS },
     Baseline { id: "avif420_s6_psnr", name: "AVIF tune=psnr", settings: &AVIF_SETTINGS },
-    Baseline {
-        id: "jxl_e7",
-        name: "JPEG XL",
-        // From distance 20 on libjxl halves the resolution.
-        settings: &["25", "20", "17", "12", "8.5", "6", "4", "3", "2", "1.25", "0.8", "0.5", "0.3"],
-    },
+    Baseline { id: "jxl_e7", name: "JPEG XL", settings: &JXL_DISTANCES },
 ];
 
-const AVIF_SETTINGS: [&str; 14] =
-    ["1", "10", "15", "20", "25", "30", "40", "50", "60", "70", "80", "88", "95", "98"];
+/// 100 would be without loss, which has no tuning.
+const AVIF_SETTINGS: [&str; 9] = ["1", "20", "35", "50", "60", "70", "82", "94", "99"];
+/// From distance 20 on libjxl halves the resolution.
+const JXL_DISTANCES: [&str; 9] = ["25", "14", "8.5", "5", "3", "1.75", "1", "0.5", "0.2"];
+const HEIC_SETTINGS: [&str; 9] = ["1", "12", "20", "28", "36", "45", "55", "68", "85"];
+/// Fewer, for it takes its time.
+const BEST_AVIF_SETTINGS: [&str; 6] = ["5", "30", "52", "72", "93", "99"];
 
-/// The best that AVIF can do. It takes up to half a minute for a picture, so it is measured on a few.
-pub(crate) const BEST_AVIF: Baseline = Baseline {
-    id: "avif444_s0",
-    name: "AVIF speed 0, 4:4:4",
-    settings: &["5", "15", "25", "35", "45", "55", "65", "75", "85"],
-};
+/// More codecs for the sections about rates alone.
+const RIVALS: [Baseline; 4] = [
+    Baseline { id: "avif420_s6_ssim2", name: "AVIF tune=ssimulacra2", settings: &AVIF_SETTINGS },
+    Baseline { id: "jxl_e9", name: "JPEG XL effort 9", settings: &JXL_DISTANCES },
+    Baseline { id: "heic", name: "HEIC", settings: &HEIC_SETTINGS },
+    Baseline { id: "avif_svt", name: "AVIF by SVT-AV1", settings: &AVIF_SETTINGS },
+];
+
+/// The best that AVIF can do, with two tunings.
+pub(crate) const BEST_AVIF: [Baseline; 2] = [
+    Baseline { id: "avif444_s2", name: "AVIF, its best", settings: &BEST_AVIF_SETTINGS },
+    Baseline { id: "avif444_s2_ssim2", name: "AVIF, its best", settings: &BEST_AVIF_SETTINGS },
+];
+
+/// A codec without other tunings.
+pub(crate) const ALONE: &[Baseline] = &[];
+
+/// What the sections about rates compare with, each with its other tunings.
+pub(crate) fn rivals() -> impl Iterator<Item = (&'static Baseline, &'static [Baseline])> {
+    let [best, tunings @ ..] = &BEST_AVIF;
+    let others = BASELINES.iter().chain(&RIVALS).map(|baseline| (baseline, ALONE));
+    others.chain([(best, &tunings[..])])
+}
+
+/// AVIF at its slowest. It takes up to half a minute for a picture of Kodak's, so it is for small
+/// ones.
+pub(crate) const SLOWEST_AVIF: Baseline =
+    Baseline { id: "avif444_s0", name: "AVIF speed 0, 4:4:4", settings: &BEST_AVIF_SETTINGS };
 
 /// JPEG as cameras write it: larger than progressive files, and faster to decode.
 pub(crate) const SEQUENTIAL_JPEG: Baseline =
@@ -78,6 +98,14 @@ OpenJPEG's 9/7 wavelet with its colour transform, in a .jp2; WebP is libwebp's m
 aom at speed 6, 4:2:0, with libavif's default tuning (tune=iq, for perceived quality) and with \
 tune=psnr; JPEG XL is libjxl's effort 7, tuned for perceived quality; from \
 distance 20 on it halves the resolution.";
+
+/// The same of those that are no baselines.
+pub(crate) const RIVALS_DESCRIPTION: &str = "AVIF tune=ssimulacra2 is the same with that tuning; \
+AVIF by SVT-AV1 is that encoder's preset 4 for still pictures with its tuning for images (tune=iq), \
+4:2:0 of 10 bits; AVIF, its best, is aom at speed 2 in 4:4:4, on each picture with the tuning that is \
+best by the metric in question, iq or ssimulacra2 (speed 0 takes more than three times as long for \
+files that are hardly smaller); JPEG XL effort 9 is the same at that effort; HEIC is x265's preset \
+veryslow, 4:2:0.";
 
 /// A picture encoded and decoded by a baseline.
 #[derive(Clone, Debug)]
@@ -101,8 +129,9 @@ pub(crate) struct Worker {
 }
 
 impl Worker {
-    /// Installs what is missing, and starts. `scratch` is a folder for passing files.
-    pub(crate) fn start(scratch: &Path) -> Result<Self> {
+    /// Installs what is missing, and starts. `scratch` is a folder for passing files; `index` tells
+    /// this worker from others with the same folder.
+    pub(crate) fn start(scratch: &Path, index: usize) -> Result<Self> {
         let packages = Path::new(FOLDER).join("baselines/requirements.txt");
         let python = python::environment("baselines", &packages, None)?;
         let mut child = Command::new(python)
@@ -113,7 +142,7 @@ impl Worker {
             .context("cannot start the baselines")?;
         let requests = child.stdin.take().context("the worker has no input")?;
         let answers = BufReader::new(child.stdout.take().context("the worker has no output")?);
-        let decoded = std::path::absolute(scratch.join("decoded.rgb"))?;
+        let decoded = std::path::absolute(scratch.join(format!("decoded-{index}.rgb")))?;
         let mut worker = Self { child, requests, answers, decoded, versions: Vec::new() };
         loop {
             let line = worker.line()?;

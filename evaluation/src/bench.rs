@@ -32,11 +32,11 @@ pub(crate) struct Folders {
     /// Folder with a second set of photographs, as .png, for the sections about quality.
     #[arg(long, value_name = "DIR")]
     photos: Option<PathBuf>,
-    /// Folder with pictures of 2,048 pixels, as .png, for `representation` at the paper's 10,000
-    /// and 50,000 Gaussians.
+    /// Folder with pictures of 2,048 pixels, as .png, for `rate`, and for `representation` at the
+    /// paper's 10,000 and 50,000 Gaussians.
     #[arg(long, value_name = "DIR")]
     large: Option<PathBuf>,
-    /// Folder with screenshots, as .png, for `monotony`.
+    /// Folder with screenshots, as .png, for `rate`, `losses` and `monotony`.
     #[arg(long, value_name = "DIR")]
     screens: Option<PathBuf>,
     /// CSV with the columns picture and content, for means by class of content in `texture`.
@@ -69,7 +69,8 @@ pub(crate) struct Bench {
     pub(crate) product: String,
     source: Source,
     folder: PathBuf,
-    worker: Option<Worker>,
+    /// One for each core, once any is needed.
+    workers: Vec<Worker>,
     manifest: Manifest,
     /// Names of pictures that the manifest does not list.
     unlisted: Vec<String>,
@@ -103,7 +104,7 @@ impl Bench {
             product: provenance::product()?,
             source: Source { machine: provenance::machine(), commit: provenance::commit() },
             folder,
-            worker: None,
+            workers: Vec::new(),
             manifest: Manifest::load()?,
             unlisted: Vec::new(),
             figures: RefCell::default(),
@@ -151,7 +152,15 @@ impl Bench {
         ]
     }
 
-    /// The sets of pictures, the first of which is [`Self::pictures`].
+    /// All sets of pictures, those of [`Self::sets`] first.
+    pub(crate) fn all_sets(&self) -> Vec<PictureSet> {
+        let others = [("large", &self.large), ("screens", &self.screens)];
+        let others = others.into_iter().filter(|(_, pictures)| !pictures.is_empty());
+        let others = others.map(|(name, pictures)| PictureSet { name, pictures: pictures.clone() });
+        self.sets().into_iter().chain(others).collect()
+    }
+
+    /// The sets of pictures for most sections, the first of which is [`Self::pictures`].
     pub(crate) fn sets(&self) -> Vec<PictureSet> {
         let mut sets = vec![PictureSet { name: "Kodak", pictures: self.pictures.clone() }];
         if !self.photos.is_empty() {
@@ -210,12 +219,18 @@ impl Bench {
 
     /// The baselines, with their versions in one line.
     pub(crate) fn baselines(&mut self) -> Result<(&mut Worker, String)> {
-        let worker = match self.worker.take() {
-            Some(worker) => worker,
-            None => Worker::start(&self.folder)?,
-        };
-        let versions = worker.versions.join(", ");
-        Ok((self.worker.insert(worker), versions))
+        let (workers, versions) = self.workers()?;
+        Ok((&mut workers[0], versions))
+    }
+
+    /// The same, one for each core: for what is measured without times.
+    pub(crate) fn workers(&mut self) -> Result<(&mut [Worker], String)> {
+        if self.workers.is_empty() {
+            let all = (0..provenance::cores()).map(|index| Worker::start(&self.folder, index));
+            self.workers = all.collect::<Result<_>>()?;
+        }
+        let versions = self.workers[0].versions.join(", ");
+        Ok((&mut self.workers, versions))
     }
 
     /// Names a figure of the section that is being measured, for texts that cite it: in `figures.csv` it has
@@ -255,7 +270,7 @@ impl Bench {
                 self.unlisted.join(", ")
             ));
         }
-        if let Some(worker) = &self.worker {
+        if let Some(worker) = self.workers.first() {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }
         if self.quick {

@@ -69,9 +69,9 @@ pub(crate) fn encode(
     Ok(MeasuredFile { file, bytes, report: encoded.report, distortion, memory })
 }
 
-/// Encodes a picture with all threads.
-pub(crate) fn file(encoder: Encoder, picture: &TestPicture) -> Result<Encoded> {
-    Ok(encoder.with_threads(Threads::Pool).encode(&source(picture)?)?)
+/// Encodes a picture without measuring it.
+pub(crate) fn file(encoder: Encoder, picture: &TestPicture, threads: Threads) -> Result<Encoded> {
+    Ok(encoder.with_threads(threads).encode(&source(picture)?)?)
 }
 
 fn source(picture: &TestPicture) -> Result<Source<'_>> {

@@ -19,6 +19,7 @@ mod memory;
 mod metric;
 mod number;
 mod origins;
+mod parallel;
 mod pictures;
 mod plot;
 mod provenance;
@@ -43,8 +44,8 @@ use bench::{Bench, Folders};
 use blind::{choices, triplets};
 use report::Section;
 use sections::{
-    ablation, content, decode, monotony, placeholders, printed, quality, rate, representation,
-    sheet, speed, stability, texture, training,
+    ablation, content, decode, losses, monotony, placeholders, printed, quality, rate,
+    representation, sheet, sizes, speed, stability, summary, texture, training,
 };
 
 /// Measures image-gip against other codecs and writes `report.md`, SVG plots, and CSV with every
@@ -122,7 +123,9 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
     store::tidy(&args.out)?;
     let mut bench = Bench::new(folders, args.out, args.quick, args.long, args.reference)?;
     bench.readme_picture = args.readme_picture;
-    let sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
+    let mut sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
+    // The first page tells what the others have measured.
+    sections.sort_by_key(|section| *section == Section::Summary);
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
         let text = measure(section, &mut bench)?;
@@ -145,9 +148,12 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
 /// Measures what a section lacks and returns its text.
 fn measure(section: Section, bench: &mut Bench) -> Result<String> {
     match section {
+        Section::Summary => summary::measure(bench),
         Section::Representation => representation::measure(bench),
         Section::Ablation => ablation::measure(bench),
         Section::Rate => rate::measure(bench),
+        Section::Losses => losses::measure(bench),
+        Section::Sizes => sizes::measure(bench),
         Section::Texture => texture::measure(bench),
         Section::Printed => printed::measure(bench),
         Section::Quality => quality::measure(bench),

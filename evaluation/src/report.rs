@@ -17,12 +17,18 @@ of the decoded 8-bit RGB picture, unless stated otherwise.
 /// What can be measured on its own; the comments are the help of `--only`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Section {
+    /// One page of claims with their numbers, from what other sections have measured
+    Summary,
     /// The fit itself, without quantization: against GaussianImage and GaussianImage++
     Representation,
     /// What each part of the method contributes
     Ablation,
     /// Rate and distortion, against every baseline
     Rate,
+    /// Pictures and kinds of content where our files are larger, and why
+    Losses,
+    /// Small pictures enlarged, and thumbnails
+    Sizes,
     /// Figures that see texture, and the blind choice
     Texture,
     /// Our curve on Kodak beside curves and codecs that papers print
@@ -49,10 +55,13 @@ pub(crate) enum Section {
 
 impl Section {
     /// In the order of the report.
-    pub(crate) const ALL: [Self; 14] = [
+    pub(crate) const ALL: [Self; 17] = [
+        Self::Summary,
         Self::Representation,
         Self::Ablation,
         Self::Rate,
+        Self::Losses,
+        Self::Sizes,
         Self::Texture,
         Self::Printed,
         Self::Quality,
@@ -68,9 +77,12 @@ impl Section {
 
     fn title(self) -> &'static str {
         match self {
+            Self::Summary => "Summary",
             Self::Representation => "Representation",
             Self::Ablation => "Ablation",
             Self::Rate => "Rate and distortion",
+            Self::Losses => "Where we lose",
+            Self::Sizes => "At other sizes",
             Self::Texture => "Texture",
             Self::Printed => "Beside printed figures",
             Self::Quality => "Quality as asked for",

@@ -188,6 +188,8 @@ mod tests {
         let machine = "A \"quick\" one, 2 cores";
         assert_eq!(get(&mut open(&path, machine), "1", "a", 0.1), [0.1, f64::INFINITY]);
         let mut again = open(&path, machine);
+        assert_eq!(again.known("1", ["gip", "a"]), Some([0.1, f64::INFINITY]));
+        assert_eq!(again.known("1", ["gip", "b"]), None);
         assert_eq!(get(&mut again, "1", "a", 9.0), [0.1, f64::INFINITY]);
         assert_eq!(get(&mut again, "1", "b", 9.0), [9.0, f64::INFINITY]);
         assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 3);

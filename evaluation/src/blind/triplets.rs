@@ -62,7 +62,7 @@ pub(crate) fn make(args: &Args) -> Result<()> {
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
 
     let mut triplets = plan(&pictures, &contents, args.count, args.seed)?;
-    let mut worker = Worker::start(&args.out)?;
+    let mut worker = Worker::start(&args.out, 0)?;
     for picture in &pictures {
         for rate in RATES {
             let all = triplets.iter_mut();

@@ -3,12 +3,13 @@
 use anyhow::Result;
 use image_gip::{Encoder, Target};
 
-use super::rate_store::{Point, RateStore};
+use super::rate_store::{Point, RateStore, Wanted};
 use crate::baselines::{Baseline, Worker};
-use crate::curve::Curve;
+use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::metric::Metric;
 use crate::pictures::TestPicture;
+use crate::provenance;
 use crate::table::mean;
 
 /// A way to run our encoder that gets curves of its own.
@@ -16,20 +17,19 @@ use crate::table::mean;
 pub(super) struct Variant {
     pub(super) name: &'static str,
     pub(super) encoder: fn(u8) -> Encoder,
-    /// What it is asked for.
+    /// What it is asked for, from small files to large ones.
     pub(super) targets: &'static [Target],
 }
 
-/// Rates to ask an encoder for.
+/// Rates to ask an encoder for: two or three in each of the ranges that are compared.
 const RATES: &[Target] = &[
     Target::BitsPerPixel(0.1),
-    Target::BitsPerPixel(0.15),
-    Target::BitsPerPixel(0.25),
-    Target::BitsPerPixel(0.35),
-    Target::BitsPerPixel(0.5),
-    Target::BitsPerPixel(0.75),
+    Target::BitsPerPixel(0.2),
+    Target::BitsPerPixel(0.4),
+    Target::BitsPerPixel(0.7),
     Target::BitsPerPixel(1.0),
     Target::BitsPerPixel(1.5),
+    Target::BitsPerPixel(2.0),
 ];
 
 /// Our encoder as it is by default, and then other ways to run it.
@@ -39,8 +39,30 @@ pub(super) const OURS: [Variant; 3] = [
     Variant { name: gip::PSNR_NAME, encoder: gip::psnr_encoder, targets: RATES },
 ];
 
-/// A quick run takes one in so many settings, and the last.
-const QUICK_STEP: usize = 3;
+/// All rates: curves are measured to their end.
+pub(super) const EVERYWHERE: (f64, f64) = (0.0, f64::INFINITY);
+
+/// Which of the settings are measured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// One in so many, and the last.
+    pub(super) step: usize,
+    /// The first file of at least so many bits per pixel is the last of its picture.
+    pub(super) until: f64,
+}
+
+impl Extent {
+    /// All settings, or those of a quick run.
+    pub(super) fn new(quick: bool) -> Self {
+        Self { step: if quick { 3 } else { 1 }, until: EVERYWHERE.1 }
+    }
+
+    fn chosen<T: Clone>(self, settings: &[T]) -> Vec<T> {
+        let last = settings.len() - 1;
+        let index = (0..=last).filter(|&index| index % self.step == 0 || index == last);
+        index.map(|index| settings[index].clone()).collect()
+    }
+}
 
 impl Variant {
     /// What the encoder is asked for, in the words of the stored measurements.
@@ -60,21 +82,16 @@ pub(super) fn setting(target: Target) -> String {
     format!("{target}, effort {}", gip::EFFORT)
 }
 
-/// All of some settings, or those of a quick run.
-fn chosen<T: Clone>(settings: &[T], quick: bool) -> Vec<T> {
-    let (step, last) = (if quick { QUICK_STEP } else { 1 }, settings.len() - 1);
-    let index = (0..=last).filter(|&index| index % step == 0 || index == last);
-    index.map(|index| settings[index].clone()).collect()
-}
-
 /// A codec with the measurements of all its files.
 #[derive(Debug)]
 pub(super) struct Codec {
     pub(super) id: &'static str,
     pub(super) name: &'static str,
     pub(super) settings: Vec<String>,
-    /// For each picture, a point for each setting.
+    /// For each picture, a point for each setting, or for the first of them.
     pub(super) points: Vec<Vec<Point>>,
+    /// The same with other tunings, of which the best counts.
+    retuned: Vec<Vec<Vec<Point>>>,
 }
 
 impl Codec {
@@ -84,59 +101,140 @@ impl Codec {
         version: &str,
         variant: &Variant,
         pictures: &[TestPicture],
-        quick: bool,
+        extent: Extent,
     ) -> Result<Self> {
-        let targets = chosen(variant.targets, quick);
-        let settings = chosen(&variant.settings(), quick);
-        let points = points(pictures, targets.len(), |picture, index| {
+        let targets = extent.chosen(variant.targets);
+        let settings = extent.chosen(&variant.settings());
+        let (codec, until) = (variant.name, extent.until);
+        let wanted = Wanted { version, codec, settings: &settings, pictures, until };
+        let mut threads = vec![(); provenance::cores()];
+        let points = store.all(&wanted, &mut threads, |(), index, picture| {
             let encoder = (variant.encoder)(gip::EFFORT).with_target(targets[index]);
-            store.ours(version, variant.name, &settings[index], encoder, picture)
+            Point::of_ours(encoder, picture)
         })?;
-        Ok(Self { id: variant.name, name: variant.name, settings, points })
+        Ok(Self { id: codec, name: codec, settings, points, retuned: Vec::new() })
     }
 
-    /// A baseline at its settings.
+    /// A baseline at its settings. Others of the same settings may be tunings of it: then each
+    /// picture has the one that is best by the metric in question.
     pub(super) fn baseline(
         store: &mut RateStore,
-        worker: &mut Worker,
+        workers: &mut [Worker],
         versions: &str,
-        baseline: &Baseline,
+        (baseline, tunings): (&Baseline, &[Baseline]),
         pictures: &[TestPicture],
-        quick: bool,
+        extent: Extent,
     ) -> Result<Self> {
-        let settings = chosen(baseline.settings, quick);
-        let points = points(pictures, settings.len(), |picture, index| {
-            store.baseline(worker, versions, baseline, settings[index], picture)
-        })?;
-        let settings = settings.into_iter().map(str::to_owned).collect();
-        Ok(Self { id: baseline.id, name: baseline.name, settings, points })
+        let settings = extent.chosen(baseline.settings);
+        let settings: Vec<String> = settings.into_iter().map(str::to_owned).collect();
+        let mut points = |baseline: &Baseline| {
+            let wanted = Wanted {
+                version: versions,
+                codec: baseline.id,
+                settings: &settings,
+                pictures,
+                until: extent.until,
+            };
+            store.all(&wanted, workers, |worker, index, picture| {
+                Point::of_baseline(worker, baseline, &settings[index], picture)
+            })
+        };
+        let first = points(baseline)?;
+        let retuned = tunings.iter().map(points).collect::<Result<_>>()?;
+        let Baseline { id, name, .. } = *baseline;
+        Ok(Self { id, name, settings, points: first, retuned })
+    }
+
+    /// The points of a picture with the tuning that is best by a metric.
+    fn best_points(&self, picture: usize, metric: Metric) -> &[Point] {
+        let mut best = &self.points[picture];
+        for tuning in &self.retuned {
+            let curves = (curve(best, metric), curve(&tuning[picture], metric));
+            if bd_rate(&curves.0, &curves.1, EVERYWHERE).is_some_and(|share| share < 0.0) {
+                best = &tuning[picture];
+            }
+        }
+        best
     }
 
     pub(super) fn curve(&self, picture: usize, metric: Metric) -> Curve {
-        let points = self.points[picture].iter();
-        Curve::new(points.map(|point| (point.rate, metric.level(&point.distortion))))
+        curve(self.best_points(picture, metric), metric)
     }
 
     pub(super) fn curves(&self, metric: Metric) -> Vec<Curve> {
         (0..self.points.len()).map(|picture| self.curve(picture, metric)).collect()
     }
 
-    /// Mean rate against mean quality at every setting.
+    /// Mean rate against mean quality at every setting that all pictures have.
     pub(super) fn mean_curve(&self, metric: Metric) -> Curve {
-        let at = |setting: usize| self.points.iter().map(move |points| &points[setting]);
-        Curve::new((0..self.settings.len()).filter_map(|setting| {
+        let all = 0..self.points.len();
+        let all: Vec<&[Point]> = all.map(|picture| self.best_points(picture, metric)).collect();
+        let common = all.iter().map(|points| points.len()).min().unwrap_or(0);
+        let at = |setting: usize| all.iter().map(move |points| &points[setting]);
+        Curve::new((0..common).filter_map(|setting| {
             let rate = mean(at(setting).map(|point| point.rate))?;
             Some((rate, metric.mean(at(setting).map(|point| metric.level(&point.distortion)))?))
         }))
     }
 }
 
-/// For each picture, a point for each of so many settings.
-fn points(
-    pictures: &[TestPicture],
-    settings: usize,
-    mut point: impl FnMut(&TestPicture, usize) -> Result<Point>,
-) -> Result<Vec<Vec<Point>>> {
-    let all = pictures.iter();
-    all.map(|picture| (0..settings).map(|setting| point(picture, setting)).collect()).collect()
+fn curve(points: &[Point], metric: Metric) -> Curve {
+    Curve::new(points.iter().map(|point| (point.rate, metric.level(&point.distortion))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pictures::Distortion;
+
+    /// Points of this PSNR and SSIMULACRA2 at 0.5 and 1 bits per pixel.
+    fn points(psnr: [f64; 2], ssimulacra2: [f64; 2]) -> Vec<Point> {
+        let point = |index: usize| Point {
+            bytes: 1.0,
+            rate: [0.5, 1.0][index],
+            distortion: Distortion::from([psnr[index], 0.9, ssimulacra2[index], 1.0, 8.0]),
+        };
+        vec![point(0), point(1)]
+    }
+
+    #[test]
+    fn each_picture_has_the_tuning_that_is_best_by_the_metric() {
+        let codec = Codec {
+            id: "a",
+            name: "a",
+            settings: vec!["1".into(), "2".into()],
+            points: vec![points([30.0, 35.0], [50.0, 60.0]), points([20.0, 25.0], [40.0, 60.0])],
+            retuned: vec![vec![
+                points([29.0, 34.0], [55.0, 65.0]),
+                points([22.0, 26.0], [30.0, 50.0]),
+            ]],
+        };
+        let at = |picture: usize, metric| codec.curve(picture, metric).quality(0.5);
+        assert_eq!([0, 1].map(|picture| at(picture, Metric::Psnr)), [Some(30.0), Some(22.0)]);
+        let scores = [0, 1].map(|picture| at(picture, Metric::Ssimulacra2));
+        assert_eq!(scores, [Some(55.0), Some(40.0)]);
+        assert_eq!(codec.mean_curve(Metric::Psnr).quality(0.5), Some(26.0));
+    }
+
+    #[test]
+    fn the_mean_ends_where_the_first_picture_does() {
+        let all = points([30.0, 35.0], [50.0, 60.0]);
+        let codec = Codec {
+            id: "a",
+            name: "a",
+            settings: vec!["1".into(), "2".into()],
+            points: vec![all.clone(), all[..1].to_vec()],
+            retuned: Vec::new(),
+        };
+        let mean: Vec<(f64, f64)> = codec.mean_curve(Metric::Psnr).points().collect();
+        assert_eq!(mean, [(0.5, 30.0)]);
+    }
+
+    #[test]
+    fn a_step_leaves_settings_out_but_not_the_last() {
+        let chosen = |step| Extent { step, until: 2.0 }.chosen(&[0, 1, 2, 3, 4, 5]);
+        assert_eq!(chosen(1), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(chosen(2), [0, 2, 4, 5]);
+        assert_eq!(chosen(3), [0, 3, 5]);
+    }
 }

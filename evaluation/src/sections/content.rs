@@ -15,7 +15,7 @@ const SIDE: u32 = 256;
 const PHOTOS: usize = 8;
 const QUICK_PHOTOS: usize = 2;
 /// Standard deviations, in 8-bit steps, of the noise on a photograph and on plain gray.
-const GRAIN: f64 = 8.0;
+pub(super) const GRAIN: f64 = 8.0;
 const NOISE: f64 = 20.0;
 /// The target in dB for all pictures. A file without Gaussians has 22 dB on noise of [`NOISE`].
 const PSNR: f64 = 26.0;
@@ -179,7 +179,7 @@ fn means<const N: usize>(all: &[[f64; N]]) -> [f64; N] {
 }
 
 /// The middle of a photograph; a smaller one is continued in mirror images.
-fn middle(photo: &TestPicture) -> TestPicture {
+pub(super) fn middle(photo: &TestPicture) -> TestPicture {
     let (left, top) = (photo.width.saturating_sub(SIDE) / 2, photo.height.saturating_sub(SIDE) / 2);
     let mut part = photo.mirrored(photo.width.max(SIDE), photo.height.max(SIDE));
     let row = part.width as usize * 3;
@@ -216,7 +216,7 @@ fn discs(x: u32, y: u32) -> [u8; 3] {
 }
 
 /// The picture with Gaussian noise of a standard deviation on every sample.
-fn noisy(picture: &TestPicture, deviation: f64) -> TestPicture {
+pub(super) fn noisy(picture: &TestPicture, deviation: f64) -> TestPicture {
     let mut random = fastrand::Rng::with_seed(gip::SEED);
     let rgb = picture.rgb.iter().map(|&sample| {
         let radius = (-2.0 * (1.0 - random.f64()).ln()).sqrt();

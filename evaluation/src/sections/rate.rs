@@ -1,263 +1,199 @@
 //! Rate and distortion: curves, tables at equal rates, and mean differences in rate.
 
-use anyhow::Result;
+use std::fs::File;
+
+use anyhow::{Context, Result};
 
 use super::codec_curves::{Codec, OURS};
+use super::comparisons::{Comparison, compare};
+use super::ranges::{Outcome, RANGES, bd_rates, short};
 use super::rate_store::RateStore;
 use super::reference;
-use crate::baselines::{BASELINES, BEST_AVIF, Baseline, DESCRIPTION};
+use crate::baselines::{BEST_AVIF, DESCRIPTION, RIVALS_DESCRIPTION};
 use crate::bench::Bench;
-use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
-use crate::curve::bd_rate;
+use crate::comparison::list_or_none;
+use crate::curve::Curve;
+use crate::gip;
 use crate::metric::Metric;
-use crate::pictures::PictureSet;
 use crate::plot::{Corner, Plot, Scale, Series};
-use crate::table::{Table, mean, percent};
+use crate::table::{Table, percent};
 
 /// Rates that the tables show, in bits per pixel.
-const TABLE_RATES: [f64; 6] = [0.15, 0.25, 0.35, 0.5, 0.75, 1.0];
-/// The range of rates for BD-rates and plots.
-const BD_RANGE: (f64, f64) = (0.15, 1.5);
-
-/// The pictures on which we are compared with the best that AVIF can do: half of them hard for us.
-const HARD_PICTURES: [&str; 6] =
-    ["kodim04", "kodim05", "kodim08", "kodim13", "city-lossless", "girl-lossless"];
-
-/// Codecs on one set of pictures.
-struct Comparison {
-    set: PictureSet,
-    /// [`OURS`].
-    ours: Vec<Codec>,
-    baselines: Vec<Codec>,
-}
-
-impl Comparison {
-    /// Our default first.
-    fn codecs(&self) -> Vec<&Codec> {
-        self.ours.iter().chain(&self.baselines).collect()
-    }
-}
+const TABLE_RATES: [f64; 5] = [0.15, 0.25, 0.5, 1.0, 1.5];
+/// Rates that the plots show.
+pub(super) const PLOT_RATES: [f64; 11] =
+    [0.1, 0.125, 0.15, 0.2, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 1.9];
+/// Codecs in the plots.
+pub(super) const PLOTTED: [&str; 8] = [
+    gip::NAME,
+    BEST_AVIF[0].name,
+    "AVIF",
+    "JPEG XL effort 9",
+    "HEIC",
+    "WebP",
+    "jpegli",
+    "JPEG 2000",
+];
+/// Codecs in the short table.
+const FOREMOST: [&str; 5] = [BEST_AVIF[0].name, "AVIF", "JPEG XL", "HEIC", "WebP"];
+/// How many pictures are named at either end.
+const ENDS: usize = 5;
+/// Every BD-rate of every picture.
+const BY_PICTURE: &str = "rate-pictures.csv";
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let mut store = RateStore::open(bench)?;
-    let comparisons = compare(bench, &mut store, bench.sets(), &BASELINES.each_ref())?;
+    let comparisons = compare(bench, &mut store)?;
     let mut text = introduction();
     if let Some(path) = &bench.reference {
         let kodak = &comparisons[0];
-        text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.baselines)?);
+        text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.others)?);
     }
-    text.push_str(&format!("\n### In short\n{}", summary(&comparisons)));
-    if let Some(set) = hard_pictures(bench) {
-        let mut baselines: Vec<_> =
-            BASELINES.iter().filter(|baseline| baseline.name.starts_with("AVIF")).collect();
-        baselines.push(&BEST_AVIF);
-        let comparisons = compare(bench, &mut store, vec![set], &baselines)?;
-        text.push_str(&against_best_avif(&comparisons));
-    }
+    text.push_str(&format!("\n### In short\n{}", in_short(&comparisons)));
     for comparison in &comparisons {
+        text.push_str(&format!("\n### Best and worst pictures: {}\n", comparison.set.name));
+        text.push_str(&ends(comparison));
         for metric in Metric::ALL {
             text.push_str(&details(bench, comparison, metric)?);
         }
     }
+    write_by_picture(bench, &comparisons)?;
     Ok(text)
 }
 
-/// Those of [`HARD_PICTURES`] that are there. A quick run has no time for them.
-fn hard_pictures(bench: &Bench) -> Option<PictureSet> {
-    let all = bench.sets().into_iter().flat_map(|set| set.pictures);
-    let hard = all.filter(|picture| HARD_PICTURES.contains(&picture.name.as_str()));
-    let set = PictureSet { name: "hard pictures", pictures: hard.collect() };
-    (!bench.quick && !set.pictures.is_empty()).then_some(set)
-}
-
 fn introduction() -> String {
-    let ours = OURS.each_ref().map(|variant| variant.name);
     format!(
-        "Compared with: {DESCRIPTION} Ours ({}) is asked for: {}. SSIMULACRA2 is 100 for equal pictures; 90 \
+        "Compared with: {DESCRIPTION} {RIVALS_DESCRIPTION} Ours ({}) is asked for: {}. SSIMULACRA2 is 100 for equal pictures; 90 \
          is hard to tell from the source, 70 is high quality, 50 medium, 30 low. Butteraugli is \
          its 3-norm at 80 nits: lower is better. Both equal what the tools of libjxl 0.11 print. \
          CVVDP is ColorVideoVDP for a monitor of 24 inches at 60 cm (standard_fhd), in JOD: 10 for \
          equal pictures; of two that are 1 apart, three in four people choose the one with more. \
-         BD-rate is from {} to {} bits per pixel: how much larger (+) or smaller (-) our files are \
-         at equal quality.\n",
-        ours.join(", "),
+         BD-rate is how much larger (+) or smaller (-) our files are at equal quality, as a mean over the \
+         qualities that both reach within a range of rates: {}. A picture is won if our files are smaller. \
+         {BY_PICTURE} has every picture's.\n",
+        OURS.each_ref().map(|variant| variant.name).join(", "),
         OURS[0].settings().join("; "),
-        BD_RANGE.0,
-        BD_RANGE.1,
+        RANGES.each_ref().map(|range| range.title()).join("; "),
     )
 }
 
-/// Ours and some baselines measured on sets. What matters most comes first, so that a run that is
-/// interrupted has it: our default and the baselines on all sets.
-fn compare(
-    bench: &mut Bench,
-    store: &mut RateStore,
-    sets: Vec<PictureSet>,
-    baselines: &[&Baseline],
-) -> Result<Vec<Comparison>> {
-    let (quick, product) = (bench.quick, bench.product.clone());
-    let (worker, versions) = bench.baselines()?;
-    let [default, variants @ ..] = OURS;
-    let mut comparisons = Vec::new();
-    for set in sets {
-        let ours = vec![Codec::ours(store, &product, &default, &set.pictures, quick)?];
-        let baselines = baselines.iter().map(|baseline| {
-            Codec::baseline(store, worker, &versions, baseline, &set.pictures, quick)
-        });
-        let baselines = baselines.collect::<Result<_>>()?;
-        comparisons.push(Comparison { set, ours, baselines });
-    }
-    for Comparison { set, ours, .. } in &mut comparisons {
-        for variant in &variants {
-            ours.push(Codec::ours(store, &product, variant, &set.pictures, quick)?);
-        }
-    }
-    Ok(comparisons)
-}
-
-/// For each picture the BD-rate of one codec against another; `None` where they have no quality in
-/// common.
-fn bd_rates(test: &Codec, anchor: &Codec, metric: Metric) -> Vec<Option<f64>> {
-    let curves = anchor.curves(metric).into_iter().zip(test.curves(metric));
-    curves.map(|(anchor, test)| bd_rate(&anchor, &test, BD_RANGE)).collect()
-}
-
-/// Mean BD-rates of each of ours: a row for each metric and set, a column for each baseline. All
-/// sets have the same codecs.
-fn summary(comparisons: &[Comparison]) -> String {
-    let mut text = String::from("\nMean BD-rate over the pictures:\n");
-    for (index, ours) in OURS.iter().enumerate() {
-        let mut columns = vec![ours.name.to_owned()];
-        columns.extend(
-            comparisons[0].baselines.iter().map(|baseline| format!("against {}", baseline.name)),
-        );
-        let mut table = Table::new(&columns);
-        for metric in Metric::ALL {
-            for Comparison { set, ours, baselines } in comparisons {
-                let mut cells = vec![format!("{}, {}", metric.name(), set.name)];
-                cells.extend(baselines.iter().map(|other| {
-                    percent(mean(bd_rates(&ours[index], other, metric).into_iter().flatten()))
-                }));
-                table.row(&cells);
-            }
-        }
-        text.push_str(&table.finish());
-    }
-    text
-}
-
-fn against_best_avif(comparisons: &[Comparison]) -> String {
-    let pictures = comparisons[0].set.pictures.iter().map(|picture| picture.name.as_str());
-    let mut text = format!(
-        "\n### The best that AVIF can do\n\nSpeed 0 takes up to half a minute for a picture, so it \
-         is measured on a few, of which half are hard for us: {}.\n{}",
-        pictures.collect::<Vec<_>>().join(", "),
-        summary(comparisons),
-    );
+/// Mean BD-rates of ours against the foremost of the others at low, middle and high rates.
+fn in_short(comparisons: &[Comparison]) -> String {
+    let mut columns = vec![format!("{}: low / middle / high rates", gip::NAME)];
+    columns.extend(FOREMOST.map(|name| format!("against {name}")));
+    let mut table = Table::new(&columns);
     for metric in Metric::ALL {
-        text.push_str(&bd_rate_table(&comparisons[0], metric));
+        for comparison in comparisons {
+            let mut cells = vec![format!("{}, {}", metric.name(), comparison.set.name)];
+            for name in FOREMOST {
+                let means = RANGES.map(|range| {
+                    let other = comparison.other(name)?;
+                    Outcome::of(&bd_rates(&comparison.ours, other, metric, range)).mean
+                });
+                cells.push(means.map(percent).join(" / "));
+            }
+            table.row(&cells);
+        }
     }
-    text
+    format!("\nMean BD-rate over the pictures:\n{}", table.finish())
 }
 
-/// The plot and the tables of one metric on one set.
+/// The pictures of a set that are worst and best for us, by metric and range.
+fn ends(comparison: &Comparison) -> String {
+    let anchor = comparison.best_avif();
+    let mut table = Table::new(&["metric, rates", "worst for gip", "best for gip"]);
+    for metric in Metric::ALL {
+        for range in RANGES {
+            let rates = bd_rates(&comparison.ours, anchor, metric, range);
+            let names = comparison.set.pictures.iter().map(|picture| short(&picture.name));
+            let mut known: Vec<(&str, f64)> =
+                names.zip(rates).filter_map(|(name, rate)| Some((name, rate?))).collect();
+            known.sort_by(|a, b| b.1.total_cmp(&a.1));
+            // No picture is at both ends.
+            let worst = known.len().div_ceil(2).min(ENDS);
+            let best = (known.len() - worst).min(ENDS);
+            let list = |of: &[(&str, f64)]| {
+                let each = of.iter().map(|(name, rate)| format!("{name} {}", percent(Some(*rate))));
+                each.collect::<Vec<_>>().join(", ")
+            };
+            table.row(&[
+                format!("{}, {}", metric.name(), range.name),
+                list(&known[..worst]),
+                list(&known.iter().rev().take(best).copied().collect::<Vec<_>>()),
+            ]);
+        }
+    }
+    format!("\nBD-rate of {} against {}:\n{}", gip::NAME, anchor.name, table.finish())
+}
+
+/// The plot and the table of one metric on one set.
 fn details(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String> {
     Ok(format!(
-        "\n### {}, {}\n\n![{0} over rate, {1}]({})\n{}{}",
+        "\n### {}, {}\n\n![{0} over rate, {1}]({})\n{}",
         metric.name(),
         comparison.set.name,
         plot(bench, comparison, metric)?,
-        at_equal_rates(&comparison.codecs(), metric),
-        bd_rate_table(comparison, metric),
+        table(comparison, metric),
     ))
 }
 
-/// A table with one row per codec and one column per rate, followed by the codecs that are better
-/// than ours and at which rates.
-fn at_equal_rates(codecs: &[&Codec], metric: Metric) -> String {
-    let names = TABLE_RATES.map(|rate| format!("{rate} bpp"));
-    let mut columns = vec![metric.with_unit().to_owned()];
-    columns.extend(names.clone());
-    let mut table = Table::new(&columns);
-    let mut compared: Vec<NamedFigures> = Vec::new();
-    for codec in codecs {
-        let curves = codec.curves(metric);
-        let (mut cells, mut levels) = (vec![codec.name.to_owned()], Vec::new());
-        for rate in TABLE_RATES {
-            let reached: Vec<f64> = curves.iter().filter_map(|curve| curve.quality(rate)).collect();
-            let all = reached.len() == curves.len();
-            let level = metric.mean(reached.iter().copied()).filter(|_| all);
-            let missing = || format!("({}/{} reach)", reached.len(), curves.len());
-            cells.push(level.map_or_else(missing, |level| metric.cell(level)));
-            levels.push(level.unwrap_or(f64::NAN));
-        }
-        table.row(&cells);
-        compared.push((codec.name.to_owned(), levels));
-    }
-    let figures = names.each_ref().map(|name| (name.as_str(), Better::Higher));
-    format!(
-        "\nMean over the pictures at equal rates: the curve of each picture is interpolated at \
-         exactly this rate. There is no mean where the curves of some pictures do not reach the \
-         rate.\n{}{}",
-        table.finish(),
-        better_than(&figures, &compared[0], &compared[1..])
-    )
+/// The mean level of a codec at a rate, or else how many pictures reach it.
+fn mean_at(curves: &[Curve], rate: f64, metric: Metric) -> Result<f64, usize> {
+    let reached: Vec<f64> = curves.iter().filter_map(|curve| curve.quality(rate)).collect();
+    let all = reached.len() == curves.len();
+    metric.mean(reached.iter().copied()).filter(|_| all).ok_or(reached.len())
 }
 
-/// BD-rates of ours against all others, for each picture and on average.
-fn bd_rate_table(comparison: &Comparison, metric: Metric) -> String {
-    let codecs = comparison.codecs();
-    let (ours, others) = (codecs[0], &codecs[1..]);
-    let mut columns = vec!["picture"];
-    columns.extend(others.iter().map(|codec| codec.name));
+/// Means over the pictures at exact rates, by interpolation of each picture's curve, as far as all
+/// pictures reach.
+pub(super) fn mean_levels(codec: &Codec, metric: Metric) -> Vec<(f64, f64)> {
+    let curves = codec.curves(metric);
+    let at = |&rate: &f64| Some((rate, mean_at(&curves, rate, metric).ok()?));
+    PLOT_RATES.iter().filter_map(at).collect()
+}
+
+/// Means at equal rates and BD-rates by range, a row for each codec.
+fn table(comparison: &Comparison, metric: Metric) -> String {
+    let mut columns = vec![metric.with_unit().to_owned()];
+    columns.extend(TABLE_RATES.map(|rate| format!("{rate} bpp")));
+    columns.extend(RANGES.map(|range| format!("BD-rate of {}, {}", gip::NAME, range.title())));
     let mut table = Table::new(&columns);
-    let all: Vec<_> = others.iter().map(|other| bd_rates(ours, other, metric)).collect();
-    for (index, picture) in comparison.set.pictures.iter().enumerate() {
-        let mut cells = vec![picture.name.clone()];
-        cells.extend(all.iter().map(|rates| percent(rates[index])));
+    let mut ahead = RANGES.map(|_| Vec::new());
+    for codec in comparison.codecs() {
+        let (curves, mut cells) = (codec.curves(metric), vec![codec.name.to_owned()]);
+        cells.extend(TABLE_RATES.map(|rate| match mean_at(&curves, rate, metric) {
+            Ok(level) => metric.cell(level),
+            Err(reached) => format!("({reached}/{} reach)", curves.len()),
+        }));
+        for (range, ahead) in RANGES.into_iter().zip(&mut ahead) {
+            if codec.id == comparison.ours.id {
+                cells.push(String::new());
+                continue;
+            }
+            let outcome = Outcome::of(&bd_rates(&comparison.ours, codec, metric, range));
+            if outcome.mean.is_some_and(|mean| mean > 0.0) {
+                ahead.push(codec.name);
+            }
+            cells.push(outcome.cell(&comparison.set.pictures));
+        }
         table.row(&cells);
     }
-    let means: Vec<_> = all.iter().map(|rates| mean(rates.iter().copied().flatten())).collect();
-    let mut cells = vec!["**mean**".to_owned()];
-    cells.extend(means.iter().map(|&mean| percent(mean)));
-    table.row(&cells);
-    let mut cells = vec!["**of the mean curves**".to_owned()];
-    cells.extend(others.iter().map(|other| {
-        percent(bd_rate(&other.mean_curve(metric), &ours.mean_curve(metric), BD_RANGE))
-    }));
-    table.row(&cells);
-
-    let named = |worse: bool| {
-        let means = others.iter().zip(&means);
-        let of_kind = means.filter(move |(_, mean)| mean.is_some_and(|m| (m > 0.0) == worse));
-        list_or_none(of_kind.map(|(codec, _)| codec.name))
-    };
+    let ahead = RANGES.iter().zip(&ahead).map(|(range, names)| {
+        format!("at {} rates: {}", range.name, list_or_none(names.iter().copied()))
+    });
     format!(
-        "\nBD-rate of {} at equal {}:\n{}\nIt is worse than: {}. It is better than: {}.\n",
-        ours.name,
-        metric.name(),
+        "\nMean over the pictures at exactly these rates, by interpolation of each picture's curve, and \
+         BD-rate: mean; pictures won; the worst picture.\n{}\nSmaller files than {} {}.\n",
         table.finish(),
-        named(true),
-        named(false),
+        gip::NAME,
+        ahead.collect::<Vec<_>>().join("; "),
     )
 }
 
 fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String> {
     let set = &comparison.set;
     let name = format!("rate-{}-{}.svg", set.name, metric.name()).to_lowercase();
-    let series: Vec<Series> = comparison
-        .codecs()
-        .into_iter()
-        .map(|codec| Series {
-            name: codec.name.to_owned(),
-            points: codec
-                .mean_curve(metric)
-                .points()
-                .filter(|(rate, _)| (BD_RANGE.0 * 0.8..=BD_RANGE.1 * 1.2).contains(rate))
-                .map(|(rate, level)| (rate, metric.shown(level)))
-                .collect(),
-        })
-        .collect();
+    let series = series(comparison, metric);
     let plot = Plot {
         title: &format!(
             "{}, mean over {} pictures: {}",
@@ -265,10 +201,54 @@ fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String
             set.pictures.len(),
             set.name
         ),
-        x: ("bits per pixel", Scale::Linear),
+        x: ("bits per pixel", Scale::Logarithmic),
         y: (metric.with_unit(), Scale::Linear),
         legend: if metric.lower_is_better() { Corner::UpperRight } else { Corner::LowerRight },
     };
     plot.write(&bench.path(&name), &series)?;
     Ok(name)
+}
+
+/// The mean curves of the codecs that plots show.
+pub(super) fn series(comparison: &Comparison, metric: Metric) -> Vec<Series> {
+    let plotted = comparison.codecs().filter(|codec| PLOTTED.contains(&codec.name));
+    let series = plotted.map(|codec| Series {
+        name: codec.name.to_owned(),
+        points: mean_levels(codec, metric)
+            .into_iter()
+            .map(|(rate, level)| (rate, metric.shown(level)))
+            .collect(),
+    });
+    series.collect()
+}
+
+/// Writes the BD-rates of each picture, in a CSV with a column for each other codec: those of the
+/// first set, which has them all.
+fn write_by_picture(bench: &Bench, comparisons: &[Comparison]) -> Result<()> {
+    let path = bench.path(BY_PICTURE);
+    let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    let mut csv = csv::Writer::from_writer(file);
+    let others: Vec<&str> = comparisons[0].others.iter().map(|codec| codec.name).collect();
+    csv.write_record(["set", "picture", "metric", "rates"].iter().chain(&others))?;
+    for comparison in comparisons {
+        for metric in Metric::ALL {
+            for range in RANGES {
+                let all = others.iter().map(|name| {
+                    let other = comparison.other(name)?;
+                    Some(bd_rates(&comparison.ours, other, metric, range))
+                });
+                let all: Vec<Option<Vec<Option<f64>>>> = all.collect();
+                for (index, picture) in comparison.set.pictures.iter().enumerate() {
+                    let key = [comparison.set.name, &picture.name, metric.name(), range.name];
+                    let rates = all.iter().map(|rates| {
+                        let rate = rates.as_ref().and_then(|rates| rates[index]);
+                        rate.map_or_else(String::new, |rate| format!("{rate:.3}"))
+                    });
+                    csv.write_record(key.into_iter().map(str::to_owned).chain(rates))?;
+                }
+            }
+        }
+    }
+    csv.flush()?;
+    Ok(())
 }

@@ -1,11 +1,14 @@
 //! Measurements of whole files, by every codec at every setting: `rate.csv`.
 
-use anyhow::Result;
+use std::cmp::Reverse;
+
+use anyhow::{Context, Result};
 use image_gip::{Encoder, Threads};
 
 use crate::baselines::{Baseline, Worker};
 use crate::bench::Bench;
 use crate::gip;
+use crate::parallel;
 use crate::pictures::{Distortion, TestPicture};
 use crate::store::Store;
 
@@ -16,6 +19,54 @@ pub(super) struct Point {
     /// In bits per pixel.
     pub(super) rate: f64,
     pub(super) distortion: Distortion,
+}
+
+impl Point {
+    fn of(picture: &TestPicture, bytes: f64, decoded: &[u8]) -> Result<Self> {
+        Ok(Self { bytes, rate: picture.rate(bytes), distortion: picture.distortion(decoded)? })
+    }
+
+    /// Of our file, with one thread: the file is the same with any number of threads.
+    pub(super) fn of_ours(encoder: Encoder, picture: &TestPicture) -> Result<Self> {
+        let file = gip::file(encoder, picture, Threads::One)?.bytes;
+        Self::of(picture, file.len() as f64, &gip::decode(&file, Threads::One)?)
+    }
+
+    pub(super) fn of_baseline(
+        worker: &mut Worker,
+        baseline: &Baseline,
+        setting: &str,
+        picture: &TestPicture,
+    ) -> Result<Self> {
+        let trip = worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?;
+        Self::of(picture, trip.bytes, &trip.decoded)
+    }
+
+    /// In the order of the columns.
+    fn values(&self) -> [f64; 7] {
+        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = self.distortion.values();
+        [self.bytes, self.rate, psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp]
+    }
+}
+
+impl From<[f64; 7]> for Point {
+    fn from([bytes, rate, distortion @ ..]: [f64; 7]) -> Self {
+        Self { bytes, rate, distortion: Distortion::from(distortion) }
+    }
+}
+
+/// Files of one codec that are wanted.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted<'a> {
+    /// Of the codec.
+    pub(super) version: &'a str,
+    /// What tells this codec from all others.
+    pub(super) codec: &'a str,
+    /// From small files to large ones.
+    pub(super) settings: &'a [String],
+    pub(super) pictures: &'a [TestPicture],
+    /// A rate in bits per pixel: of each picture, the first file that reaches it is the last.
+    pub(super) until: f64,
 }
 
 /// The measurements of files that any section has needed so far.
@@ -37,10 +88,9 @@ impl RateStore {
         encoder: Encoder,
         picture: &TestPicture,
     ) -> Result<Point> {
-        self.point(version, [name, setting, &picture.name], || {
-            let measured = gip::encode(encoder, picture, Threads::Pool)?;
-            Ok((measured.bytes, picture.rate(measured.bytes), measured.distortion))
-        })
+        let key = [name, setting, &picture.name];
+        let values = self.0.get(version, key, || Ok(Point::of_ours(encoder, picture)?.values()))?;
+        Ok(values.into())
     }
 
     pub(super) fn baseline(
@@ -51,25 +101,136 @@ impl RateStore {
         setting: &str,
         picture: &TestPicture,
     ) -> Result<Point> {
-        self.point(versions, [baseline.id, setting, &picture.name], || {
-            let trip = worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?;
-            let distortion = picture.distortion(&trip.decoded)?;
-            Ok((trip.bytes, picture.rate(trip.bytes), distortion))
-        })
+        let key = [baseline.id, setting, &picture.name];
+        let values = self.0.get(versions, key, || {
+            Ok(Point::of_baseline(worker, baseline, setting, picture)?.values())
+        })?;
+        Ok(values.into())
     }
 
-    fn point(
+    /// For each picture the points of its files. What is missing is measured with one thread for
+    /// each worker, by `measure` of the index of a setting.
+    pub(super) fn all<W: Send>(
         &mut self,
-        version: &str,
-        key: [&str; 3],
-        measure: impl FnOnce() -> Result<(f64, f64, Distortion)>,
-    ) -> Result<Point> {
-        let values = self.0.get(version, key, || {
-            let (bytes, rate, distortion) = measure()?;
-            let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = distortion.values();
-            Ok([bytes, rate, psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp])
+        wanted: &Wanted<'_>,
+        workers: &mut [W],
+        measure: impl Fn(&mut W, usize, &TestPicture) -> Result<Point> + Sync,
+    ) -> Result<Vec<Vec<Point>>> {
+        let Wanted { version, codec, settings, pictures, until } = *wanted;
+        // With what is known already, and those first that have most to do.
+        let mut jobs: Vec<(&TestPicture, Vec<Option<Point>>)> = Vec::new();
+        for picture in pictures {
+            let known = settings.iter().map(|setting| self.known(version, codec, setting, picture));
+            jobs.push((picture, known.collect()));
+        }
+        jobs.sort_by_key(|(picture, _)| Reverse(picture.rgb.len()));
+        let work = |worker: &mut W,
+                    (picture, known): &(&TestPicture, Vec<Option<Point>>),
+                    emit: &mut dyn FnMut((String, String, Point))| {
+            for (index, setting) in settings.iter().enumerate() {
+                let point = match known[index] {
+                    Some(point) => point,
+                    None => {
+                        let key = || format!("{codec}, {setting}, {}", picture.name);
+                        let point = measure(worker, index, picture).with_context(key)?;
+                        emit((setting.clone(), picture.name.clone(), point));
+                        point
+                    }
+                };
+                if point.rate >= until {
+                    break;
+                }
+            }
+            Ok(())
+        };
+        let store = &mut self.0;
+        parallel::for_each(workers, &jobs, work, |(setting, picture, point)| {
+            store.get(version, [codec, &setting, &picture], || Ok(point.values())).map(|_| ())
         })?;
-        let [bytes, rate, distortion @ ..] = values;
-        Ok(Point { bytes, rate, distortion: Distortion::from(distortion) })
+        pictures
+            .iter()
+            .map(|picture| {
+                let mut points = Vec::new();
+                for setting in settings {
+                    let point = self.known(version, codec, setting, picture);
+                    let point = point.context("it was measured above")?;
+                    points.push(point);
+                    if point.rate >= until {
+                        break;
+                    }
+                }
+                Ok(points)
+            })
+            .collect()
+    }
+
+    fn known(
+        &self,
+        version: &str,
+        codec: &str,
+        setting: &str,
+        picture: &TestPicture,
+    ) -> Option<Point> {
+        self.0.known(version, [codec, setting, &picture.name]).map(Point::from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::store::Source;
+
+    fn picture(name: &str, side: u32) -> TestPicture {
+        let rgb = vec![7; 3 * (side * side) as usize];
+        TestPicture { name: name.into(), path: "".into(), width: side, height: side, rgb }
+    }
+
+    #[test]
+    fn files_are_measured_once_on_all_cores_until_the_rate_is_reached() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let open = || {
+            let (keys, values) = (["codec", "quality", "image"], Distortion::columns_of_file(&[]));
+            let path = folder.path().join("rate.csv");
+            let source = Source { machine: "here".into(), commit: "1".into() };
+            RateStore(Store::open(&path, &source, keys, values).expect("it opens"))
+        };
+        let pictures = [picture("a", 1), picture("b", 2)];
+        let settings = ["1", "2", "3"].map(str::to_owned);
+        let count = AtomicUsize::new(0);
+        let all = |store: &mut RateStore, until: f64| {
+            let wanted = Wanted {
+                version: "1",
+                codec: "c",
+                settings: &settings,
+                pictures: &pictures,
+                until,
+            };
+            let points = store.all(&wanted, &mut [(), ()], |(), index, picture| {
+                count.fetch_add(1, Ordering::Relaxed);
+                // A file of the larger picture has half as many bits per pixel.
+                let rate = (index + 1) as f64 / f64::from(picture.width);
+                Ok(Point { bytes: 1.0, rate, distortion: Distortion::from([rate; 5]) })
+            });
+            let points = points.expect("it measures");
+            let rates = |points: &Vec<Point>| points.iter().map(|point| point.rate).collect();
+            let rates: Vec<Vec<f64>> = points.iter().map(rates).collect();
+            (rates, count.swap(0, Ordering::Relaxed))
+        };
+        let until_one = vec![vec![1.0], vec![0.5, 1.0]];
+        assert_eq!(all(&mut open(), 1.0), (until_one.clone(), 3));
+        assert_eq!(all(&mut open(), 1.0), (until_one, 0));
+        let until_two = vec![vec![1.0, 2.0], vec![0.5, 1.0, 1.5]];
+        assert_eq!(all(&mut open(), 2.0), (until_two, 2));
+    }
+
+    #[test]
+    fn our_file_is_measured_as_it_is() {
+        let picture = picture("a", 16);
+        let point = Point::of_ours(gip::encoder(1), &picture).expect("a small picture");
+        assert_eq!(point.rate, point.bytes / 32.0);
+        assert!(point.distortion.psnr > 50.0);
+        assert_eq!(Point::from(point.values()).values(), point.values());
     }
 }

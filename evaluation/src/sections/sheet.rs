@@ -24,7 +24,7 @@ const OTHERS: [&str; 2] = ["AVIF", "WebP"];
 const SIDE: u32 = 160;
 const GAP: u32 = 4;
 /// The most bytes of a sheet of a set.
-const SHEET_BYTES: usize = 600_000;
+const SHEET_BYTES: usize = 450_000;
 /// Of the README's picture.
 const README_BYTES: usize = 600_000;
 /// Our files without their texture.
@@ -37,7 +37,7 @@ const TITLES: [&str; 3] = [
 ];
 /// How many of these kinds are in a sheet, so many crops of each. All are in the README's picture.
 const SHEET_KINDS: usize = 2;
-const SHEET_CROPS: usize = 9;
+const SHEET_CROPS: usize = 7;
 const README_CROPS: usize = 3;
 /// Where the pictures come from.
 const LICENCE: &str = "Photographs: Kodak (released by Eastman Kodak for unrestricted use); gb82 \
@@ -136,7 +136,7 @@ fn ours(bench: &Bench, picture: &TestPicture) -> Result<Vec<u8>> {
     let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
     bench.file(&name, || {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
-        Ok(gip::file(encoder, picture)?.bytes)
+        Ok(gip::file(encoder, picture, Threads::Pool)?.bytes)
     })
 }
 

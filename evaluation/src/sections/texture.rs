@@ -1,7 +1,7 @@
 //! Texture: what figures that see it say, beside those that compare pixel by pixel, and what people
 //! chose.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use image_gip::Encoder;
 
 use crate::bench::{Bench, timing_version};
@@ -11,6 +11,7 @@ use crate::contents::Contents;
 use crate::gip;
 use crate::local_statistics::{deviation_error, wasserstein_distortion};
 use crate::metric::Metric;
+use crate::parallel;
 use crate::pictures::{Distortion, PictureSet, TestPicture};
 use crate::store::Store;
 use crate::table::{Table, mean};
@@ -107,6 +108,20 @@ impl Figures {
             }),
         })
     }
+
+    /// In the order of the columns.
+    fn values(&self) -> [f64; 11] {
+        let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = self.distortion.values();
+        let ([gaussians, texture], Self { bytes, rate, tex, wd, .. }) = (self.texture, *self);
+        [bytes, rate, psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp, tex, wd, gaussians, texture]
+    }
+}
+
+impl From<[f64; 11]> for Figures {
+    fn from([bytes, rate, distortion @ .., tex, wd, gaussians, texture]: [f64; 11]) -> Self {
+        let (distortion, texture) = (Distortion::from(distortion), [gaussians, texture]);
+        Self { bytes, rate, distortion, tex, wd, texture }
+    }
 }
 
 /// `texture.csv`: figures of files by codec, rate asked for, and picture.
@@ -119,37 +134,56 @@ impl FigureStore {
         Ok(Self(bench.store("texture.csv", ["codec", "rate", "image"], values)?))
     }
 
-    fn get(
+    /// For each of some rates, the figures of each picture. What is missing is measured with one
+    /// thread for each worker, by `show` of the indices of rate and picture.
+    fn all<W: Send>(
         &mut self,
+        version: &str,
+        codec: &str,
+        set: &PictureSet,
+        rates: &[f64],
+        workers: &mut [W],
+        show: impl Fn(&mut W, usize, usize) -> Result<Version> + Sync,
+    ) -> Result<Vec<Vec<Figures>>> {
+        let pictures = &set.pictures;
+        let all = (0..rates.len()).flat_map(|rate| (0..pictures.len()).map(move |of| (rate, of)));
+        let is_missing = |&(rate, of): &(usize, usize)| {
+            self.known(version, codec, rates[rate], &pictures[of]).is_none()
+        };
+        let jobs: Vec<(usize, usize)> = all.filter(is_missing).collect();
+        let work = |worker: &mut W,
+                    &(rate, of): &(usize, usize),
+                    emit: &mut dyn FnMut((usize, usize, Figures))| {
+            let context = || format!("{codec}, {} bpp, {}", rates[rate], pictures[of].name);
+            let version = show(worker, rate, of).with_context(context)?;
+            emit((rate, of, Figures::of(&pictures[of], &version)?));
+            Ok(())
+        };
+        parallel::for_each(workers, &jobs, work, |(rate, of, figures)| {
+            let key = [codec, &key(rates[rate]), &pictures[of].name];
+            self.0.get(version, key, || Ok(figures.values())).map(|_| ())
+        })?;
+        let of_rate = |&rate: &f64| {
+            let figures = pictures.iter().map(|picture| self.known(version, codec, rate, picture));
+            figures.map(|figures| figures.context("it was measured above")).collect()
+        };
+        rates.iter().map(of_rate).collect()
+    }
+
+    fn known(
+        &self,
         version: &str,
         codec: &str,
         rate: f64,
         picture: &TestPicture,
-        show: impl FnOnce() -> Result<Version>,
-    ) -> Result<Figures> {
-        let values = self.0.get(version, [codec, &format!("{rate} bpp"), &picture.name], || {
-            let figures = Figures::of(picture, &show()?)?;
-            let Figures { bytes, rate, distortion, tex, wd, texture } = figures;
-            let [gaussians, texture] = texture;
-            let [psnr, ms_ssim, ssimulacra2, butteraugli, cvvdp] = distortion.values();
-            Ok([
-                bytes,
-                rate,
-                psnr,
-                ms_ssim,
-                ssimulacra2,
-                butteraugli,
-                cvvdp,
-                tex,
-                wd,
-                gaussians,
-                texture,
-            ])
-        })?;
-        let [bytes, rate, distortion @ .., tex, wd, gaussians, texture] = values;
-        let (distortion, texture) = (Distortion::from(distortion), [gaussians, texture]);
-        Ok(Figures { bytes, rate, distortion, tex, wd, texture })
+    ) -> Option<Figures> {
+        self.0.known(version, [codec, &key(rate), &picture.name]).map(Figures::from)
     }
+}
+
+/// What the CSV calls a rate.
+fn key(rate: f64) -> String {
+    format!("{rate} bpp")
 }
 
 /// A codec on all pictures of a set.
@@ -167,42 +201,24 @@ fn codecs(
     rates: &[f64],
 ) -> Result<Vec<Codec>> {
     let product = bench.product.clone();
-    let (worker, versions) = bench.baselines()?;
+    let (workers, versions) = bench.workers()?;
     let beside = timing_version(&product, &versions);
-    let mut codecs = Vec::new();
+    let mut codecs: Vec<Codec> = Vec::new();
     for (name, encoder) in OURS {
-        let figures = at_rates(set, rates, |_, rate, picture| {
-            store.get(&product, name, rates[rate], picture, || {
-                Version::ours(encoder(gip::EFFORT), picture, rates[rate])
-            })
+        let figures = store.all(&product, name, set, rates, workers, |_, rate, of| {
+            Version::ours(encoder(gip::EFFORT), &set.pictures[of], rates[rate])
         })?;
         codecs.push(Codec { name, figures });
     }
     for name in OTHERS {
-        let baseline = versions::baseline_called(name)?;
-        let figures = at_rates(set, rates, |index, rate, picture| {
-            let bytes = codecs[0].figures[rate][index].bytes;
-            store.get(&beside, baseline.id, rates[rate], picture, || {
-                Version::baseline(worker, baseline, picture, bytes)
-            })
-        })?;
+        let (baseline, ours) = (versions::baseline_called(name)?, &codecs[0].figures);
+        let figures =
+            store.all(&beside, baseline.id, set, rates, workers, |worker, rate, of| {
+                Version::baseline(worker, baseline, &set.pictures[of], ours[rate][of].bytes)
+            })?;
         codecs.push(Codec { name, figures });
     }
     Ok(codecs)
-}
-
-/// What `get` says, of the indices of picture and rate, for each rate and picture.
-fn at_rates(
-    set: &PictureSet,
-    rates: &[f64],
-    mut get: impl FnMut(usize, usize, &TestPicture) -> Result<Figures>,
-) -> Result<Vec<Vec<Figures>>> {
-    (0..rates.len())
-        .map(|rate| {
-            let pictures = set.pictures.iter().enumerate();
-            pictures.map(|(index, picture)| get(index, rate, picture)).collect()
-        })
-        .collect()
 }
 
 /// Means over the pictures at one rate, and who is better than ours. `rate` is its index and the rate.

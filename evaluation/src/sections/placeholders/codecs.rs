@@ -1,14 +1,14 @@
 //! What codecs can do with a few hundred bytes.
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::{Result, anyhow};
 use image::imageops::{self, FilterType};
 use image::{DynamicImage, RgbImage};
-use image_gip::{Target, metrics};
+use image_gip::{Target, Threads, metrics};
 
-use crate::baselines::BEST_AVIF;
-use crate::bench::Bench;
+use crate::baselines::{SLOWEST_AVIF, Worker};
 use crate::pictures::TestPicture;
 use crate::{gip, versions, visual};
 
@@ -18,6 +18,8 @@ pub(super) const BUDGETS: [usize; 4] = [100, 200, 400, 800];
 const PART: u32 = 8;
 /// The longer sides in pixels of the pictures that other codecs are given in place of the whole one.
 const SIDES: [u32; 16] = [8, 11, 16, 19, 23, 27, 32, 38, 45, 54, 64, 76, 91, 108, 152, 256];
+/// One in so many of a hundred settings of each baseline is tried.
+const SETTING_STEP: usize = 7;
 /// Most components of BlurHash in a direction.
 const MOST_COMPONENTS: u32 = 9;
 
@@ -67,16 +69,18 @@ impl Codec {
     }
 
     /// Our file at the default effort; of others the best by SSIMULACRA2, with all their settings.
+    /// `scratch` is a folder for passing files to the worker.
     pub(super) fn placeholders(
         self,
-        bench: &mut Bench,
+        worker: &mut Worker,
+        scratch: &Path,
         picture: &TestPicture,
     ) -> Result<Placeholders> {
         match self {
             Self::Gip => ours(picture),
             Self::ThumbHash => thumb_hash(picture),
             Self::BlurHash => blur_hash(picture),
-            Self::Baseline(name) => baseline(bench, name, picture),
+            Self::Baseline(name) => baseline(worker, scratch, name, picture),
         }
     }
 }
@@ -117,7 +121,7 @@ fn ours(picture: &TestPicture) -> Result<Placeholders> {
     let mut placeholders = Placeholders::default();
     for (placeholder, budget) in placeholders.iter_mut().zip(BUDGETS) {
         let encoder = gip::encoder(gip::EFFORT).with_target(Target::Bytes(budget as u64));
-        let file = gip::file(encoder, picture)?.bytes;
+        let file = gip::file(encoder, picture, Threads::Pool)?.bytes;
         let samples = gip::decode_at(&file, original.dimensions())?;
         let shown = RgbImage::from_raw(original.width(), original.height(), samples);
         let shown = shown.expect("it was asked for this size");
@@ -161,14 +165,19 @@ fn opaque([width, height]: [u32; 2], rgba: &[u8]) -> RgbImage {
     RgbImage::from_raw(width, height, samples).expect("they are of this size")
 }
 
-fn baseline(bench: &mut Bench, name: &str, picture: &TestPicture) -> Result<Placeholders> {
+fn baseline(
+    worker: &mut Worker,
+    scratch: &Path,
+    name: &str,
+    picture: &TestPicture,
+) -> Result<Placeholders> {
     let mut baselines = vec![versions::baseline_called(name)?];
     if name == TRIED_SLOWLY {
-        baselines.push(&BEST_AVIF);
+        baselines.push(&SLOWEST_AVIF);
     }
     let (whole, original) = (image_of(picture), original(picture));
-    let path = bench.path("placeholder.png");
-    let (worker, _) = bench.baselines()?;
+    // The worker may have another working directory.
+    let path = std::path::absolute(scratch.join(format!("placeholder of {}.png", picture.name)))?;
     let mut placeholders = Placeholders::default();
     for longer in SIDES {
         let scale = f64::from(longer) / f64::from(picture.width.max(picture.height));
@@ -179,7 +188,7 @@ fn baseline(bench: &mut Bench, name: &str, picture: &TestPicture) -> Result<Plac
         let (path, rgb) = (path.clone(), small.into_raw());
         let small = TestPicture { name: picture.name.clone(), path, width, height, rgb };
         for baseline in &baselines {
-            for setting in baseline.settings {
+            for setting in versions::settings(baseline).iter().step_by(SETTING_STEP) {
                 let trip = worker.round_trip(baseline.id, setting, &small, Some(1), [1; 2])?;
                 let bytes = trip.bytes as usize;
                 // Files grow from setting to setting.

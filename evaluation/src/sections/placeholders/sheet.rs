@@ -31,7 +31,9 @@ pub(super) fn make(bench: &mut Bench) -> Result<String> {
     let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(wide.len());
     let mut blocks = Vec::new();
     for picture in (0..count).map(|index| &wide[index * wide.len() / count]) {
-        let of_codec = |codec: Codec| codec.placeholders(bench, picture);
+        let scratch = bench.path("");
+        let (worker, _) = bench.baselines()?;
+        let of_codec = |codec: Codec| codec.placeholders(worker, &scratch, picture);
         let placeholders = Codec::ALL.into_iter().map(of_codec).collect::<Result<_>>()?;
         let (name, original) = (picture.name.clone(), codecs::original(picture));
         blocks.push(Block { name, original, placeholders });

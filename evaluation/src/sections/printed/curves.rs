@@ -6,13 +6,13 @@ use anyhow::{Context, Result};
 use image_gip::Target;
 use serde::Deserialize;
 
-use crate::baselines::BASELINES;
+use crate::baselines::{ALONE, BASELINES};
 use crate::bench::Bench;
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::metric::Metric;
 use crate::provenance::FOLDER;
-use crate::sections::codec_curves::{Codec, Variant};
+use crate::sections::codec_curves::{Codec, Extent, Variant};
 use crate::sections::rate_store::RateStore;
 use crate::table::{Table, decibels, median, percent};
 
@@ -91,13 +91,13 @@ fn read(path: &Path) -> Result<Vec<Row>> {
 /// Ours and then the baselines, as measured on Kodak.
 fn measured(bench: &mut Bench) -> Result<Vec<Printed>> {
     let mut store = RateStore::open(bench)?;
-    let (pictures, quick) = (bench.pictures.clone(), bench.quick);
+    let (pictures, extent) = (bench.pictures.clone(), Extent::new(bench.quick));
     let product = bench.product.clone();
-    let mut codecs = vec![Codec::ours(&mut store, &product, &OURS, &pictures, quick)?];
-    let (worker, versions) = bench.baselines()?;
+    let mut codecs = vec![Codec::ours(&mut store, &product, &OURS, &pictures, extent)?];
+    let (workers, versions) = bench.workers()?;
     for baseline in &BASELINES {
-        let store = &mut store;
-        codecs.push(Codec::baseline(store, worker, &versions, baseline, &pictures, quick)?);
+        let (store, alone) = (&mut store, (baseline, ALONE));
+        codecs.push(Codec::baseline(store, workers, &versions, alone, &pictures, extent)?);
     }
     let row = |codec: Codec| Printed {
         name: codec.name.to_owned(),

@@ -1,0 +1,146 @@
+//! All codecs on all sets of pictures, for the sections about rates.
+
+use anyhow::Result;
+
+use super::codec_curves::{Codec, Extent, OURS, Variant};
+use super::ranges::HIGH;
+use super::rate_store::RateStore;
+use crate::baselines::{self, BEST_AVIF};
+use crate::bench::Bench;
+use crate::gip;
+use crate::pictures::PictureSet;
+
+/// Codecs on one set of pictures.
+#[derive(Debug)]
+pub(super) struct Comparison {
+    pub(super) set: PictureSet,
+    pub(super) ours: Codec,
+    /// Others, and then our encoder run otherwise than by default.
+    pub(super) others: Vec<Codec>,
+}
+
+impl Comparison {
+    /// Ours first.
+    pub(super) fn codecs(&self) -> impl Iterator<Item = &Codec> {
+        [&self.ours].into_iter().chain(&self.others)
+    }
+
+    /// Another codec by its name.
+    pub(super) fn other(&self, name: &str) -> Option<&Codec> {
+        self.others.iter().find(|codec| codec.name == name)
+    }
+
+    /// The codec that single pictures are compared with: the strongest.
+    pub(super) fn best_avif(&self) -> &Codec {
+        self.other(BEST_AVIF[0].name).expect("it is on all sets")
+    }
+}
+
+/// All sets with the codecs that each is measured with. What matters most comes first, so that a
+/// run that is interrupted has it: our default and the others on all sets.
+pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Comparison>> {
+    let product = bench.product.clone();
+    let [default, variants @ ..] = OURS;
+    let mut comparisons = Vec::new();
+    let quick = bench.quick;
+    for set in bench.all_sets().into_iter().map(thinned) {
+        let [of_ours, of_others] = steps(set.name).map(|step| extent(quick, step));
+        let ours = Codec::ours(store, &product, &default, &set.pictures, of_ours)?;
+        let (workers, versions) = bench.workers()?;
+        let rivals = baselines::rivals().filter(|(rival, _)| is_in(set.name, rival.name));
+        let others = rivals.map(|rival| {
+            // It has few settings anyway.
+            let is_best = rival.0.name == BEST_AVIF[0].name;
+            let extent = if is_best { extent(quick, 1) } else { of_others };
+            Codec::baseline(store, workers, &versions, rival, &set.pictures, extent)
+        });
+        let others = others.collect::<Result<_>>()?;
+        comparisons.push(Comparison { set, ours, others });
+    }
+    for Comparison { set, others, .. } in &mut comparisons {
+        let of_set = |variant: &&Variant| is_in(set.name, variant.name);
+        for variant in variants.iter().filter(of_set) {
+            let extent = extent(quick, VARIANT_STEP);
+            others.push(Codec::ours(store, &product, variant, &set.pictures, extent)?);
+        }
+    }
+    Ok(comparisons)
+}
+
+/// A set with the pictures that are compared: of the large ones, each of which takes as long as seven
+/// of Kodak's, every other one.
+fn thinned(mut set: PictureSet) -> PictureSet {
+    if set.name == "large" {
+        set.pictures = set.pictures.into_iter().step_by(2).collect();
+    }
+    set
+}
+
+/// One in so many settings of ours and of the others is measured on a set. Large pictures and
+/// screenshots take as long as all others together; most curves of screenshots are short.
+fn steps(set: &str) -> [usize; 2] {
+    match set {
+        "large" => [2, 2],
+        "screens" => [1, 2],
+        _ => [1, 1],
+    }
+}
+
+/// Other ways to run our encoder are there for a comparison with ours, for which fewer rates do.
+const VARIANT_STEP: usize = 2;
+
+/// Beyond the highest range nothing is compared.
+fn extent(quick: bool, step: usize) -> Extent {
+    let all = Extent::new(quick);
+    Extent { step: all.step.max(step), until: HIGH.rates.1 }
+}
+
+/// These are measured on the first set alone.
+const ON_FIRST: [&str; 3] = [gip::PLAIN_NAME, gip::PSNR_NAME, "AVIF tune=psnr"];
+/// On the large pictures only these are measured.
+const ON_LARGE: [&str; 5] = ["WebP", "AVIF", "JPEG XL", "HEIC", BEST_AVIF[0].name];
+
+/// Whether a codec is measured on a set.
+fn is_in(set: &str, codec: &str) -> bool {
+    match set {
+        "Kodak" => true,
+        "large" => ON_LARGE.contains(&codec),
+        _ => !ON_FIRST.contains(&codec),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pictures::TestPicture;
+
+    #[test]
+    fn every_other_large_picture_is_compared() {
+        let picture = |name: &str| TestPicture {
+            name: name.into(),
+            path: "".into(),
+            width: 1,
+            height: 1,
+            rgb: vec![0; 3],
+        };
+        let names = |name: &'static str| {
+            let pictures = ["a", "b", "c"].map(picture).into();
+            let set = thinned(PictureSet { name, pictures });
+            set.pictures.into_iter().map(|picture| picture.name).collect::<Vec<_>>()
+        };
+        assert_eq!(names("large"), ["a", "c"]);
+        assert_eq!(names("photos"), ["a", "b", "c"]);
+    }
+
+    #[test]
+    fn every_codec_is_on_the_first_set_and_ours_beside_the_best_on_all() {
+        for (rival, _) in baselines::rivals() {
+            assert!(is_in("Kodak", rival.name), "{}", rival.name);
+        }
+        assert!(ON_LARGE.iter().all(|name| baselines::rivals().any(|(r, _)| r.name == *name)));
+        for set in ["Kodak", "photos", "large", "screens"] {
+            assert!(is_in(set, BEST_AVIF[0].name), "{set}");
+        }
+        assert!(!is_in("large", gip::PSNR_NAME) && !is_in("photos", gip::PLAIN_NAME));
+    }
+}
