@@ -71,7 +71,7 @@ impl Array {
         let kind = after("descr")?.strip_prefix('\'').and_then(|value| value.split_once('\''));
         let kind = kind
             .map(|(kind, _)| kind.to_owned())
-            .context("it is a structured array; save each of its fields as an array")?;
+            .context("it is a structured array; it must have one type")?;
         let fortran = after("fortran_order")?.starts_with("True");
         let shape = after("shape")?.strip_prefix('(').and_then(|value| value.split_once(')'));
         let (sides, _) = shape.context("its header has no shape")?;

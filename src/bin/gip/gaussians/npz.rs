@@ -131,8 +131,14 @@ pub(crate) fn read(bytes: &[u8], most: u64) -> Result<Imported> {
         let array = Array::parse(&contents).with_context(|| name.clone())?;
         arrays.0.insert(name, array);
     }
-    let required =
-        |name: &str| arrays.numbers(name)?.with_context(|| format!("it has no array {name}"));
+    let required = |name: &str| {
+        let missing = || {
+            format!(
+                "it has no array {name}; of a structured array, save each of its fields as an array"
+            )
+        };
+        arrays.numbers(name)?.with_context(missing)
+    };
     let (center, color) = (required("center")?, required("color")?);
     let &[count, 2] = &center.shape[..] else {
         bail!("center has shape {:?}; it must be [n, 2]", center.shape);
