@@ -5,8 +5,8 @@
 // of `npm ci`. The command line tool of wasm-bindgen comes from crates.io, in exactly the version that Cargo.lock has.
 
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
-import { homedir } from 'node:os';
+import { copyFileSync, cpSync, existsSync, mkdirSync, readFileSync, readdirSync, realpathSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
+import { homedir, tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { deflateSync } from 'node:zlib';
@@ -48,20 +48,32 @@ function wasmBindgen() {
  * What makes the files the same wherever the package is built. By the place of a crate outside of this workspace Cargo names its
  * functions, which then are in another order, so it is found by a link inside; and the compiler calls folders by other names.
  */
-function linked(name, folder) {
-  const link = join(target, name);
+const linked = (name, folder) => linkTo(join(target, name), folder);
+
+/** A link to a folder, which may be there from an earlier build, or for another one that runs. */
+function linkTo(link, folder) {
+  const isThere = existsSync(link) && realpathSync(link) === realpathSync(folder);
+  if (isThere) return link;
   rmSync(link, { force: true });
   // Windows links folders without special rights only this way.
   symlinkSync(folder, link, 'junction');
   return link;
 }
+
+/**
+ * The standard library's source. Cargo names its crates by the whole path, so that it needs one that is the same for all
+ * copies of this folder.
+ */
+const compiler = told('rustc', '--version', '--verbose').match(/^commit-hash: (.*)$/m)[1];
+const library = join(tmpdir(), `image-gip-rust-${compiler}`);
 mkdirSync(target, { recursive: true });
 const source = linked('source', join(root, '../..'));
 const folders = {
   [root]: 'image-gip',
   [process.env.CARGO_HOME ?? join(homedir(), '.cargo')]: 'cargo',
   // By this name the compiler calls it where it is not installed.
-  [rust]: `/rustc/${told('rustc', '--version', '--verbose').match(/^commit-hash: (.*)$/m)[1]}`,
+  [rust]: `/rustc/${compiler}`,
+  [library]: `/rustc/${compiler}/library`,
 };
 const renamed = Object.entries(folders).map(([folder, name]) => `--remap-path-prefix=${folder}=${name}`);
 const configured = (settings) => Object.entries(settings).flatMap(([name, value]) => ['--config', `${name}=${JSON.stringify(value)}`]);
@@ -129,8 +141,7 @@ if (hasThreads) {
     env: {
       // So the compiler takes what is for nightly ones only, and all modules are made by the same one.
       RUSTC_BOOTSTRAP: '1',
-      // The place of the standard library, for what is said above.
-      __CARGO_TESTS_ONLY_SRC_ROOT: linked('library', join(rust, 'library')),
+      __CARGO_TESTS_ONLY_SRC_ROOT: linkTo(library, join(rust, 'library')),
     },
     // Crates that find out what the compiler takes are not the same as for the other modules.
     folder: join(target, 'threads'),
