@@ -1,6 +1,6 @@
 //! Losses by what pictures show.
 
-use super::Case;
+use super::case::Case;
 use super::source::{EDGE, Source};
 use crate::metric::Metric;
 use crate::sections::ranges::{Outcome, RANGES, short};
@@ -195,7 +195,7 @@ fn worst(cases: &[&Case]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sections::losses::tests::case;
+    use crate::sections::losses::case::tests::case;
 
     #[test]
     fn rank_correlations_follow_the_order_alone() {

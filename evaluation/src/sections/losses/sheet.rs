@@ -6,8 +6,8 @@ use anyhow::Result;
 use image::{RgbImage, imageops};
 use image_gip::{Target, Threads};
 
+use super::case::{Case, worst};
 use super::kinds::KINDS;
-use super::{Case, worst};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
@@ -140,7 +140,7 @@ fn draw(strips: &[Strip]) -> Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sections::losses::tests::case;
+    use crate::sections::losses::case::tests::case;
 
     #[test]
     fn every_metric_and_every_class_has_another_picture() {
