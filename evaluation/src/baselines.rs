@@ -68,8 +68,8 @@ const RIVALS: [Baseline; 4] = [
 
 /// The best that AVIF can do, with two tunings.
 pub(crate) const BEST_AVIF: [Baseline; 2] = [
-    Baseline { id: "avif444_s2", name: "AVIF, its best", settings: &BEST_AVIF_SETTINGS },
-    Baseline { id: "avif444_s2_ssim2", name: "AVIF, its best", settings: &BEST_AVIF_SETTINGS },
+    Baseline { id: "avif444_s2", name: "AVIF at its best", settings: &BEST_AVIF_SETTINGS },
+    Baseline { id: "avif444_s2_ssim2", name: "AVIF at its best", settings: &BEST_AVIF_SETTINGS },
 ];
 
 /// A codec without other tunings.
@@ -102,7 +102,7 @@ distance 20 on it halves the resolution.";
 /// The same of those that are no baselines.
 pub(crate) const RIVALS_DESCRIPTION: &str = "AVIF tune=ssimulacra2 is the same with that tuning; \
 AVIF by SVT-AV1 is that encoder's preset 4 for still pictures with its tuning for images (tune=iq), \
-4:2:0 of 10 bits; AVIF, its best, is aom at speed 2 in 4:4:4, on each picture with the tuning that is \
+4:2:0 of 10 bits; AVIF at its best is aom at speed 2 in 4:4:4, on each picture with the tuning that is \
 best by the metric in question, iq or ssimulacra2 (speed 0 takes more than three times as long for \
 files that are hardly smaller); JPEG XL effort 9 is the same at that effort; HEIC is x265's preset \
 veryslow, 4:2:0.";

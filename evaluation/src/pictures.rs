@@ -136,7 +136,7 @@ pub(crate) fn mosaic(
     Some(TestPicture { name, path: PathBuf::new(), width, height, rgb: mosaic.into_raw() })
 }
 
-/// All PNGs of a folder by name, or `at_most` of them, evenly spread.
+/// All PNGs of a folder by name, or the `at_most` smallest of them, which are quick to measure.
 pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPicture>> {
     let unreadable = || format!("cannot read the folder {}", folder.display());
     let mut paths = Vec::new();
@@ -148,8 +148,12 @@ pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPict
     }
     ensure!(!paths.is_empty(), "there is no .png in {}", folder.display());
     paths.sort();
-    let count = at_most.map_or(paths.len(), |most| most.min(paths.len()));
-    (0..count).map(|index| open(&paths[index * paths.len() / count])).collect()
+    let mut pictures = paths.iter().map(|path| open(path)).collect::<Result<Vec<_>>>()?;
+    if let Some(most) = at_most {
+        pictures.sort_by_key(|picture| u64::from(picture.width) * u64::from(picture.height));
+        pictures.truncate(most);
+    }
+    Ok(pictures)
 }
 
 /// The picture of a file.
@@ -177,6 +181,22 @@ mod tests {
         assert_eq!(reds, [0, 3, 3, 0, 0, 6, 9, 9, 6, 6, 6, 9, 9, 6, 6]);
         assert_eq!(picture.mirrored(2, 2).rgb, picture.rgb);
         assert_eq!(picture.mirrored(1, 1).rgb, [0, 1, 2]);
+    }
+
+    #[test]
+    fn the_smallest_pictures_are_the_quick_ones() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, size) in [("a", (9, 9)), ("b", (3, 2)), ("c", (4, 4)), ("d", (2, 3))] {
+            let path = folder.path().join(name).with_extension("png");
+            image::RgbImage::new(size.0, size.1).save(path).expect("it is written");
+        }
+        let names = |at_most| -> Vec<String> {
+            let pictures = load(folder.path(), at_most).expect("there are pictures");
+            pictures.into_iter().map(|picture| picture.name).collect()
+        };
+        assert_eq!(names(None), ["a", "b", "c", "d"]);
+        assert_eq!(names(Some(3)), ["b", "d", "c"]);
+        assert_eq!(names(Some(9)).len(), 4);
     }
 
     #[test]

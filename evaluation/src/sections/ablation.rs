@@ -24,8 +24,8 @@ const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
 const OWN_ITERATIONS: u32 = 320;
 const QUICK_OWN_ITERATIONS: u32 = 150;
 /// How many pictures: for components and seeds, and for the tables with more settings.
-const PICTURES: usize = 8;
-const FEWER_PICTURES: usize = 4;
+const PICTURES: usize = 4;
+const FEWER_PICTURES: usize = 2;
 const QUICK_PICTURES: usize = 1;
 /// Bits of position, shape and colour; the first are the paper's choice.
 const DEPTHS: [[u8; 3]; 8] = [

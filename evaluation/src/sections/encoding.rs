@@ -41,13 +41,13 @@ pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64)
     for &(name, pictures) in sets {
         if !pictures.is_empty() {
             text.push_str(&format!("\n{name}, {} pictures:\n", pictures.len()));
-            text.push_str(&set(bench, pictures, rate)?);
+            text.push_str(&set(bench, name, pictures, rate)?);
         }
     }
     Ok(text)
 }
 
-fn set(bench: &Bench, pictures: &[TestPicture], rate: f64) -> Result<String> {
+fn set(bench: &Bench, name: &str, pictures: &[TestPicture], rate: f64) -> Result<String> {
     let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
     let mut store: EncodingStore = bench.store(
         "encoding.csv",
@@ -68,10 +68,16 @@ fn set(bench: &Bench, pictures: &[TestPicture], rate: f64) -> Result<String> {
         });
         by_picture.push(encodings.collect::<Result<Vec<_>>>()?);
     }
-    Ok(effort_table(efforts, &by_picture))
+    let costs = costs(efforts, &by_picture);
+    for cost in &costs {
+        let named = |figure: &str| format!("efforts/{name}/{figure}/{}", cost.effort);
+        bench.figure(named("PSNR in dB"), cost.psnr, "dB");
+        bench.figure(named("seconds per megapixel"), cost.seconds[1], "s");
+    }
+    Ok(effort_table(&costs))
 }
 
-/// PSNR, seconds with one thread and with all, peak memory with all.
+/// PSNR, seconds with one thread and with all in turns, peak memory with all.
 fn measured(encoder: &Encoder, picture: &TestPicture) -> Result<[f64; 4]> {
     let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
     let (mut one, mut all) = (Vec::new(), Vec::new());
@@ -89,8 +95,49 @@ fn measured(encoder: &Encoder, picture: &TestPicture) -> Result<[f64; 4]> {
     Ok([report.psnr, one, all, memory])
 }
 
-/// What each effort costs per megapixel.
-fn effort_table(efforts: &[u8], by_picture: &[Vec<Encoding>]) -> String {
+/// PSNR, seconds and peak memory with all threads.
+fn with_all_threads(encoder: &Encoder, picture: &TestPicture) -> Result<[f64; 3]> {
+    let mut times = Vec::new();
+    loop {
+        let (encoded, memory) = memory::peak(|| gip::file(encoder.clone(), picture, Threads::Pool));
+        let report = encoded?.report;
+        times.push(report.seconds);
+        if times.len() == RUNS || times.iter().sum::<f64>() > SECONDS {
+            return Ok([report.psnr, median(times).unwrap_or(f64::NAN), memory]);
+        }
+    }
+}
+
+/// What an effort costs, by medians over pictures: seconds per megapixel with one thread and with all,
+/// their ratio, and bytes of memory per pixel. PSNR is a mean.
+#[derive(Clone, Copy, Debug)]
+struct Cost {
+    effort: u8,
+    psnr: f64,
+    seconds: [f64; 2],
+    ratio: f64,
+    memory: f64,
+}
+
+fn costs(efforts: &[u8], by_picture: &[Vec<Encoding>]) -> Vec<Cost> {
+    let all = efforts.iter().enumerate().map(|(index, &effort)| {
+        let each = || by_picture.iter().map(move |encodings| encodings[index]);
+        let middle = |of: fn(Encoding) -> f64| median(each().map(of)).unwrap_or(f64::NAN);
+        Cost {
+            effort,
+            psnr: mean(each().map(|encoding| encoding.psnr)).unwrap_or(f64::NAN),
+            seconds: [
+                middle(|encoding| encoding.seconds[0] / encoding.megapixels),
+                middle(|encoding| encoding.seconds[1] / encoding.megapixels),
+            ],
+            ratio: middle(|encoding| encoding.seconds[0] / encoding.seconds[1]),
+            memory: middle(|encoding| encoding.memory / encoding.megapixels * 1e-6),
+        }
+    });
+    all.collect()
+}
+
+fn effort_table(costs: &[Cost]) -> String {
     let mut table = Table::new(&[
         "effort",
         "PSNR in dB",
@@ -101,20 +148,15 @@ fn effort_table(efforts: &[u8], by_picture: &[Vec<Encoding>]) -> String {
         "bytes per pixel",
     ]);
     let mut before = None;
-    for (index, effort) in efforts.iter().enumerate() {
-        let middle = |of: fn(&Encoding) -> f64| {
-            median(by_picture.iter().map(|encodings| of(&encodings[index]))).unwrap_or(f64::NAN)
-        };
-        let psnr = mean(by_picture.iter().map(|encodings| encodings[index].psnr));
-        let all = middle(|encoding| encoding.seconds[1] / encoding.megapixels);
+    for &Cost { effort, psnr, seconds: [one, all], ratio, memory } in costs {
         table.row(&[
             effort.to_string(),
-            format!("{:.2}", psnr.unwrap_or(f64::NAN)),
-            format!("{:.2}", middle(|encoding| encoding.seconds[0] / encoding.megapixels)),
+            format!("{psnr:.2}"),
+            format!("{one:.2}"),
             format!("{all:.2}"),
-            format!("{:.2}", middle(|encoding| encoding.seconds[0] / encoding.seconds[1])),
+            format!("{ratio:.2}"),
             before.map_or_else(|| "-".into(), |before: f64| format!("{:.2}", all / before)),
-            format!("{:.1}", middle(|encoding| encoding.memory / encoding.megapixels * 1e-6)),
+            format!("{memory:.1}"),
         ]);
         before = Some(all);
     }
@@ -128,10 +170,10 @@ pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
         sets.push(pictures::PictureSet { name, pictures: pictures.clone() });
     }
     sets.retain(|set| !set.pictures.is_empty());
-    let mut store: EncodingStore = bench.store(
+    let mut store = bench.store(
         "encoding-pictures.csv",
         ["set", "image"],
-        ["psnr", "seconds_one", "seconds_all", "peak_memory"],
+        ["psnr", "seconds_all", "peak_memory"],
     )?;
     let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
     let (mut names, mut times) = (Vec::new(), Vec::new());
@@ -140,8 +182,8 @@ pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
         names.push(set.name);
         for picture in &set.pictures {
             let key = [set.name, &picture.name];
-            let [_, _, seconds, _] =
-                store.get(&bench.product, key, || measured(&encoder, picture))?;
+            let [_, seconds, _] =
+                store.get(&bench.product, key, || with_all_threads(&encoder, picture))?;
             times.push((
                 seconds / picture.pixels() * 1e6,
                 format!("{} ({})", picture.name, set.name),
@@ -151,6 +193,8 @@ pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
     }
     times.sort_by(|a, b| a.0.total_cmp(&b.0));
     let middle = median(times.iter().map(|&(seconds, _)| seconds)).unwrap_or(f64::NAN);
+    let slowest = times.last().map_or(f64::NAN, |&(seconds, _)| seconds);
+    bench.figure("single pictures/slowest over median", slowest / middle, "");
     let mut table = Table::new(&["picture", "s per megapixel", "over the median"]);
     let ends = times.iter().take(1).chain(times.iter().rev().take(5).rev());
     for (seconds, name) in ends {
@@ -168,11 +212,13 @@ pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
     );
     if let Some(mosaic) = pictures::mosaic(&all, TILES, TILE) {
         let key = ["mosaic", mosaic.name.as_str()];
-        let values = store.get(&bench.product, key, || measured(&encoder, &mosaic))?;
-        let [_, one, all, memory] = values;
+        let [_, seconds, memory] =
+            store.get(&bench.product, key, || with_all_threads(&encoder, &mosaic))?;
+        bench.figure("mosaic/megapixels", 1e-6 * mosaic.pixels(), "");
+        bench.figure("mosaic/seconds", seconds, "s");
         text.push_str(&format!(
             "\nA picture of {:.0} megapixels, a mosaic of {} tiles of {TILE} x {TILE} pixels of these pictures, none of \
-             them twice, takes {all:.1} seconds ({one:.1} with one thread) and {:.1} bytes of memory per pixel.\n",
+             them twice, takes {seconds:.1} seconds and {:.1} bytes of memory per pixel.\n",
             1e-6 * mosaic.pixels(),
             TILES.0 * TILES.1,
             memory / mosaic.pixels(),
@@ -193,7 +239,7 @@ mod tests {
             seconds: [2.0 * seconds, seconds],
             memory: 32e6,
         };
-        let text = effort_table(&[1, 2], &[vec![encoding(1.0), encoding(3.0)]]);
+        let text = effort_table(&costs(&[1, 2], &[vec![encoding(1.0), encoding(3.0)]]));
         assert!(text.contains("| 1 | 30.00 | 1.00 | 0.50 | 2.00 | - | 16.0 |"), "{text}");
         assert!(text.contains("| 2 | 30.00 | 3.00 | 1.50 | 2.00 | 3.00 | 16.0 |"), "{text}");
     }

@@ -1,13 +1,13 @@
 //! How time and memory grow with pixels and with Gaussians.
 
 use anyhow::Result;
-use image_gip::{Target, Threads};
+use image_gip::{Encoded, Target, Threads};
 
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
-use crate::gip;
 use crate::plot::{Corner, Plot, Scale, Series};
 use crate::table::Table;
+use crate::{gip, memory};
 
 /// Sizes in megapixels, and how many Gaussians each megapixel gets.
 const MEGAPIXELS: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0];
@@ -76,14 +76,14 @@ pub(super) fn measure(bench: &Bench) -> Result<String> {
             let large = picture.mirrored(width as u32, height as u32);
             let encoder =
                 gip::psnr_encoder(GROWTH_EFFORT).with_target(Target::Gaussians(gaussians));
-            let measured = gip::encode(encoder, &large, Threads::Pool)?;
-            let file = &measured.file;
+            let (encoded, memory) = memory::peak(|| gip::file(encoder, &large, Threads::Pool));
+            let Encoded { bytes: file, report, .. } = &encoded?;
             Ok([
-                measured.distortion.psnr,
-                measured.report.iterations.into(),
-                measured.report.evaluations as f64,
-                measured.report.seconds,
-                measured.memory,
+                report.psnr,
+                report.iterations.into(),
+                report.evaluations as f64,
+                report.seconds,
+                memory,
                 gip::decode_seconds(file, Threads::One)?,
                 gip::decode_seconds(file, Threads::Pool)?,
                 gip::decode_memory(file)?,

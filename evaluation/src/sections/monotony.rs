@@ -5,7 +5,7 @@ use image_gip::{ColorModel, Source, Target, Tune};
 
 use crate::bench::Bench;
 use crate::gip;
-use crate::pictures::TestPicture;
+use crate::pictures::{PictureSet, TestPicture};
 use crate::store::Store;
 use crate::table::Table;
 
@@ -14,6 +14,9 @@ const TUNES: [(&str, Tune); 2] = [("visual", Tune::Visual), ("psnr", Tune::Psnr)
 /// In bits per pixel.
 const RATES: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.0];
 const QUICK_RATES: [f64; 3] = [0.25, 1.0, 2.0];
+/// One in so many pictures of a set is measured.
+const STEP: usize = 3;
+const LARGE_STEP: usize = 6;
 /// What the PSNR may fall, in dB.
 const TOLERANCE: f64 = 0.1;
 /// The PSNR of a picture of which nothing but the rounding to samples is left: what is better counts as
@@ -46,9 +49,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let rates: &[f64] = if bench.quick { &QUICK_RATES } else { &RATES };
     let keys = ["tune", "effort", "bpp", "image"];
     let mut store: Store<4, 3> = bench.store("monotony.csv", keys, ["bytes", "psnr", "quality"])?;
-    let sets: Vec<TestPicture> = bench.sets().into_iter().flat_map(|set| set.pictures).collect();
-    let pictures: Vec<&TestPicture> =
-        sets.iter().chain(&bench.large).chain(&bench.screens).collect();
+    let pictures: Vec<TestPicture> = bench.all_sets().into_iter().flat_map(part).collect();
     let mut files = Vec::new();
     for picture in &pictures {
         for (name, tune) in TUNES {
@@ -71,7 +72,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     bench.figure("falls", falls.len() as f64, "files");
     bench.figure("worst", falls.first().map_or(0.0, |fall| fall.by), "dB");
     let mut text = format!(
-        "Compared: {} pictures at {rates:?} bits per pixel and efforts {EFFORTS:?}. A picture falls if its \
+        "Compared: {} pictures, one in {STEP} of each set (of large ones one in {LARGE_STEP}), at {rates:?} bits per pixel and efforts {EFFORTS:?}. A picture falls if its \
          PSNR is more than {TOLERANCE} dB below that of a file with fewer bits and the same effort, or with \
          less effort and the same bits; above {EXACT} dB nothing but rounding is left of the error.\n\n",
         pictures.len(),
@@ -81,6 +82,12 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         text.push_str(&format!("\nThe largest falls:\n\n{}", named(&falls)));
     }
     Ok(text)
+}
+
+/// The pictures of a set that are measured, evenly spread: of large ones few, which take as long.
+fn part(set: PictureSet) -> Vec<TestPicture> {
+    let step = if set.name == "large" { LARGE_STEP } else { STEP };
+    set.pictures.into_iter().step_by(step).collect()
 }
 
 /// Bytes, PSNR and quality of a file.

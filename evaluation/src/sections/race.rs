@@ -12,8 +12,8 @@ use crate::versions::{baseline_called, nearest_setting};
 use crate::visual;
 
 /// What takes longer has lost.
-const EFFORTS: [u8; 5] = [1, 2, 3, 4, 5];
-const QUICK_EFFORTS: [u8; 3] = [1, 3, 5];
+const EFFORTS: [u8; 4] = [1, 2, 3, 4];
+const QUICK_EFFORTS: [u8; 2] = [1, 4];
 /// Both are timed in turns, so that other work on the machine slows both down alike: so many times, or until ours have
 /// taken so many seconds.
 const ROUNDS: usize = 5;
@@ -83,7 +83,7 @@ pub(super) fn measure(bench: &mut Bench, sets: &[(&str, &[TestPicture])]) -> Res
          SSIMULACRA2 takes texture for noise, so that ours is measured without it, too. The time is interpolated \
          between that effort and the one before (in its logarithm), and divided by the other codec's own; medians \
          of rounds in which both take turns, with all threads. The effort is interpolated likewise; where the \
-         lowest is better already, its time is taken, and where none up to effort 5 is as good the ratio is \
+         lowest is better already, its time is taken, and where none up to the default effort is as good the ratio is \
          never.\n",
     );
     for &(set, pictures) in sets {
@@ -106,6 +106,7 @@ fn races(bench: &mut Bench, set: &str, pictures: &[TestPicture]) -> Result<Strin
     let (worker, versions) = bench.baselines()?;
     let version = timing_version(&product, &versions);
     let mut table = Table::new(&["", "time over its own", "from", "to", "effort"]);
+    let mut figures = Vec::new();
     let mut by_picture = vec![Vec::new(); pictures.len()];
     let mut columns = vec!["picture".to_owned()];
     for rival in RIVALS {
@@ -120,11 +121,13 @@ fn races(bench: &mut Bench, set: &str, pictures: &[TestPicture]) -> Result<Strin
                 races.push(Race::from(values));
             }
             let Rival { name, metric, baseline, .. } = rival;
+            let figure = format!("races/{set}/{name} to {baseline}/{rate} bpp");
             let name = format!("{name}, to the {metric} of {baseline}, {rate} bpp");
             let ratios = || races.iter().map(Race::ratio);
             let middle = median(ratios()).unwrap_or(f64::NAN);
             let least = ratios().fold(f64::INFINITY, f64::min);
             let most = ratios().fold(0.0, f64::max);
+            figures.push((figure, middle));
             let effort = mean(races.iter().map(|race| race.effort)).unwrap_or(f64::NAN);
             let effort = if effort.is_finite() { format!("{effort:.1}") } else { "-".into() };
             let [middle, least, most] = [middle, least, most].map(cell);
@@ -133,6 +136,7 @@ fn races(bench: &mut Bench, set: &str, pictures: &[TestPicture]) -> Result<Strin
             by_picture.iter_mut().zip(ratios()).for_each(|(cells, ratio)| cells.push(cell(ratio)));
         }
     }
+    figures.into_iter().for_each(|(name, ratio)| bench.figure(name, ratio, ""));
     let mut single = Table::new(&columns);
     for (picture, cells) in pictures.iter().zip(by_picture) {
         single.row(&[vec![picture.name.clone()], cells].concat());

@@ -55,6 +55,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         text.push_str(&ends(comparison));
         for metric in Metric::ALL {
             text.push_str(&details(bench, comparison, metric)?);
+            name_figures(bench, comparison, metric);
         }
     }
     write_by_picture(bench, &comparisons)?;
@@ -188,6 +189,29 @@ fn table(comparison: &Comparison, metric: Metric) -> String {
         gip::NAME,
         ahead.collect::<Vec<_>>().join("; "),
     )
+}
+
+/// The mean levels and BD-rates of [`table`], for texts that cite them.
+fn name_figures(bench: &Bench, comparison: &Comparison, metric: Metric) {
+    let set = comparison.set.name;
+    for codec in comparison.codecs() {
+        let (name, curves) = (codec.name, codec.curves(metric));
+        for rate in TABLE_RATES {
+            if let Ok(level) = mean_at(&curves, rate, metric) {
+                let figure = format!("{set}/{}/{name}/{rate} bpp", metric.name());
+                bench.figure(figure, metric.shown(level), "");
+            }
+        }
+        if codec.id == comparison.ours.id {
+            continue;
+        }
+        for range in RANGES {
+            let rates = bd_rates(&comparison.ours, codec, metric, range);
+            let mean = Outcome::of(&rates).mean.unwrap_or(f64::NAN);
+            let figure = format!("{set}/BD/{}/{name}/{}", metric.name(), range.name);
+            bench.figure(figure, 100.0 * mean, "%");
+        }
+    }
 }
 
 fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String> {
