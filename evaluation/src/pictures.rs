@@ -188,7 +188,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, size) in [("a", (9, 9)), ("b", (3, 2)), ("c", (4, 4)), ("d", (2, 3))] {
             let path = folder.path().join(name).with_extension("png");
-            image::RgbImage::new(size.0, size.1).save(path).expect("it is written");
+            RgbImage::new(size.0, size.1).save(path).expect("it is written");
         }
         let names = |at_most| -> Vec<String> {
             let pictures = load(folder.path(), at_most).expect("there are pictures");
