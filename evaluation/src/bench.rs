@@ -19,6 +19,8 @@ use crate::{gip, provenance};
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 2;
 const QUICK_LARGE_PICTURES: usize = 1;
+/// How many large pictures are for what takes long.
+const FEW_LARGE_PICTURES: usize = 2;
 /// Iterations of the published methods.
 const ITERATIONS: u32 = 3_000;
 const QUICK_ITERATIONS: u32 = 1_000;
@@ -171,8 +173,12 @@ impl Bench {
 
     /// At most so many of the pictures, evenly spread.
     pub(crate) fn sample(&self, at_most: usize) -> Vec<TestPicture> {
-        let (all, count) = (self.pictures.len(), at_most.min(self.pictures.len()));
-        (0..count).map(|index| self.pictures[index * all / count].clone()).collect()
+        spread(&self.pictures, at_most)
+    }
+
+    /// The large pictures for what takes long: each takes as long as seven of Kodak's.
+    pub(crate) fn large_sample(&self) -> Vec<TestPicture> {
+        spread(&self.large, FEW_LARGE_PICTURES)
     }
 
     /// How many pictures a table is about, in words.
@@ -278,6 +284,12 @@ impl Bench {
         }
         Ok(list)
     }
+}
+
+/// At most so many pictures, evenly spread.
+fn spread(pictures: &[TestPicture], at_most: usize) -> Vec<TestPicture> {
+    let (all, count) = (pictures.len(), at_most.min(pictures.len()));
+    (0..count).map(|index| pictures[index * all / count].clone()).collect()
 }
 
 /// The version of measured times of baselines. It includes the version of our codec, so that they

@@ -148,12 +148,20 @@ pub(crate) fn load(folder: &Path, at_most: Option<usize>) -> Result<Vec<TestPict
     }
     ensure!(!paths.is_empty(), "there is no .png in {}", folder.display());
     paths.sort();
-    let mut pictures = paths.iter().map(|path| open(path)).collect::<Result<Vec<_>>>()?;
     if let Some(most) = at_most {
-        pictures.sort_by_key(|picture| u64::from(picture.width) * u64::from(picture.height));
-        pictures.truncate(most);
+        let sized = paths.into_iter().map(|path| Ok((pixels(&path)?, path)));
+        let mut sized = sized.collect::<Result<Vec<_>>>()?;
+        sized.sort();
+        paths = sized.into_iter().take(most).map(|(_, path)| path).collect();
     }
-    Ok(pictures)
+    paths.iter().map(|path| open(path)).collect()
+}
+
+/// The number of pixels of a file, by its header.
+fn pixels(path: &Path) -> Result<u64> {
+    let size = image::image_dimensions(path);
+    let (width, height) = size.with_context(|| format!("cannot read {}", path.display()))?;
+    Ok(u64::from(width) * u64::from(height))
 }
 
 /// The picture of a file.

@@ -165,11 +165,7 @@ fn effort_table(costs: &[Cost]) -> String {
 
 /// What single pictures of all sets cost at the default effort, and one of 25 megapixels.
 pub(super) fn single_pictures(bench: &Bench, rate: f64) -> Result<String> {
-    let mut sets = bench.sets();
-    for (name, pictures) in [("large", &bench.large), ("screens", &bench.screens)] {
-        sets.push(pictures::PictureSet { name, pictures: pictures.clone() });
-    }
-    sets.retain(|set| !set.pictures.is_empty());
+    let sets = bench.all_sets();
     let mut store = bench.store(
         "encoding-pictures.csv",
         ["set", "image"],

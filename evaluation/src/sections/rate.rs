@@ -55,7 +55,6 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         text.push_str(&ends(comparison));
         for metric in Metric::ALL {
             text.push_str(&details(bench, comparison, metric)?);
-            name_figures(bench, comparison, metric);
         }
     }
     write_by_picture(bench, &comparisons)?;
@@ -134,7 +133,7 @@ fn details(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<Str
         metric.name(),
         comparison.set.name,
         plot(bench, comparison, metric)?,
-        table(comparison, metric),
+        table(bench, comparison, metric),
     ))
 }
 
@@ -153,8 +152,9 @@ pub(super) fn mean_levels(codec: &Codec, metric: Metric) -> Vec<(f64, f64)> {
     PLOT_RATES.iter().filter_map(at).collect()
 }
 
-/// Means at equal rates and BD-rates by range, a row for each codec.
-fn table(comparison: &Comparison, metric: Metric) -> String {
+/// Means at equal rates and BD-rates by range, a row for each codec, and as figures for other texts.
+fn table(bench: &Bench, comparison: &Comparison, metric: Metric) -> String {
+    let set = comparison.set.name;
     let mut columns = vec![metric.with_unit().to_owned()];
     columns.extend(TABLE_RATES.map(|rate| format!("{rate} bpp")));
     columns.extend(RANGES.map(|range| format!("BD-rate of {}, {}", gip::NAME, range.title())));
@@ -163,7 +163,11 @@ fn table(comparison: &Comparison, metric: Metric) -> String {
     for codec in comparison.codecs() {
         let (curves, mut cells) = (codec.curves(metric), vec![codec.name.to_owned()]);
         cells.extend(TABLE_RATES.map(|rate| match mean_at(&curves, rate, metric) {
-            Ok(level) => metric.cell(level),
+            Ok(level) => {
+                let figure = format!("{set}/{}/{}/{rate} bpp", metric.name(), codec.name);
+                bench.figure(figure, metric.shown(level), "");
+                metric.cell(level)
+            }
             Err(reached) => format!("({reached}/{} reach)", curves.len()),
         }));
         for (range, ahead) in RANGES.into_iter().zip(&mut ahead) {
@@ -172,6 +176,8 @@ fn table(comparison: &Comparison, metric: Metric) -> String {
                 continue;
             }
             let outcome = Outcome::of(&bd_rates(&comparison.ours, codec, metric, range));
+            let figure = format!("{set}/BD/{}/{}/{}", metric.name(), codec.name, range.name);
+            bench.figure(figure, 100.0 * outcome.mean.unwrap_or(f64::NAN), "%");
             if outcome.mean.is_some_and(|mean| mean > 0.0) {
                 ahead.push(codec.name);
             }
@@ -189,29 +195,6 @@ fn table(comparison: &Comparison, metric: Metric) -> String {
         gip::NAME,
         ahead.collect::<Vec<_>>().join("; "),
     )
-}
-
-/// The mean levels and BD-rates of [`table`], for texts that cite them.
-fn name_figures(bench: &Bench, comparison: &Comparison, metric: Metric) {
-    let set = comparison.set.name;
-    for codec in comparison.codecs() {
-        let (name, curves) = (codec.name, codec.curves(metric));
-        for rate in TABLE_RATES {
-            if let Ok(level) = mean_at(&curves, rate, metric) {
-                let figure = format!("{set}/{}/{name}/{rate} bpp", metric.name());
-                bench.figure(figure, metric.shown(level), "");
-            }
-        }
-        if codec.id == comparison.ours.id {
-            continue;
-        }
-        for range in RANGES {
-            let rates = bd_rates(&comparison.ours, codec, metric, range);
-            let mean = Outcome::of(&rates).mean.unwrap_or(f64::NAN);
-            let figure = format!("{set}/BD/{}/{name}/{}", metric.name(), range.name);
-            bench.figure(figure, 100.0 * mean, "%");
-        }
-    }
 }
 
 fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String> {

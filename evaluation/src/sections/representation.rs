@@ -22,8 +22,6 @@ const QUICK_LARGE_GAUSSIANS: [u32; 1] = [10_000];
 /// How many pictures of Kodak: the published methods take half a minute for each.
 const PICTURES: usize = 4;
 const QUICK_PICTURES: usize = 1;
-/// One in so many large pictures is fitted, each of which takes as long as seven of Kodak's.
-const LARGE_STEP: usize = 3;
 /// The effort that is shown beside the default one; a higher one gains next to nothing.
 const BEST_EFFORT: u8 = 6;
 /// Attributes of a Gaussian: two for the centre, three for the shape, three for the colour.
@@ -126,7 +124,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     if !bench.quick {
         text.push_str(&as_long_as_the_paper(bench, &mut store, &all[..2])?);
     }
-    let large: Vec<_> = bench.large.iter().step_by(LARGE_STEP).cloned().collect();
+    let large = bench.large_sample();
     if !large.is_empty() {
         let large = DataSet {
             bench,

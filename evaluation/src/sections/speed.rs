@@ -21,8 +21,6 @@ const RATE: f64 = 0.5;
 /// How many pictures are coded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 2;
-/// One in so many large pictures is encoded at all efforts.
-const LARGE_STEP: usize = 3;
 const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
@@ -64,7 +62,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         }
     }
     text.push_str(&races);
-    let large: Vec<TestPicture> = large.iter().step_by(LARGE_STEP).cloned().collect();
+    let large = bench.large_sample();
     let sets = [("Kodak", &kodak[..]), ("Large pictures", &large[..])];
     text.push_str(&encoding::efforts(bench, &sets, RATE)?);
     text.push_str(&encoding::single_pictures(bench, RATE)?);

@@ -15,8 +15,6 @@ use crate::table::Table;
 /// The pictures that crops are made of.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 1;
-/// One in so many large pictures is taken.
-const LARGE_STEP: usize = 3;
 /// What crops are read by, as the program calls it.
 const READERS: [&str; 7] = [
     "gip",
@@ -50,8 +48,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
          not rendered at that size is resampled by Pillow. Medians of rounds in which all take turns.\n",
     );
     let taken = bench.sample(if bench.quick { QUICK_PICTURES } else { PICTURES });
-    let large = bench.large.iter().step_by(LARGE_STEP).cloned().collect();
-    for (set, pictures) in [("Kodak", taken), ("large", large)] {
+    for (set, pictures) in [("Kodak", taken), ("large", bench.large_sample())] {
         if !pictures.is_empty() {
             text.push_str(&crops(bench, set, &pictures, run("crops.py"))?);
         }
