@@ -22,7 +22,7 @@ const QUICK_LARGE_PICTURES: usize = 1;
 /// How many large pictures are for what takes long.
 const FEW_LARGE_PICTURES: usize = 2;
 /// Iterations of the published methods.
-const ITERATIONS: u32 = 3_000;
+const ITERATIONS: u32 = 2_000;
 const QUICK_ITERATIONS: u32 = 1_000;
 
 /// Where the pictures are.

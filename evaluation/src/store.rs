@@ -10,6 +10,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::number::rounded;
 use crate::origins::{self, Origins};
+use crate::parallel;
 
 /// Whose measurements are made: they are valid for one machine and one version of what is measured.
 /// Rows of others stay in the files but are not used.
@@ -107,6 +108,30 @@ impl<const K: usize, const V: usize> Store<K, V> {
         self.rows.insert(key, values);
         Ok(values)
     }
+
+    /// The measurements of some jobs, in their order, each under its key. Those that are missing are made on all
+    /// cores at once, with one thread for each worker.
+    pub(crate) fn all<'j, W: Send, J: Sync>(
+        &mut self,
+        version: &str,
+        workers: &mut [W],
+        jobs: &'j [([&'j str; K], J)],
+        measure: impl Fn(&mut W, &J) -> Result<[f64; V]> + Sync,
+    ) -> Result<Vec<[f64; V]>> {
+        let missing = jobs.iter().filter(|(key, _)| self.known(version, *key).is_none());
+        let missing: Vec<_> = missing.collect();
+        let work = |worker: &mut W,
+                    (key, job): &&'j ([&'j str; K], J),
+                    emit: &mut dyn FnMut(([&'j str; K], [f64; V]))| {
+            emit((*key, measure(worker, job).with_context(|| key.join(", "))?));
+            Ok(())
+        };
+        parallel::for_each(workers, &missing, work, |(key, values)| {
+            self.get(version, key, || Ok(values)).map(|_| ())
+        })?;
+        let made = jobs.iter().map(|(key, _)| self.known(version, *key));
+        made.map(|values| values.context("it was measured above")).collect()
+    }
 }
 
 /// Sorts the rows of all stores of a folder, so that the same measurements are the same bytes in whatever
@@ -193,6 +218,28 @@ mod tests {
         assert_eq!(get(&mut again, "1", "a", 9.0), [0.1, f64::INFINITY]);
         assert_eq!(get(&mut again, "1", "b", 9.0), [9.0, f64::INFINITY]);
         assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 3);
+    }
+
+    #[test]
+    fn what_is_missing_is_measured_on_all_cores() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        get(&mut open(&path, "here"), "1", "b", 2.0);
+        let all = |store: &mut Store<2, 2>| {
+            let jobs =
+                [("a", 1.0), ("b", 9.0), ("c", 3.0)].map(|(image, value)| (["gip", image], value));
+            let measure = |(): &mut (), value: &f64| {
+                anyhow::ensure!(*value < 9.0, "it is known");
+                Ok([*value, f64::INFINITY])
+            };
+            let rows = store.all("1", &mut [(), ()], &jobs, measure).expect("it measures");
+            rows.iter().map(|row| row[0]).collect::<Vec<_>>()
+        };
+        assert_eq!(all(&mut open(&path, "here")), [1.0, 2.0, 3.0]);
+        assert_eq!(get(&mut open(&path, "here"), "1", "c", 9.0)[0], 3.0);
+        let refused = open(&path, "here")
+            .all("1", &mut [()], &[(["gip", "d"], ())], |_, ()| anyhow::bail!("no such codec"));
+        assert_eq!(format!("{:#}", refused.expect_err("it fails")), "gip, d: no such codec");
     }
 
     #[test]

@@ -90,12 +90,12 @@ def box_of(crop: Crop, x: float, y: float) -> tuple[float, float, float, float]:
 #: What makes crops, and the suffix of its files.
 READERS: dict[str, tuple[str, Callable[[bytes, Crop], Samples]]] = {
     "gip": ("gip", of_gip),
-    "gip, with texture": ("textured.gip", of_gip),
-    "JPEG, Pillow": ("jpeg", of_pillow),
-    "JPEG, Pillow, scaled": ("jpeg", of_draft),
-    "JPEG, simplejpeg, scaled": ("jpeg", of_simplejpeg),
-    "WebP, Pillow": ("webp", of_pillow),
-    "AVIF, Pillow": ("avif", of_pillow),
+    "gip with texture": ("textured.gip", of_gip),
+    "JPEG by Pillow": ("jpeg", of_pillow),
+    "JPEG by Pillow at a smaller scale": ("jpeg", of_draft),
+    "JPEG by simplejpeg at a smaller scale": ("jpeg", of_simplejpeg),
+    "WebP by Pillow": ("webp", of_pillow),
+    "AVIF by Pillow": ("avif", of_pillow),
 }
 
 

@@ -1,11 +1,12 @@
 //! Whether more bits, and more effort, give a picture that is no worse.
 
 use anyhow::Result;
-use image_gip::{ColorModel, Source, Target, Tune};
+use image_gip::{Target, Threads, Tune};
 
 use crate::bench::Bench;
 use crate::gip;
 use crate::pictures::{PictureSet, TestPicture};
+use crate::provenance::cores;
 use crate::store::Store;
 use crate::table::Table;
 
@@ -15,7 +16,7 @@ const TUNES: [(&str, Tune); 2] = [("visual", Tune::Visual), ("psnr", Tune::Psnr)
 const RATES: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.0];
 const QUICK_RATES: [f64; 3] = [0.25, 1.0, 2.0];
 /// One in so many pictures of a set is measured.
-const STEP: usize = 3;
+const STEP: usize = 4;
 const LARGE_STEP: usize = 6;
 /// What the PSNR may fall, in dB.
 const TOLERANCE: f64 = 0.1;
@@ -50,22 +51,31 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let keys = ["tune", "effort", "bpp", "image"];
     let mut store: Store<4, 3> = bench.store("monotony.csv", keys, ["bytes", "psnr", "quality"])?;
     let pictures: Vec<TestPicture> = bench.all_sets().into_iter().flat_map(part).collect();
-    let mut files = Vec::new();
-    for picture in &pictures {
-        for (name, tune) in TUNES {
-            let mut reached = Vec::new();
-            for effort in EFFORTS {
-                let of_effort = rates.iter().map(|&rate| {
-                    let key = [name, &effort.to_string(), &rate.to_string(), &picture.name];
-                    let [_, psnr, quality] =
-                        store.get(&bench.product, key, || encoded(picture, tune, effort, rate))?;
-                    Ok([psnr.min(EXACT), quality])
-                });
-                reached.push(of_effort.collect::<Result<Vec<_>>>()?);
-            }
-            files.push(Files { tune: name, picture: &picture.name, rates, reached });
-        }
-    }
+    let runs = pictures.iter().flat_map(|picture| TUNES.map(|tune| (picture, tune)));
+    let runs: Vec<(&TestPicture, (&str, Tune))> = runs.collect();
+    let settings = EFFORTS.iter().flat_map(|&effort| rates.iter().map(move |&rate| (effort, rate)));
+    let settings: Vec<((u8, f64), [String; 2])> = settings
+        .map(|(effort, rate)| ((effort, rate), [effort.to_string(), rate.to_string()]))
+        .collect();
+    let jobs = runs.iter().flat_map(|&(picture, (name, tune))| {
+        settings.iter().map(move |&((effort, rate), [ref of_effort, ref of_rate])| {
+            ([name, of_effort, of_rate, &picture.name], (picture, tune, effort, rate))
+        })
+    });
+    let jobs: Vec<_> = jobs.collect();
+    let mut threads = vec![(); cores()];
+    let rows =
+        store.all(&bench.product, &mut threads, &jobs, |(), &(picture, tune, effort, rate)| {
+            encoded(picture, tune, effort, rate)
+        })?;
+    let files =
+        runs.iter().zip(rows.chunks(settings.len())).map(|(&(picture, (tune, _)), rows)| {
+            let reached: Vec<[f64; 2]> =
+                rows.iter().map(|[_, psnr, quality]| [psnr.min(EXACT), *quality]).collect();
+            let reached = reached.chunks(rates.len()).map(<[_]>::to_vec).collect();
+            Files { tune, picture: &picture.name, rates, reached }
+        });
+    let files: Vec<Files<'_>> = files.collect();
     let mut falls: Vec<Fall<'_>> = files.iter().flat_map(Files::falls).collect();
     falls.sort_by(|a, b| b.by.total_cmp(&a.by));
     bench.figure("pictures", pictures.len() as f64, "pictures");
@@ -92,9 +102,8 @@ fn part(set: PictureSet) -> Vec<TestPicture> {
 
 /// Bytes, PSNR and quality of a file.
 fn encoded(picture: &TestPicture, tune: Tune, effort: u8, rate: f64) -> Result<[f64; 3]> {
-    let source = Source::new_u8(picture.width, picture.height, ColorModel::Rgb, &picture.rgb)?;
     let encoder = gip::encoder(effort).with_tune(tune).with_target(Target::BitsPerPixel(rate));
-    let encoded = encoder.encode(&source)?;
+    let encoded = gip::file(encoder, picture, Threads::One)?;
     let report = encoded.report;
     Ok([encoded.bytes.len() as f64, report.psnr.min(EXACT), report.quality])
 }

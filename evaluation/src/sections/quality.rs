@@ -3,11 +3,12 @@
 use anyhow::Result;
 use image_gip::Target;
 
-use super::codec_curves::setting;
-use super::rate_store::{Point, RateStore};
+use super::codec_curves::{EVERYWHERE, setting};
+use super::rate_store::{Point, RateStore, Wanted};
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
 use crate::gip;
+use crate::provenance::cores;
 use crate::table::{Table, mean};
 
 /// The qualities that the encoder is asked for.
@@ -21,6 +22,8 @@ type File = (String, Point);
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let qualities: &[f64] = if bench.quick { &QUICK_QUALITIES } else { &QUALITIES };
+    let targets: Vec<Target> = qualities.iter().map(|&quality| Target::Quality(quality)).collect();
+    let settings: Vec<String> = targets.iter().map(|&target| setting(target)).collect();
     let mut store = RateStore::open(bench)?;
     let sets = bench.sets();
     // For each set the files of each quality, and then all of them.
@@ -32,20 +35,24 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         gip::EFFORT
     );
     for set in &sets {
-        let mut of_set = Vec::new();
-        for (&quality, all) in qualities.iter().zip(&mut all) {
-            let mut files: Vec<File> = Vec::new();
-            for picture in &set.pictures {
-                let target = Target::Quality(quality);
-                let encoder = gip::plain_encoder(gip::EFFORT).with_target(target);
-                let setting = setting(target);
-                let point =
-                    store.ours(&bench.product, gip::PLAIN_NAME, &setting, encoder, picture)?;
-                files.push((picture.name.clone(), point));
-            }
-            all.extend_from_slice(&files);
-            of_set.push(files);
-        }
+        let wanted = Wanted {
+            version: &bench.product,
+            codec: gip::PLAIN_NAME,
+            settings: &settings,
+            pictures: &set.pictures,
+            until: EVERYWHERE.1,
+        };
+        let points = store.all(&wanted, &mut vec![(); cores()], |(), index, picture| {
+            Point::of_ours(gip::plain_encoder(gip::EFFORT).with_target(targets[index]), picture)
+        })?;
+        let files_of = |index: usize| {
+            let files = set.pictures.iter().zip(&points);
+            files
+                .map(|(picture, points)| (picture.name.clone(), points[index]))
+                .collect::<Vec<File>>()
+        };
+        let of_set: Vec<_> = (0..qualities.len()).map(files_of).collect();
+        all.iter_mut().zip(&of_set).for_each(|(all, files)| all.extend_from_slice(files));
         text.push_str(&format!("\n### Quality: {}\n{}", set.name, table(qualities, &of_set)));
     }
     if sets.len() > 1 {

@@ -15,7 +15,10 @@ use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than};
 use crate::curve::{Curve, bd_rate};
 use crate::gip::{self, MeasuredFile};
+use crate::parallel;
 use crate::pictures::TestPicture;
+use crate::provenance::cores;
+use crate::store::Store;
 use crate::table::{Table, decibels, mean, percent};
 
 /// Bits of a coordinate: the paper's, and enough for positions that are practically exact.
@@ -91,7 +94,7 @@ pub(super) fn measure(
     counts: &[u32],
     iterations: u32,
 ) -> Result<String> {
-    let mut store = bench.store(
+    let mut store: Store<4, 4> = bench.store(
         "ablation-quantizers.csv",
         ["quantizers", "iterations", "gaussians", "image"],
         ["bpp", "bits_per_gaussian", "psnr", "msssim"],
@@ -99,18 +102,34 @@ pub(super) fn measure(
     let iterations = ADAM_ITERATIONS * iterations;
     let mut rows = vec![Vec::new(); ALL.len()];
     for &count in counts {
-        let mut all = vec![Vec::new(); ALL.len()];
-        for picture in pictures {
-            // The fit that all rounded positions start from.
+        // Rounded positions share a fit, so all quantizers of a picture are one job.
+        let settings = [iterations, count].map(|number| number.to_string());
+        let known = |store: &Store<4, 4>, name: &str, picture: &str| {
+            store.known(&bench.product, [name, &settings[0], &settings[1], picture])
+        };
+        let jobs = pictures.iter().map(|picture| {
+            let mut missing = ALL.to_vec();
+            missing.retain(|(name, _)| known(&store, name, &picture.name).is_none());
+            (picture, missing)
+        });
+        let jobs: Vec<_> = jobs.collect();
+        let work = |(): &mut (),
+                    (picture, missing): &(&TestPicture, Vec<(&'static str, Quantizers)>),
+                    emit: &mut dyn FnMut((&'static str, String, [f64; 4]))| {
             let mut fine = None;
-            for ((name, quantizers), all) in ALL.iter().zip(&mut all) {
-                let key = [*name, &iterations.to_string(), &count.to_string(), &picture.name];
-                all.push(store.get(&bench.product, key, || {
-                    stored(*quantizers, count, iterations, picture, &mut fine)
-                })?);
+            for &(name, quantizers) in missing {
+                let values = stored(quantizers, count, iterations, picture, &mut fine)?;
+                emit((name, picture.name.clone(), values));
             }
-        }
-        for (row, all) in rows.iter_mut().zip(all) {
+            Ok(())
+        };
+        parallel::for_each(&mut vec![(); cores()], &jobs, work, |(name, picture, values)| {
+            let key = [name, &settings[0], &settings[1], &picture];
+            store.get(&bench.product, key, || Ok(values)).map(|_| ())
+        })?;
+        for (row, (name, _)) in rows.iter_mut().zip(ALL) {
+            let all = pictures.iter().filter_map(|picture| known(&store, name, &picture.name));
+            let all: Vec<[f64; 4]> = all.collect();
             let of = |column: usize| mean(all.iter().map(|one| one[column])).unwrap_or(f64::NAN);
             row.push(QuantizerMeans { rate: of(0), bits: of(1), psnr: of(2), ms_ssim: of(3) });
         }
@@ -189,7 +208,7 @@ fn stored(
             .with_target(Target::Gaussians(count))
             .with_training(training(iterations, positions, colors, picture))
             .with_precision(Precision::Packed);
-        gip::encode(encoder, picture, Threads::Pool)
+        gip::encode(encoder, picture, Threads::One)
     };
     let trained;
     let measured = match quantizers {

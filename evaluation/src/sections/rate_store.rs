@@ -79,20 +79,6 @@ impl RateStore {
         Ok(Self(bench.store("rate.csv", ["codec", "quality", "image"], values)?))
     }
 
-    /// A file of ours. `name` and `setting` tell this encoder from all others.
-    pub(super) fn ours(
-        &mut self,
-        version: &str,
-        name: &str,
-        setting: &str,
-        encoder: Encoder,
-        picture: &TestPicture,
-    ) -> Result<Point> {
-        let key = [name, setting, &picture.name];
-        let values = self.0.get(version, key, || Ok(Point::of_ours(encoder, picture)?.values()))?;
-        Ok(values.into())
-    }
-
     pub(super) fn baseline(
         &mut self,
         worker: &mut Worker,

@@ -1,7 +1,7 @@
 //! Texture: what figures that see it say, beside those that compare pixel by pixel, and what people
 //! chose.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use image_gip::Encoder;
 
 use crate::bench::{Bench, timing_version};
@@ -11,7 +11,6 @@ use crate::contents::Contents;
 use crate::gip;
 use crate::local_statistics::{deviation_error, wasserstein_distortion};
 use crate::metric::Metric;
-use crate::parallel;
 use crate::pictures::{Distortion, PictureSet, TestPicture};
 use crate::store::Store;
 use crate::table::{Table, mean};
@@ -146,44 +145,18 @@ impl FigureStore {
         show: impl Fn(&mut W, usize, usize) -> Result<Version> + Sync,
     ) -> Result<Vec<Vec<Figures>>> {
         let pictures = &set.pictures;
-        let all = (0..rates.len()).flat_map(|rate| (0..pictures.len()).map(move |of| (rate, of)));
-        let is_missing = |&(rate, of): &(usize, usize)| {
-            self.known(version, codec, rates[rate], &pictures[of]).is_none()
-        };
-        let jobs: Vec<(usize, usize)> = all.filter(is_missing).collect();
-        let work = |worker: &mut W,
-                    &(rate, of): &(usize, usize),
-                    emit: &mut dyn FnMut((usize, usize, Figures))| {
-            let context = || format!("{codec}, {} bpp, {}", rates[rate], pictures[of].name);
-            let version = show(worker, rate, of).with_context(context)?;
-            emit((rate, of, Figures::of(&pictures[of], &version)?));
-            Ok(())
-        };
-        parallel::for_each(workers, &jobs, work, |(rate, of, figures)| {
-            let key = [codec, &key(rates[rate]), &pictures[of].name];
-            self.0.get(version, key, || Ok(figures.values())).map(|_| ())
+        let names: Vec<String> = rates.iter().map(|rate| format!("{rate} bpp")).collect();
+        let jobs = names.iter().enumerate().flat_map(|(rate, name)| {
+            let of_rate = pictures.iter().enumerate();
+            of_rate.map(move |(of, picture)| ([codec, name, &picture.name], (rate, of)))
+        });
+        let jobs: Vec<_> = jobs.collect();
+        let rows = self.0.all(version, workers, &jobs, |worker, &(rate, of)| {
+            Ok(Figures::of(&pictures[of], &show(worker, rate, of)?)?.values())
         })?;
-        let of_rate = |&rate: &f64| {
-            let figures = pictures.iter().map(|picture| self.known(version, codec, rate, picture));
-            figures.map(|figures| figures.context("it was measured above")).collect()
-        };
-        rates.iter().map(of_rate).collect()
+        let of_rates = rows.chunks(pictures.len());
+        Ok(of_rates.map(|rows| rows.iter().map(|&row| row.into()).collect()).collect())
     }
-
-    fn known(
-        &self,
-        version: &str,
-        codec: &str,
-        rate: f64,
-        picture: &TestPicture,
-    ) -> Option<Figures> {
-        self.0.known(version, [codec, &key(rate), &picture.name]).map(Figures::from)
-    }
-}
-
-/// What the CSV calls a rate.
-fn key(rate: f64) -> String {
-    format!("{rate} bpp")
 }
 
 /// A codec on all pictures of a set.

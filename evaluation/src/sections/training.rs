@@ -18,12 +18,12 @@ const QUICK_PICTURES: usize = 1;
 /// What crops are read by, as the program calls it.
 const READERS: [&str; 7] = [
     "gip",
-    "gip, with texture",
-    "JPEG, Pillow",
-    "JPEG, Pillow, scaled",
-    "JPEG, simplejpeg, scaled",
-    "WebP, Pillow",
-    "AVIF, Pillow",
+    "gip with texture",
+    "JPEG by Pillow",
+    "JPEG by Pillow at a smaller scale",
+    "JPEG by simplejpeg at a smaller scale",
+    "WebP by Pillow",
+    "AVIF by Pillow",
 ];
 /// What a network learns from.
 const LEARNED: [&str; 3] = ["the pictures", "gip", "JPEG"];
@@ -72,15 +72,20 @@ fn crops(
     let mut measured = Measured::new(command);
     let mut table =
         Table::new(&["", "SSIMULACRA2", "bytes", "crops a second", "with two processes"]);
-    let mut ours = f64::NAN;
+    let mut ours = [f64::NAN; 2];
     for reader in READERS {
         let key = [set, &pictures.len().to_string(), reader];
         let [ssimulacra2, bytes, one, two] =
             store.get(&bench.product, key, || measured.row(reader))?;
         // The first reader is ours.
-        ours = if ours.is_nan() { one } else { ours };
-        bench.figure(format!("{set}/{reader}/crops"), one, "crops a second");
-        bench.figure(format!("{set}/{reader}/ours to theirs"), ours / one, "");
+        ours = if ours[0].is_nan() { [one, bytes] } else { ours };
+        let figure = |name: &str, value: f64, unit: &str| {
+            bench.figure(format!("{reader}/{set}/{name}"), value, unit);
+        };
+        figure("crops a second", one, "");
+        figure("bytes", bytes, "");
+        figure("our crops to theirs", ours[0] / one, "");
+        figure("their bytes to ours", bytes / ours[1], "");
         let numbers = [format!("{ssimulacra2:.1}"), format!("{bytes:.0}"), format!("{one:.0}")];
         table.row(&[&[reader.to_owned()], &numbers[..], &[format!("{two:.0}")]].concat());
     }
@@ -112,6 +117,7 @@ fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
             // Without a file, they are the same for each quality.
             if bytes > 0.0 || index == 0 {
                 bench.figure(format!("{learned}/{quality}/accuracy"), accuracies[0], "%");
+                bench.figure(format!("{learned}/{quality}/bytes"), bytes, "");
                 let bytes = if bytes > 0.0 { format!("{bytes:.0}") } else { "-".into() };
                 let accuracies = accuracies.map(|accuracy| format!("{accuracy:.1}"));
                 table.row(&[&[learned.to_owned(), bytes], &accuracies[..]].concat());

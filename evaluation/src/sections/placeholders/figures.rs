@@ -1,13 +1,11 @@
 //! Placeholders in figures, set by set.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
-use super::codecs::{BUDGETS, Codec, Placeholders};
-use crate::baselines::Worker;
+use super::codecs::{BUDGETS, Codec};
 use crate::bench::Bench;
 use crate::gip;
-use crate::parallel;
-use crate::pictures::{PictureSet, TestPicture};
+use crate::pictures::PictureSet;
 use crate::store::Store;
 use crate::table::{Table, mean, median};
 
@@ -75,34 +73,21 @@ fn figures(
         Codec::ThumbHash | Codec::BlurHash => "as in Cargo.lock".to_owned(),
         Codec::Baseline(_) => bench.baselines()?.1,
     };
-    let known = |store: &Store<2, 12>, picture: &TestPicture| {
-        store.known(&version, [codec.name(), &picture.name])
-    };
     let count = if bench.quick { QUICK_PICTURES } else { usize::MAX };
     let taken = &set.pictures[..count.min(set.pictures.len())];
-    let missing = taken.iter().filter(|picture| known(store, picture).is_none());
-    let jobs: Vec<&TestPicture> = missing.collect();
+    let jobs = taken.iter().map(|picture| ([codec.name(), picture.name.as_str()], picture));
+    let jobs: Vec<_> = jobs.collect();
     let scratch = bench.path("");
     let (workers, _) = bench.workers()?;
-    let work = |worker: &mut Worker,
-                picture: &&TestPicture,
-                emit: &mut dyn FnMut((String, Placeholders))| {
-        let context = || format!("{}, {}", codec.name(), picture.name);
-        let placeholders = codec.placeholders(worker, &scratch, picture).with_context(context)?;
-        emit((picture.name.clone(), placeholders));
-        Ok(())
-    };
-    parallel::for_each(workers, &jobs, work, |(picture, placeholders)| {
-        let figures = placeholders.map(|placeholder| {
+    let rows = store.all(&version, workers, &jobs, |worker, picture| {
+        let figures = codec.placeholders(worker, &scratch, picture)?.map(|placeholder| {
             placeholder
                 .map_or([f64::NAN; 3], |found| [found.bytes as f64, found.ssimulacra2, found.psnr])
         });
-        let values = figures.as_flattened().try_into().expect("as many as columns");
-        store.get(&version, [codec.name(), &picture], || Ok(values)).map(|_| ())
+        Ok(figures.as_flattened().try_into().expect("as many as columns"))
     })?;
     let mut at_budgets = vec![Vec::new(); BUDGETS.len()];
-    for picture in taken {
-        let values = known(store, picture).context("it was measured above")?;
+    for values in rows {
         for (all, figures) in at_budgets.iter_mut().zip(values.as_chunks().0) {
             all.push(*figures);
         }
