@@ -17,13 +17,13 @@ use crate::table::{Table, mean, percent};
 
 /// Number of Gaussians, except for the curves of bit depths.
 const GAUSSIANS: u32 = 5_000;
-const QUICK_GAUSSIANS: u32 = 2_500;
+const QUICK_GAUSSIANS: u32 = 1_500;
 /// Numbers of Gaussians for the curves of bit depths.
 const CURVE: [u32; 4] = [1_500, 2_500, 4_000, 6_500];
-const QUICK_CURVE: [u32; 2] = [1_500, 3_500];
+const QUICK_CURVE: [u32; 2] = [1_000, 2_000];
 /// Iterations of our encoder for bit depths and seeds.
 const OWN_ITERATIONS: u32 = 320;
-const QUICK_OWN_ITERATIONS: u32 = 150;
+const QUICK_OWN_ITERATIONS: u32 = 100;
 /// How many pictures: for components and seeds, and for the tables with more settings.
 const PICTURES: usize = 4;
 const FEWER_PICTURES: usize = 2;

@@ -91,10 +91,10 @@ fn steps(set: &str) -> [usize; 2] {
 /// Other ways to run our encoder are there for a comparison with ours, for which fewer rates do.
 const VARIANT_STEP: usize = 2;
 
-/// Beyond the highest range nothing is compared.
+/// Beyond the highest range nothing is compared, and a quick run has no time for files that large.
 fn extent(quick: bool, step: usize) -> Extent {
-    let all = Extent::new(quick);
-    Extent { step: all.step.max(step), until: HIGH.rates.1 }
+    let (all, (low, high)) = (Extent::new(quick), HIGH.rates);
+    Extent { step: all.step.max(step), until: if quick { low } else { high } }
 }
 
 /// These are measured on the first set alone.

@@ -9,7 +9,7 @@ use crate::store::Store;
 use crate::table::{Table, mean, median};
 use crate::{gip, memory};
 
-const QUICK_EFFORTS: [u8; 3] = [1, 3, 5];
+const QUICK_EFFORTS: [u8; 2] = [1, gip::EFFORT];
 /// An encoding is timed so often, or until all of its runs have taken so many seconds.
 const RUNS: usize = 5;
 const SECONDS: f64 = 4.0;

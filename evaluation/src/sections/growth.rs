@@ -11,11 +11,11 @@ use crate::{gip, memory};
 
 /// Sizes in megapixels, and how many Gaussians each megapixel gets.
 const MEGAPIXELS: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0];
-const QUICK_MEGAPIXELS: [f64; 3] = [0.1, 0.5, 2.0];
+const QUICK_MEGAPIXELS: [f64; 2] = [0.1, 0.5];
 const DENSITY: f64 = 12_500.0;
 /// Numbers of Gaussians on one megapixel.
 const GAUSSIANS: [u32; 8] = [1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000];
-const QUICK_GAUSSIANS: [u32; 3] = [1_000, 5_000, 25_000];
+const QUICK_GAUSSIANS: [u32; 2] = [1_000, 5_000];
 /// The effort with which growth is measured: it only scales the number of iterations.
 const GROWTH_EFFORT: u8 = 1;
 

@@ -22,7 +22,7 @@ use crate::versions::{self, Version};
 
 /// How many pictures of each set.
 const PICTURES: usize = 6;
-const QUICK_PICTURES: usize = 2;
+const QUICK_PICTURES: usize = 1;
 /// The most pixels of a picture: a larger one, of the screenshots, is left out.
 const MOST_PIXELS: f64 = 2e6;
 /// Sides are cut to multiples of this, so that every size is exact.

@@ -20,8 +20,8 @@ use crate::versions::nearest;
 const RATE: f64 = 0.5;
 /// How many pictures are coded.
 const PICTURES: usize = 8;
-const QUICK_PICTURES: usize = 2;
-const QUICK_EFFORTS: [u8; 4] = [1, 3, 5, 7];
+const QUICK_PICTURES: usize = 1;
+const QUICK_EFFORTS: [u8; 2] = [1, gip::EFFORT];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
 

@@ -39,7 +39,11 @@ pub(super) fn claims(comparisons: &[Comparison]) -> String {
     if !others.is_empty() {
         let each = RANGES.map(|range| {
             let (outcome, _) = of(&others, anchor, METRIC, range);
-            format!("{} at {} rates", percent(outcome.mean), range.name)
+            let Outcome { mean, won, compared, .. } = outcome;
+            if compared == 0 {
+                return format!("nothing to compare at {} rates", range.name);
+            }
+            format!("{} at {} rates ({won} of {compared} won)", percent(mean), range.name)
         });
         text.push_str(&format!(
             "- **Screenshots**: our files against {anchor}, at equal {}: {}.\n",
