@@ -23,7 +23,7 @@ const QUICK_LARGE_PICTURES: usize = 1;
 const FEW_LARGE_PICTURES: usize = 2;
 /// Iterations of the published methods.
 const ITERATIONS: u32 = 2_000;
-const QUICK_ITERATIONS: u32 = 500;
+const QUICK_ITERATIONS: u32 = 300;
 
 /// Where the pictures are.
 #[derive(Debug, clap::Args)]

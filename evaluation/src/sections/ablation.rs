@@ -23,7 +23,7 @@ const CURVE: [u32; 4] = [1_500, 2_500, 4_000, 6_500];
 const QUICK_CURVE: [u32; 2] = [1_000, 2_000];
 /// Iterations of our encoder for bit depths and seeds.
 const OWN_ITERATIONS: u32 = 320;
-const QUICK_OWN_ITERATIONS: u32 = 100;
+const QUICK_OWN_ITERATIONS: u32 = 50;
 /// How many pictures: for components and seeds, and for the tables with more settings.
 const PICTURES: usize = 4;
 const FEWER_PICTURES: usize = 2;
