@@ -22,6 +22,8 @@ pub(crate) const PLAIN_NAME: &str = "gip --texture 0";
 pub(crate) const EFFORT: u8 = 4;
 /// All efforts.
 pub(crate) const EFFORTS: [u8; 7] = [1, 2, 3, 4, 5, 6, 7];
+/// Those of a quick run.
+pub(crate) const QUICK_EFFORTS: [u8; 2] = [1, EFFORT];
 /// The seed of everything random in the encoder.
 pub(crate) const SEED: u64 = 0;
 /// Decoding is timed as the median of this many.

@@ -6,6 +6,13 @@ use std::thread;
 
 use anyhow::Result;
 
+use crate::provenance::cores;
+
+/// Workers that need nothing but a thread, one for each core.
+pub(crate) fn threads() -> Vec<()> {
+    vec![(); cores()]
+}
+
 /// Does jobs with one thread for each worker. `work` emits results one by one, and `keep` gets them
 /// on the caller's thread in the order in which they are made, which differs from run to run. After
 /// a failure no further job begins; what was made until then is kept.

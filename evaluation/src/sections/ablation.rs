@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use image_gip::training::Training;
-use image_gip::{Encoded, Encoder, Parameterization, Precision, Target, Threads};
+use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
 use super::methods::{self, PARAMETERIZATIONS};
 use super::quantizers;
@@ -10,8 +10,8 @@ use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than, list_or_none};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
+use crate::parallel;
 use crate::pictures::TestPicture;
-use crate::provenance::cores;
 use crate::store::Store;
 use crate::table::{Table, mean, percent};
 
@@ -298,13 +298,12 @@ impl Ablation<'_> {
         let jobs = self.pictures.iter();
         let jobs = jobs.map(|picture| ([variant, &rounds, &count, &picture.name], picture));
         let jobs: Vec<_> = jobs.collect();
-        let (version, threads) = (&self.bench.product, &mut vec![(); cores()]);
+        let (version, threads) = (&self.bench.product, &mut parallel::threads());
         let rows = self.store.all(version, threads, &jobs, |(), picture| {
             let encoder = encoder.clone().with_target(Target::Gaussians(gaussians));
-            let Encoded { bytes, report, .. } = gip::file(encoder, picture, Threads::One)?;
-            let decoded = gip::decode(&bytes, Threads::One)?;
-            let ms_ssim = picture.distortion(&decoded)?.ms_ssim;
-            Ok([picture.rate(bytes.len() as f64), report.psnr_float, ms_ssim])
+            let measured = gip::encode(encoder, picture, Threads::One)?;
+            let (report, ms_ssim) = (&measured.report, measured.distortion.ms_ssim);
+            Ok([picture.rate(measured.bytes), report.psnr_float, ms_ssim])
         })?;
         let of = |column: usize| mean(rows.iter().map(|row| row[column])).unwrap_or(f64::NAN);
         Ok(VariantMeans { rate: of(0), psnr: of(1), ms_ssim: of(2) })

@@ -8,17 +8,17 @@ use crate::baselines::{Baseline, Worker};
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::metric::Metric;
+use crate::parallel;
 use crate::pictures::TestPicture;
-use crate::provenance;
 use crate::table::mean;
 
 /// A way to run our encoder that gets curves of its own.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Variant {
+pub(super) struct Variant<'a> {
     pub(super) name: &'static str,
     pub(super) encoder: fn(u8) -> Encoder,
     /// What it is asked for, from small files to large ones.
-    pub(super) targets: &'static [Target],
+    pub(super) targets: &'a [Target],
 }
 
 /// Rates to ask an encoder for: two or three in each of the ranges that are compared.
@@ -33,7 +33,7 @@ const RATES: &[Target] = &[
 ];
 
 /// Our encoder as it is by default, and then other ways to run it.
-pub(super) const OURS: [Variant; 3] = [
+pub(super) const OURS: [Variant<'static>; 3] = [
     Variant { name: gip::NAME, encoder: gip::encoder, targets: RATES },
     Variant { name: gip::PLAIN_NAME, encoder: gip::plain_encoder, targets: RATES },
     Variant { name: gip::PSNR_NAME, encoder: gip::psnr_encoder, targets: RATES },
@@ -64,7 +64,7 @@ impl Extent {
     }
 }
 
-impl Variant {
+impl Variant<'_> {
     /// What the encoder is asked for, in the words of the stored measurements.
     pub(super) fn settings(&self) -> Vec<String> {
         self.targets.iter().map(|&target| setting(target)).collect()
@@ -99,7 +99,7 @@ impl Codec {
     pub(super) fn ours(
         store: &mut RateStore,
         version: &str,
-        variant: &Variant,
+        variant: &Variant<'_>,
         pictures: &[TestPicture],
         extent: Extent,
     ) -> Result<Self> {
@@ -107,7 +107,7 @@ impl Codec {
         let settings = extent.chosen(&variant.settings());
         let (codec, until) = (variant.name, extent.until);
         let wanted = Wanted { version, codec, settings: &settings, pictures, until };
-        let mut threads = vec![(); provenance::cores()];
+        let mut threads = parallel::threads();
         let points = store.all(&wanted, &mut threads, |(), index, picture| {
             let encoder = (variant.encoder)(gip::EFFORT).with_target(targets[index]);
             Point::of_ours(encoder, picture)

@@ -60,7 +60,7 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
         comparisons.push(Comparison { set, ours, others });
     }
     for Comparison { set, others, .. } in &mut comparisons {
-        let of_set = |variant: &&Variant| is_in(set.name, variant.name);
+        let of_set = |variant: &&Variant<'_>| is_in(set.name, variant.name);
         for variant in variants.iter().filter(of_set) {
             let extent = extent(quick, VARIANT_STEP);
             others.push(Codec::ours(store, &product, variant, &set.pictures, extent)?);

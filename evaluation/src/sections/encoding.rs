@@ -9,7 +9,6 @@ use crate::store::Store;
 use crate::table::{Table, mean, median};
 use crate::{gip, memory};
 
-const QUICK_EFFORTS: [u8; 2] = [1, gip::EFFORT];
 /// An encoding is timed so often, or until all of its runs have taken so many seconds.
 const RUNS: usize = 5;
 const SECONDS: f64 = 4.0;
@@ -48,7 +47,7 @@ pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64)
 }
 
 fn set(bench: &Bench, name: &str, pictures: &[TestPicture], rate: f64) -> Result<String> {
-    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
+    let efforts: &[u8] = if bench.quick { &gip::QUICK_EFFORTS } else { &gip::EFFORTS };
     let mut store: EncodingStore = bench.store(
         "encoding.csv",
         ["effort", "image"],

@@ -5,8 +5,8 @@ use image_gip::{Target, Threads, Tune};
 
 use crate::bench::Bench;
 use crate::gip;
+use crate::parallel;
 use crate::pictures::{PictureSet, TestPicture};
-use crate::provenance::cores;
 use crate::store::Store;
 use crate::table::Table;
 
@@ -63,11 +63,12 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         })
     });
     let jobs: Vec<_> = jobs.collect();
-    let mut threads = vec![(); cores()];
-    let rows =
-        store.all(&bench.product, &mut threads, &jobs, |(), &(picture, tune, effort, rate)| {
-            encoded(picture, tune, effort, rate)
-        })?;
+    let rows = store.all(
+        &bench.product,
+        &mut parallel::threads(),
+        &jobs,
+        |(), &(picture, tune, effort, rate)| encoded(picture, tune, effort, rate),
+    )?;
     let files =
         runs.iter().zip(rows.chunks(settings.len())).map(|(&(picture, (tune, _)), rows)| {
             let reached: Vec<[f64; 2]> =

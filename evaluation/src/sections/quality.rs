@@ -3,12 +3,11 @@
 use anyhow::Result;
 use image_gip::Target;
 
-use super::codec_curves::{EVERYWHERE, setting};
-use super::rate_store::{Point, RateStore, Wanted};
+use super::codec_curves::{Codec, EVERYWHERE, Extent, Variant};
+use super::rate_store::{Point, RateStore};
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
 use crate::gip;
-use crate::provenance::cores;
 use crate::table::{Table, mean};
 
 /// The qualities that the encoder is asked for.
@@ -23,7 +22,8 @@ type File = (String, Point);
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let qualities: &[f64] = if bench.quick { &QUICK_QUALITIES } else { &QUALITIES };
     let targets: Vec<Target> = qualities.iter().map(|&quality| Target::Quality(quality)).collect();
-    let settings: Vec<String> = targets.iter().map(|&target| setting(target)).collect();
+    let variant = Variant { name: gip::PLAIN_NAME, encoder: gip::plain_encoder, targets: &targets };
+    let extent = Extent { step: 1, until: EVERYWHERE.1 };
     let mut store = RateStore::open(bench)?;
     let sets = bench.sets();
     // For each set the files of each quality, and then all of them.
@@ -35,18 +35,9 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         gip::EFFORT
     );
     for set in &sets {
-        let wanted = Wanted {
-            version: &bench.product,
-            codec: gip::PLAIN_NAME,
-            settings: &settings,
-            pictures: &set.pictures,
-            until: EVERYWHERE.1,
-        };
-        let points = store.all(&wanted, &mut vec![(); cores()], |(), index, picture| {
-            Point::of_ours(gip::plain_encoder(gip::EFFORT).with_target(targets[index]), picture)
-        })?;
+        let codec = Codec::ours(&mut store, &bench.product, &variant, &set.pictures, extent)?;
         let files_of = |index: usize| {
-            let files = set.pictures.iter().zip(&points);
+            let files = set.pictures.iter().zip(&codec.points);
             files
                 .map(|(picture, points)| (picture.name.clone(), points[index]))
                 .collect::<Vec<File>>()

@@ -1,7 +1,7 @@
 //! What stores positions and colours: the paper's table of quantizers, and what rounding costs that
 //! training does not know of.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use anyhow::Result;
 use half::f16;
@@ -17,8 +17,6 @@ use crate::curve::{Curve, bd_rate};
 use crate::gip::{self, MeasuredFile};
 use crate::parallel;
 use crate::pictures::TestPicture;
-use crate::provenance::cores;
-use crate::store::Store;
 use crate::table::{Table, decibels, mean, percent};
 
 /// Bits of a coordinate: the paper's, and enough for positions that are practically exact.
@@ -94,7 +92,7 @@ pub(super) fn measure(
     counts: &[u32],
     iterations: u32,
 ) -> Result<String> {
-    let mut store: Store<4, 4> = bench.store(
+    let mut store = bench.store(
         "ablation-quantizers.csv",
         ["quantizers", "iterations", "gaussians", "image"],
         ["bpp", "bits_per_gaussian", "psnr", "msssim"],
@@ -102,34 +100,20 @@ pub(super) fn measure(
     let iterations = ADAM_ITERATIONS * iterations;
     let mut rows = vec![Vec::new(); ALL.len()];
     for &count in counts {
-        // Rounded positions share a fit, so all quantizers of a picture are one job.
         let settings = [iterations, count].map(|number| number.to_string());
-        let known = |store: &Store<4, 4>, name: &str, picture: &str| {
-            store.known(&bench.product, [name, &settings[0], &settings[1], picture])
-        };
-        let jobs = pictures.iter().map(|picture| {
-            let mut missing = ALL.to_vec();
-            missing.retain(|(name, _)| known(&store, name, &picture.name).is_none());
-            (picture, missing)
-        });
-        let jobs: Vec<_> = jobs.collect();
-        let work = |(): &mut (),
-                    (picture, missing): &(&TestPicture, Vec<(&'static str, Quantizers)>),
-                    emit: &mut dyn FnMut((&'static str, String, [f64; 4]))| {
-            let mut fine = None;
-            for &(name, quantizers) in missing {
-                let values = stored(quantizers, count, iterations, picture, &mut fine)?;
-                emit((name, picture.name.clone(), values));
-            }
-            Ok(())
-        };
-        parallel::for_each(&mut vec![(); cores()], &jobs, work, |(name, picture, values)| {
-            let key = [name, &settings[0], &settings[1], &picture];
-            store.get(&bench.product, key, || Ok(values)).map(|_| ())
-        })?;
-        for (row, (name, _)) in rows.iter_mut().zip(ALL) {
-            let all = pictures.iter().filter_map(|picture| known(&store, name, &picture.name));
-            let all: Vec<[f64; 4]> = all.collect();
+        // For each picture the fit that all rounded positions start from.
+        let fine: Vec<Mutex<Option<MeasuredFile>>> =
+            pictures.iter().map(|_| Mutex::default()).collect();
+        for (row, (name, quantizers)) in rows.iter_mut().zip(ALL) {
+            let jobs = pictures.iter().zip(&fine).map(|(picture, fine)| {
+                ([name, &settings[0], &settings[1], &picture.name], (picture, fine))
+            });
+            let jobs: Vec<_> = jobs.collect();
+            let threads = &mut parallel::threads();
+            let all = store.all(&bench.product, threads, &jobs, |(), (picture, fine)| {
+                let mut fine = fine.lock().expect("no fit panics");
+                stored(quantizers, count, iterations, picture, &mut fine)
+            })?;
             let of = |column: usize| mean(all.iter().map(|one| one[column])).unwrap_or(f64::NAN);
             row.push(QuantizerMeans { rate: of(0), bits: of(1), psnr: of(2), ms_ssim: of(3) });
         }

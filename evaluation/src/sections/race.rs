@@ -13,7 +13,6 @@ use crate::visual;
 
 /// What takes longer has lost.
 const EFFORTS: [u8; 4] = [1, 2, 3, 4];
-const QUICK_EFFORTS: [u8; 2] = [1, 4];
 /// Both are timed in turns, so that other work on the machine slows both down alike: so many times, or until ours have
 /// taken so many seconds.
 const ROUNDS: usize = 5;
@@ -101,7 +100,7 @@ fn races(bench: &mut Bench, set: &str, pictures: &[TestPicture]) -> Result<Strin
         ["bytes", "level", "effort", "seconds", "other_seconds"],
     )?;
     let quick = bench.quick;
-    let efforts: &[u8] = if quick { &QUICK_EFFORTS } else { &EFFORTS };
+    let efforts: &[u8] = if quick { &gip::QUICK_EFFORTS } else { &EFFORTS };
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let version = timing_version(&product, &versions);

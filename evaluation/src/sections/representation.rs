@@ -2,15 +2,15 @@
 
 use anyhow::Result;
 use image_gip::training::Training;
-use image_gip::{Encoded, Encoder, Parameterization, Precision, Target, Threads};
+use image_gip::{Encoder, Parameterization, Precision, Target, Threads};
 
 use super::printed::paper::{self, PrintedFit};
 use super::{methods, two_level};
 use crate::bench::Bench;
 use crate::comparison::{Better, NamedFigures, better_than};
 use crate::gip;
+use crate::parallel;
 use crate::pictures::TestPicture;
-use crate::provenance::cores;
 use crate::store::Store;
 use crate::table::{Table, mean};
 
@@ -191,12 +191,12 @@ fn as_long_as_the_paper(
             if !bench.is_long && jobs.iter().any(is_missing) {
                 return Ok(String::new());
             }
-            let mut threads = vec![(); cores()];
-            let all = long.all(&bench.product, &mut threads, &jobs, |(), picture| {
-                let encoder = published_encoder(training, count);
-                let Encoded { bytes, report, .. } = gip::file(encoder, picture, Threads::One)?;
-                Ok([report.psnr_float, gip::distortion(&bytes, picture)?.ms_ssim])
-            })?;
+            let all =
+                long.all(&bench.product, &mut parallel::threads(), &jobs, |(), picture| {
+                    let encoder = published_encoder(training, count);
+                    let measured = gip::encode(encoder, picture, Threads::One)?;
+                    Ok([measured.report.psnr_float, measured.distortion.ms_ssim])
+                })?;
             row(name, &all);
         }
         tables.push_str(&format!("\n{count} Gaussians:\n{}", table.finish()));

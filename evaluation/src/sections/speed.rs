@@ -21,7 +21,6 @@ const RATE: f64 = 0.5;
 /// How many pictures are coded.
 const PICTURES: usize = 8;
 const QUICK_PICTURES: usize = 1;
-const QUICK_EFFORTS: [u8; 2] = [1, gip::EFFORT];
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
 
@@ -104,7 +103,7 @@ fn measure_all(bench: &mut Bench) -> Result<Vec<CodecRow>> {
     let mut store = bench.store("speed.csv", keys, columns)?;
     let mut files = RateStore::open(bench)?;
     let pictures = pictures(bench);
-    let efforts: &[u8] = if bench.quick { &QUICK_EFFORTS } else { &gip::EFFORTS };
+    let efforts: &[u8] = if bench.quick { &gip::QUICK_EFFORTS } else { &gip::EFFORTS };
     let product = bench.product.clone();
     let (worker, versions) = bench.baselines()?;
     let mut rows = Vec::new();

@@ -17,7 +17,7 @@ use crate::sections::rate_store::RateStore;
 use crate::table::{Table, decibels, median, percent};
 
 /// Ours, in that convention: one multiplier of the rate for all pictures.
-const OURS: Variant =
+const OURS: Variant<'static> =
     Variant { name: gip::PSNR_NAME, encoder: gip::psnr_encoder, targets: LAMBDAS };
 /// From about 0.1 to 2 bits per pixel.
 const LAMBDAS: &[Target] = &[
