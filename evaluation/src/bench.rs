@@ -245,6 +245,11 @@ impl Bench {
         self.figures.borrow_mut().add(name.into(), value, unit);
     }
 
+    /// The figures that sections have written.
+    pub(crate) fn written_figures(&self) -> Result<Figures> {
+        Figures::load(&self.folder)
+    }
+
     /// Writes the figures that were named, in place of all that the section had.
     pub(crate) fn write_figures(&self, section: &str) -> Result<()> {
         mem::take(&mut *self.figures.borrow_mut()).update(&self.folder, section)

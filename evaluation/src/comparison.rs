@@ -37,9 +37,12 @@ pub(crate) fn better_than(
     format!("\nBetter than {subject} {}.\n", clauses.join("; "))
 }
 
-/// The names separated by commas, or the words that there are none.
+/// The names separated by commas, or the words that there are none. Names that have commas themselves
+/// are quoted.
 pub(crate) fn list_or_none<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let names: Vec<&str> = names.collect();
+    let quoted = |name: &str| format!("\"{name}\"");
+    let names = names.map(|name| if name.contains(',') { quoted(name) } else { name.to_owned() });
+    let names: Vec<String> = names.collect();
     if names.is_empty() { "none of these".to_owned() } else { names.join(", ") }
 }
 
@@ -61,5 +64,6 @@ mod tests {
         assert_eq!(text, "\nBetter than ours in PSNR: a, c; in time: b.\n");
         let text = better_than(&figures, &row("ours", [32.0, 0.5]), &others);
         assert_eq!(text, "\nBetter than ours in PSNR, time: none of these.\n");
+        assert_eq!(list_or_none(["a, 1", "b"].into_iter()), "\"a, 1\", b");
     }
 }

@@ -6,6 +6,9 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde::Deserialize;
 
+/// The class of pictures among photographs that no camera made.
+pub(crate) const RENDERED: &str = "rendered";
+
 /// The class of content of each picture: textured, smooth, text, face, or whatever names are given.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents(BTreeMap<String, String>);

@@ -58,7 +58,8 @@ const COLORS: [RGBColor; 9] = [
 ];
 
 impl Plot<'_> {
-    /// Writes the series, each as points joined by lines.
+    /// Writes the series, each as points joined by lines, in the colour of its place. Those without points have
+    /// a place alone.
     pub(crate) fn write(&self, path: &Path, series: &[Series]) -> Result<()> {
         let points = || series.iter().flat_map(|series| &series.points);
         let mut x = range(points().map(|point| point.0), self.x.1);
@@ -101,9 +102,14 @@ impl Plot<'_> {
             .x_label_formatter(&label)
             .y_label_formatter(&label)
             .light_line_style(WHITE)
+            .x_labels(labels(self.x.1))
+            .y_labels(labels(self.y.1))
             .draw()
             .map_err(|error| failed(&error))?;
         for (index, series) in series.iter().enumerate() {
+            if series.points.is_empty() {
+                continue;
+            }
             let color = COLORS[index % COLORS.len()];
             let line = LineSeries::new(series.points.iter().copied(), color.stroke_width(2));
             chart
@@ -126,6 +132,14 @@ impl Plot<'_> {
             .draw()
             .map_err(|error| failed(&error))?;
         canvas.present().map_err(|error| failed(&error))
+    }
+}
+
+/// At most so many labels: on a logarithmic axis those between the powers of ten, too.
+fn labels(scale: Scale) -> usize {
+    match scale {
+        Scale::Linear => 11,
+        Scale::Logarithmic => 24,
     }
 }
 

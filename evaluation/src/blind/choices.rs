@@ -97,9 +97,19 @@ struct Answer {
     answer: Choice,
 }
 
+/// A version that is smaller than its rival by more than this is no fair choice.
+const LEAST_SIZE: f64 = 0.9;
+
+/// Who the viewers were, in a sentence: a file in the folder of a round.
+const VIEWERS: &str = "viewers.txt";
+
 /// Triplets with all answers to them.
 #[derive(Debug)]
 struct Round {
+    /// Who saw them; empty if nobody said.
+    viewers: String,
+    /// How many are left out, because one of their files is much smaller.
+    unequal: usize,
     triplets: Vec<Triplet>,
     /// By index of triplet, with the viewer: what was chosen, `None` for no difference.
     answers: Vec<(usize, String, Option<Shown>)>,
@@ -121,7 +131,13 @@ impl Round {
                 answers.push(answer.with_context(unreadable)?);
             }
         }
-        Self::new(key::read(&folder.join("key.csv"))?, answers)
+        let viewers = folder.join(VIEWERS);
+        let viewers = if viewers.exists() {
+            fs::read_to_string(&viewers).with_context(|| format!("cannot read {}", viewers.display()))?
+        } else {
+            String::new()
+        };
+        Ok(Self { viewers, ..Self::new(key::read(&folder.join("key.csv"))?, answers)? })
     }
 
     fn new(triplets: Vec<Triplet>, answers: Vec<Answer>) -> Result<Self> {
@@ -140,8 +156,10 @@ impl Round {
             };
             Ok((index, viewer, shown))
         });
-        let answers = answers.collect::<Result<_>>()?;
-        Ok(Self { triplets, answers })
+        let mut answers: Vec<(usize, String, Option<Shown>)> = answers.collect::<Result<_>>()?;
+        answers.retain(|(index, ..)| triplets[*index].size_ratio() >= LEAST_SIZE);
+        let unequal = triplets.iter().filter(|triplet| triplet.size_ratio() < LEAST_SIZE).count();
+        Ok(Self { viewers: String::new(), unequal, triplets, answers })
     }
 
     /// The answers to the triplets of one comparison that a filter lets pass.
@@ -166,11 +184,19 @@ impl Round {
     fn tables(&self) -> String {
         let viewers: BTreeSet<&str> =
             self.answers.iter().map(|(_, viewer, _)| viewer.as_str()).collect();
+        let versions: BTreeSet<&str> =
+            self.triplets.iter().map(|triplet| triplet.version.as_str()).collect();
+        let versions: Vec<&str> = versions.into_iter().collect();
         let mut text = format!(
-            "\n{} triplets, {} viewers, {} answers. Decided answers are those that chose a side. The \
+            "\n{} Encoder: commit {}. {} triplets, of which {} are left out, because one file has less than {:.0} % of \
+             the other's bytes (on some pictures AVIF's largest file has); {} viewers, {} answers to the others. Decided answers are those that chose a side. The \
              intervals (95 %, Clopper and Pearson) take each answer as independent of all others; \
              answers to the same triplet are not quite that.\n",
+            self.viewers.trim(),
+            versions.join(", "),
             self.triplets.len(),
+            self.unequal,
+            100.0 * LEAST_SIZE,
             viewers.len(),
             self.answers.len()
         );
@@ -370,6 +396,23 @@ triplet,picture,content,x,y,width,height,scale,bpp,left,right,left_bpp,right_bpp
         ] {
             assert!(text.contains(row), "{row}\n{text}");
         }
+    }
+
+    #[test]
+    fn a_choice_between_unequal_files_does_not_count() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let key = format!("{KEY}004,a,text,0,0,32,24,1,1,avif,textured,0.5,1,2\n");
+        fs::write(folder.path().join("key.csv"), key).expect("it is written");
+        fs::write(folder.path().join(VIEWERS), "Two friends.\n").expect("it is written");
+        let answers = "triplet,viewer,answer\n003,v,left\n004,v,left\n";
+        fs::write(folder.path().join("one.csv"), answers).expect("it is written");
+        let round = Round::load(folder.path()).expect("all is in order");
+        let avif = round.tally(Shown::Avif, |_, _| true);
+        assert_eq!(avif, Tally { triplets: 1, textured: 1, other: 0, same: 0 });
+        let text = round.tables();
+        let start = "Two friends. Encoder: commit 1, 2. 4 triplets, of which 1 are left out";
+        assert!(text.contains(start), "{text}");
+        assert!(text.contains("1 viewers, 1 answers to the others."), "{text}");
     }
 
     #[test]

@@ -44,6 +44,11 @@ pub(super) struct Triplet {
 }
 
 impl Triplet {
+    /// The size of the smaller file divided by that of the larger one.
+    pub(super) fn size_ratio(&self) -> f64 {
+        self.left_bpp.min(self.right_bpp) / self.left_bpp.max(self.right_bpp)
+    }
+
     /// What the textured version is compared with.
     pub(super) fn other(&self) -> Shown {
         if self.left == Shown::Textured { self.right } else { self.left }

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::codec_curves::{Codec, Extent, OURS, Variant};
+use super::codec_curves::{Codec, Extent, OURS};
 use super::ranges::HIGH;
 use super::rate_store::RateStore;
 use crate::baselines::{self, BEST_AVIF};
@@ -46,23 +46,21 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
     // A large picture takes AVIF at its best longer than a quick run may last.
     let sets = bench.all_sets().into_iter().filter(|set| !(quick && set.name == "large"));
     for set in sets.map(thinned) {
-        let [of_ours, of_others] = steps(set.name).map(|step| extent(quick, step));
-        let ours = Codec::ours(store, &product, &default, &set.pictures, of_ours)?;
+        let ours = Codec::ours(store, &product, &default, &set.pictures, extent(quick, 1))?;
         let (workers, versions) = bench.workers()?;
         let rivals = baselines::rivals().filter(|(rival, _)| is_in(set.name, rival.name));
         let others = rivals.map(|rival| {
             // It has few settings anyway.
             let is_best = rival.0.name == BEST_AVIF[0].name;
-            let extent = if is_best { extent(quick, 1) } else { of_others };
-            Codec::baseline(store, workers, &versions, rival, &set.pictures, extent)
+            let step = if is_best { 1 } else { step_of_others(set.name) };
+            Codec::baseline(store, workers, &versions, rival, &set.pictures, extent(quick, step))
         });
         let others = others.collect::<Result<_>>()?;
         comparisons.push(Comparison { set, ours, others });
     }
     for Comparison { set, others, .. } in &mut comparisons {
-        let of_set = |variant: &&Variant<'_>| is_in(set.name, variant.name);
-        for variant in variants.iter().filter(of_set) {
-            let extent = extent(quick, VARIANT_STEP);
+        for variant in variants.iter().filter(|variant| is_in(set.name, variant.name)) {
+            let extent = extent(quick, 1);
             others.push(Codec::ours(store, &product, variant, &set.pictures, extent)?);
         }
     }
@@ -78,18 +76,11 @@ fn thinned(mut set: PictureSet) -> PictureSet {
     set
 }
 
-/// One in so many settings of ours and of the others is measured on a set. Large pictures and
-/// screenshots take as long as all others together; most curves of screenshots are short.
-fn steps(set: &str) -> [usize; 2] {
-    match set {
-        "large" => [2, 2],
-        "screens" => [1, 2],
-        _ => [1, 1],
-    }
+/// One in so many settings of the others is measured on a set: screenshots take them as long as all
+/// photographs of Kodak's, and most of their curves are short.
+fn step_of_others(set: &str) -> usize {
+    if set == "screens" { 2 } else { 1 }
 }
-
-/// Other ways to run our encoder are there for a comparison with ours, for which fewer rates do.
-const VARIANT_STEP: usize = 2;
 
 /// Beyond the highest range nothing is compared, and a quick run has no time for files that large.
 fn extent(quick: bool, step: usize) -> Extent {

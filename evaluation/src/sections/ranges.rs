@@ -4,7 +4,7 @@ use super::codec_curves::Codec;
 use crate::curve::bd_rate;
 use crate::metric::Metric;
 use crate::pictures::TestPicture;
-use crate::table::{mean, percent};
+use crate::table::{mean, median, percent};
 
 /// Rates that are compared apart from others.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +42,7 @@ pub(super) fn bd_rates(
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outcome {
     pub(super) mean: Option<f64>,
+    pub(super) median: Option<f64>,
     /// The index of the picture with the largest, and that BD-rate.
     pub(super) worst: Option<(usize, f64)>,
     /// How many pictures have smaller files than the anchor's.
@@ -55,6 +56,7 @@ impl Outcome {
         let known = || rates.iter().enumerate().filter_map(|(i, rate)| Some((i, (*rate)?)));
         Self {
             mean: mean(known().map(|(_, rate)| rate)),
+            median: median(known().map(|(_, rate)| rate)),
             worst: known().max_by(|a, b| a.1.total_cmp(&b.1)),
             won: known().filter(|(_, rate)| *rate < 0.0).count(),
             compared: known().count(),

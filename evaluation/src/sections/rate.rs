@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 
 use super::codec_curves::{Codec, OURS};
 use super::comparisons::{Comparison, compare};
-use super::ranges::{Outcome, RANGES, bd_rates, short};
+use super::ranges::{HIGH, Outcome, RANGES, bd_rates, short};
 use super::rate_store::RateStore;
 use super::reference;
 use crate::baselines::{BEST_AVIF, DESCRIPTION, RIVALS_DESCRIPTION};
@@ -28,7 +28,7 @@ pub(super) const PLOTTED: [&str; 8] = [
     gip::NAME,
     BEST_AVIF[0].name,
     "AVIF",
-    "JPEG XL effort 9",
+    "JPEG XL",
     "HEIC",
     "WebP",
     "jpegli",
@@ -68,11 +68,15 @@ fn introduction() -> String {
          its 3-norm at 80 nits: lower is better. Both equal what the tools of libjxl 0.11 print. \
          CVVDP is ColorVideoVDP for a monitor of 24 inches at 60 cm (standard_fhd), in JOD: 10 for \
          equal pictures; of two that are 1 apart, three in four people choose the one with more. \
+         Curves run through a file for each setting (ours seven, AVIF at its best six, the others seven or nine, half \
+         of them on screenshots) and end with the first file of at least {} bits per pixel. \
          BD-rate is how much larger (+) or smaller (-) our files are at equal quality, as a mean over the \
-         qualities that both reach within a range of rates: {}. A picture is won if our files are smaller. \
-         {BY_PICTURE} has every picture's.\n",
+         qualities that both reach within a range of rates: {}. A picture without such a quality is left out; one is \
+         won if our files are smaller. [{BY_PICTURE}]({BY_PICTURE}) has every picture's, [rate.csv](rate.csv) every \
+         file. Of the large pictures every other one is compared.\n",
         OURS.each_ref().map(|variant| variant.name).join(", "),
         OURS[0].settings().join("; "),
+        HIGH.rates.1,
         RANGES.each_ref().map(|range| range.title()).join("; "),
     )
 }
@@ -216,17 +220,16 @@ fn plot(bench: &Bench, comparison: &Comparison, metric: Metric) -> Result<String
     Ok(name)
 }
 
-/// The mean curves of the codecs that plots show.
+/// The mean curves of the codecs that plots show: none of a codec of which no rate is reached by all
+/// pictures. Each has its place and so its colour in the plots of all sets.
 pub(super) fn series(comparison: &Comparison, metric: Metric) -> Vec<Series> {
-    let plotted = comparison.codecs().filter(|codec| PLOTTED.contains(&codec.name));
-    let series = plotted.map(|codec| Series {
-        name: codec.name.to_owned(),
-        points: mean_levels(codec, metric)
-            .into_iter()
-            .map(|(rate, level)| (rate, metric.shown(level)))
-            .collect(),
+    let series = PLOTTED.map(|name| {
+        let codec = comparison.codecs().find(|codec| codec.name == name);
+        let levels = codec.map_or_else(Vec::new, |codec| mean_levels(codec, metric));
+        let points = levels.into_iter().map(|(rate, level)| (rate, metric.shown(level)));
+        Series { name: name.to_owned(), points: points.collect() }
     });
-    series.collect()
+    series.into()
 }
 
 /// Writes the BD-rates of each picture, in a CSV with a column for each other codec: those of the

@@ -151,7 +151,7 @@ mod tests {
             case("d", "face", 0.7),
             case("e", "face", 0.6),
             case("f", "face", 0.5),
-            case("g", "drawing", -0.5),
+            case("g", "rendered", -0.5),
         ];
         let chosen = chosen(&cases);
         let names: Vec<&str> = chosen.iter().map(|(case, _)| case.picture.name.as_str()).collect();

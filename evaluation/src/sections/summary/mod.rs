@@ -18,7 +18,7 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         "Every number of this page is made from the measurements of the sections that follow, which say how \
          it was measured.\n\n",
     );
-    text.push_str(&rates::claims(&comparisons));
+    text.push_str(&rates::claims(bench, &comparisons));
     text.push_str(&sizes::claim(bench)?);
     text.push_str(&times::claims(bench)?);
     text.push_str(&rates::pictures(bench, &comparisons)?);
