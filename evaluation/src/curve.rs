@@ -7,6 +7,9 @@ pub(crate) struct Curve {
     rates: Vec<f64>,
     /// Qualities, increasing.
     qualities: Vec<f64>,
+    /// The logarithm of the largest rate that was measured. Files beyond the last of `rates` are no
+    /// better than that one.
+    end: f64,
 }
 
 impl Curve {
@@ -16,13 +19,14 @@ impl Curve {
         let mut points: Vec<(f64, f64)> = points.into_iter().collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
         let (mut rates, mut qualities) = (Vec::new(), Vec::new());
+        let end = points.last().map_or(f64::NEG_INFINITY, |point| point.0.ln());
         for (rate, quality) in points {
             if qualities.last().is_none_or(|&best| quality > best) {
                 rates.push(rate.ln());
                 qualities.push(quality);
             }
         }
-        Self { rates, qualities }
+        Self { rates, qualities, end }
     }
 
     /// Points of bits per pixel and quality, as measured.
@@ -30,11 +34,13 @@ impl Curve {
         self.rates.iter().map(|rate| rate.exp()).zip(self.qualities.iter().copied())
     }
 
-    /// The quality at a rate in bits per pixel; `None` beyond the ends of the curve.
+    /// The quality at a rate in bits per pixel: past the best file that of the best file. `None` beyond
+    /// the rates that were measured.
     pub(crate) fn quality(&self, rate: f64) -> Option<f64> {
         let (first, last) = (*self.rates.first()?, *self.rates.last()?);
         let rate = rate.ln();
-        (first..=last).contains(&rate).then(|| Pchip::new(&self.rates, &self.qualities).at(rate))
+        let curve = || Pchip::new(&self.rates, &self.qualities).at(rate.min(last));
+        (first..=self.end.max(last)).contains(&rate).then(curve)
     }
 
     /// The qualities from the rate `low` to the rate `high`, as far as the curve goes.
@@ -163,7 +169,10 @@ mod tests {
 
     #[test]
     fn worse_points_at_higher_rates_do_not_count() {
-        let curve = Curve::new([(0.2, 30.0), (0.3, 29.0), (0.2, 28.0), (0.4, 31.0)]);
+        let curve =
+            Curve::new([(0.2, 30.0), (0.3, 29.0), (0.2, 28.0), (0.4, 31.0), (0.5, 30.5)]);
+        close(curve.quality(0.45), 31.0);
+        assert_eq!(curve.quality(0.51), None);
         let points: Vec<(f64, f64)> = curve.points().collect();
         assert_eq!(points.len(), 2);
         for ((rate, quality), expected) in points.into_iter().zip([(0.2, 30.0), (0.4, 31.0)]) {
