@@ -169,8 +169,7 @@ mod tests {
 
     #[test]
     fn worse_points_at_higher_rates_do_not_count() {
-        let curve =
-            Curve::new([(0.2, 30.0), (0.3, 29.0), (0.2, 28.0), (0.4, 31.0), (0.5, 30.5)]);
+        let curve = Curve::new([(0.2, 30.0), (0.3, 29.0), (0.2, 28.0), (0.4, 31.0), (0.5, 30.5)]);
         close(curve.quality(0.45), 31.0);
         assert_eq!(curve.quality(0.51), None);
         let points: Vec<(f64, f64)> = curve.points().collect();

@@ -133,7 +133,8 @@ impl Round {
         }
         let viewers = folder.join(VIEWERS);
         let viewers = if viewers.exists() {
-            fs::read_to_string(&viewers).with_context(|| format!("cannot read {}", viewers.display()))?
+            fs::read_to_string(&viewers)
+                .with_context(|| format!("cannot read {}", viewers.display()))?
         } else {
             String::new()
         };

@@ -130,8 +130,14 @@ fn colors(bench: &Bench, photos: &[TestPicture]) -> Result<String> {
             pixels.flat_map(|(p, alpha)| [p[0], p[1], p[2], alpha]).collect()
         }),
     ];
-    let mut table =
-        Table::new(&["colours", "Gaussians", "bytes", "against RGB", "bits per Gaussian", "PSNR in dB"]);
+    let mut table = Table::new(&[
+        "colours",
+        "Gaussians",
+        "bytes",
+        "against RGB",
+        "bits per Gaussian",
+        "PSNR in dB",
+    ]);
     let mut rows = Vec::new();
     for (name, model, samples) in models {
         let mut all = Vec::new();

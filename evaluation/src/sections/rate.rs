@@ -24,16 +24,8 @@ const TABLE_RATES: [f64; 5] = [0.15, 0.25, 0.5, 1.0, 1.5];
 pub(super) const PLOT_RATES: [f64; 11] =
     [0.1, 0.125, 0.15, 0.2, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 1.9];
 /// Codecs in the plots.
-pub(super) const PLOTTED: [&str; 8] = [
-    gip::NAME,
-    BEST_AVIF[0].name,
-    "AVIF",
-    "JPEG XL",
-    "HEIC",
-    "WebP",
-    "jpegli",
-    "JPEG 2000",
-];
+pub(super) const PLOTTED: [&str; 8] =
+    [gip::NAME, BEST_AVIF[0].name, "AVIF", "JPEG XL", "HEIC", "WebP", "jpegli", "JPEG 2000"];
 /// Codecs in the short table.
 const FOREMOST: [&str; 5] = [BEST_AVIF[0].name, "AVIF", "JPEG XL", "HEIC", "WebP"];
 /// How many pictures are named at either end.

@@ -118,19 +118,11 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         names.join(", "),
         bench.pictures_used(pictures.len()),
     );
-    let kodak = DataSet {
-        bench,
-        pictures: &pictures,
-        methods: &all,
-        printed: &paper::KODAK,
-    };
+    let kodak = DataSet { bench, pictures: &pictures, methods: &all, printed: &paper::KODAK };
     if !bench.quick {
         text.push_str(&as_long_as_the_paper(bench, &mut store, &all[..2])?);
     }
-    text.push_str(&format!(
-        "\n### {iterations} iterations\n{}",
-        kodak.tables(&mut store, counts)?
-    ));
+    text.push_str(&format!("\n### {iterations} iterations\n{}", kodak.tables(&mut store, counts)?));
     let large = bench.large_sample();
     if !large.is_empty() {
         let large = DataSet {

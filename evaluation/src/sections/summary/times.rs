@@ -51,9 +51,9 @@ pub(super) fn claims(bench: &mut Bench) -> Result<String> {
         legend: Corner::Beside,
     };
     plot.write(&bench.path(PLOT), &series)?;
-    let encode = others.iter().map(|row| {
-        format!("{} {}", row.name, two_digits(ours.times[0] / row.times[0]))
-    });
+    let encode = others
+        .iter()
+        .map(|row| format!("{} {}", row.name, two_digits(ours.times[0] / row.times[0])));
     let encode: Vec<String> = encode.collect();
     let figures = bench.written_figures()?;
     let decode = others.iter().filter_map(|row| {
