@@ -1,18 +1,21 @@
 //! What all sections share: pictures, stores, baselines, and the report's folder.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::fs;
 use std::mem;
 use std::path::PathBuf;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::baselines::Worker;
 use crate::contents::Contents;
 use crate::figures::Figures;
+use crate::files;
 use crate::manifest::{Manifest, NAME};
 use crate::origins::Origins;
 use crate::pictures::{self, PictureSet, TestPicture};
+use crate::report;
 use crate::store::{Source, Store};
 use crate::{gip, provenance};
 
@@ -73,6 +76,8 @@ pub(crate) struct Bench {
     folder: PathBuf,
     /// One for each core, once any is needed.
     workers: Vec<Worker>,
+    /// Whether the section that is being measured needs them.
+    uses_baselines: bool,
     manifest: Manifest,
     /// Names of pictures that the manifest does not list.
     unlisted: Vec<String>,
@@ -107,6 +112,7 @@ impl Bench {
             source: Source { machine: provenance::machine(), commit: provenance::commit() },
             folder,
             workers: Vec::new(),
+            uses_baselines: false,
             manifest: Manifest::load()?,
             unlisted: Vec::new(),
             figures: RefCell::default(),
@@ -119,9 +125,17 @@ impl Bench {
     /// of another picture with the same name.
     fn check_pictures(&mut self) -> Result<()> {
         let mut unlisted = Vec::new();
+        let mut sets = HashMap::new();
         for (set, pictures) in self.folders() {
             for picture in pictures {
-                if !self.manifest.has(set, picture)? {
+                let other = sets.insert(&picture.name, set);
+                ensure!(
+                    other.is_none(),
+                    "{} is in {set} and in {}: a picture can be in one set alone",
+                    picture.name,
+                    other.unwrap_or_default()
+                );
+                if !self.manifest.has(picture)? {
                     unlisted.push(picture);
                 }
             }
@@ -201,25 +215,28 @@ impl Bench {
         Store::open(&self.path(name), &self.source, keys, values)
     }
 
-    /// A file that takes long to make: from the folder of files of this version of our codec, or
+    /// The folder of files of this version of our codec.
+    pub(crate) fn files(&self) -> PathBuf {
+        self.path("files").join(&self.product)
+    }
+
+    /// A file that takes long to make: from [`Self::files`], or
     /// else made now and kept there.
     pub(crate) fn file(
         &self,
         name: &str,
         make: impl FnOnce() -> Result<Vec<u8>>,
     ) -> Result<Vec<u8>> {
-        let folder = self.path("files").join(&self.product);
+        let folder = self.files();
         let path = folder.join(name);
         if let Ok(bytes) = fs::read(&path) {
             return Ok(bytes);
         }
         eprintln!("{name}");
         let bytes = make()?;
-        fs::create_dir_all(&folder)?;
-        // Renamed when it is whole, so that an interruption leaves no part of it under its name.
-        let new = path.with_extension("new");
-        fs::write(&new, &bytes)?;
-        fs::rename(new, path)?;
+        fs::create_dir_all(&folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        files::replace(&path, &bytes)?;
         Ok(bytes)
     }
 
@@ -231,12 +248,24 @@ impl Bench {
 
     /// The same, one for each core: for what is measured without times.
     pub(crate) fn workers(&mut self) -> Result<(&mut [Worker], String)> {
+        self.uses_baselines = true;
         if self.workers.is_empty() {
             let all = (0..provenance::cores()).map(|index| Worker::start(&self.folder, index));
             self.workers = all.collect::<Result<_>>()?;
         }
         let versions = self.workers[0].versions.join(", ");
         Ok((&mut self.workers, versions))
+    }
+
+    /// Begins a section.
+    pub(crate) fn begin(&mut self) {
+        self.uses_baselines = false;
+        self.figures.take();
+    }
+
+    /// Stops the baselines, one of which may have failed; they start again when they are needed.
+    pub(crate) fn stop_baselines(&mut self) {
+        self.workers.clear();
     }
 
     /// Names a figure of the section that is being measured, for texts that cite it: in `figures.csv` it has
@@ -269,7 +298,11 @@ impl Bench {
         );
         let sets = self.folders().into_iter().filter(|(_, pictures)| !pictures.is_empty());
         let counts = sets.map(|(set, pictures)| {
-            format!("{set} {} of {}", pictures.len(), self.manifest.count(set))
+            let others = pictures.iter().filter(|picture| self.unlisted.contains(&picture.name));
+            let others = others.count();
+            let listed = pictures.len() - others;
+            let others = if others > 0 { format!(" and {others} others") } else { String::new() };
+            format!("{set} {listed} of {}{others}", self.manifest.count(set))
         });
         list.push_str(&format!(
             "- Pictures, of which some tables take fewer and say so: {} ([{NAME}](../{NAME}))\n",
@@ -281,11 +314,11 @@ impl Bench {
                 self.unlisted.join(", ")
             ));
         }
-        if let Some(worker) = self.workers.first() {
+        if let Some(worker) = self.workers.first().filter(|_| self.uses_baselines) {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }
         if self.quick {
-            list.push_str("- A quick run: few pictures and settings\n");
+            list.push_str(report::QUICK);
         }
         Ok(list)
     }

@@ -1,7 +1,6 @@
 //! Pictures made of pictures and lines of text.
 
 use std::convert::Infallible;
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -13,6 +12,8 @@ use embedded_graphics::prelude::{
 use embedded_graphics::text::{Baseline, Text};
 use image::codecs::jpeg::JpegEncoder;
 use image::{Rgb, RgbImage, imageops};
+
+use crate::files;
 
 /// The height of a line of text in pixels.
 pub(crate) const LINE: u32 = 12;
@@ -57,8 +58,7 @@ impl Canvas {
             let mut bytes = Vec::new();
             JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(&self.0)?;
             if bytes.len() <= most {
-                return fs::write(path, bytes)
-                    .with_context(|| format!("cannot write {}", path.display()));
+                return files::replace(path, &bytes);
             }
         }
         bail!("{} is too large for {most} bytes", path.display())
@@ -91,6 +91,8 @@ impl DrawTarget for Canvas {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -10,6 +10,9 @@ use anyhow::{Context, Result, ensure};
 use crate::manifest::{Listed, Manifest, NAME};
 use crate::pictures;
 
+/// The sets of the list.
+const SETS: [&str; 4] = ["kodak", "photos", "large", "screens"];
+
 /// Fetches the pictures of `pictures.csv` whose address is known, a folder for each set, and checks them.
 ///
 /// It needs the programs curl, and djxl of libjxl for the sets that are published as JPEG XL. What is there
@@ -19,8 +22,8 @@ pub(crate) struct Args {
     /// Folder for the sets' folders.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Only these sets: kodak, photos, large, screens [default: all].
-    #[arg(long, value_name = "SET")]
+    /// Only these sets [default: all].
+    #[arg(long, value_name = "SET", value_delimiter = ',', value_parser = SETS)]
     set: Vec<String>,
 }
 
@@ -54,7 +57,8 @@ pub(crate) fn fetch(args: &Args) -> Result<()> {
 fn get(listed: &Listed, path: &Path) -> Result<()> {
     if !path.exists() {
         let folder = path.parent().context("it is in a folder")?;
-        fs::create_dir_all(folder)?;
+        let no_folder = || format!("cannot make the folder {}", folder.display());
+        fs::create_dir_all(folder).with_context(no_folder)?;
         let is_png = listed.url.ends_with(".png");
         let new = path.with_extension(if is_png { "png.new" } else { "jxl" });
         let fetch = ["--fail", "--silent", "--show-error", "--location", "--output"];
@@ -73,8 +77,9 @@ fn get(listed: &Listed, path: &Path) -> Result<()> {
 }
 
 fn run(command: &mut Command) -> Result<()> {
-    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
-    ensure!(status.success(), "{command:?} failed");
+    let output = command.output().with_context(|| format!("cannot run {command:?}"))?;
+    let words = String::from_utf8_lossy(&output.stderr);
+    ensure!(output.status.success(), "{command:?} failed: {}", words.trim());
     Ok(())
 }
 

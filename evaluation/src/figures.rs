@@ -1,12 +1,12 @@
 //! The figures of the report that texts elsewhere cite, by name: `figures.csv`.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
+use crate::files;
 use crate::number::rounded;
 
 /// The name of the table in the folder of the report.
@@ -35,11 +35,9 @@ impl Figures {
     /// Those of a folder; none if it has no table.
     pub(crate) fn load(folder: &Path) -> Result<Self> {
         let path = folder.join(NAME);
-        if !path.exists() {
-            return Ok(Self::default());
-        }
+        let text = files::read_if_any(&path)?.unwrap_or_default();
         let unreadable = || format!("cannot read {}", path.display());
-        let mut reader = csv::Reader::from_path(&path).with_context(unreadable)?;
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows = reader
             .deserialize()
             .map(|row| row.map(|Row { figure, value, unit }| (figure, Figure { value, unit })));
@@ -57,7 +55,7 @@ impl Figures {
         for (figure, Figure { value, unit }) in all {
             writer.serialize(Row { figure, value, unit })?;
         }
-        Ok(fs::write(folder.join(NAME), writer.into_inner()?)?)
+        files::replace(&folder.join(NAME), &writer.into_inner()?)
     }
 
     /// Adds a figure, unless it is no number: then there is nothing to cite.
@@ -74,6 +72,8 @@ impl Figures {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -11,6 +11,7 @@ mod contents;
 mod curve;
 mod fetch;
 mod figures;
+mod files;
 mod gip;
 mod kernel_benchmark;
 mod local_statistics;
@@ -34,10 +35,10 @@ mod versions;
 mod visual;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, Subcommand};
 
 use bench::{Bench, Folders};
@@ -85,10 +86,10 @@ struct Args {
     #[arg(long)]
     quick: bool,
     /// Only these sections [default: all].
-    #[arg(long, value_enum, value_name = "SECTION")]
+    #[arg(long, value_enum, value_name = "SECTION", value_delimiter = ',')]
     only: Vec<Section>,
     /// In `representation`, the published methods with all of the paper's iterations, too, on four pictures: hours.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "quick")]
     long: bool,
     /// CSV with measurements of the same baselines by other programs, to compare ours with; it
     /// needs the columns codec, quality, image, bytes, psnr and msssim of `rate.csv`.
@@ -120,29 +121,73 @@ fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+    let _lock = files::lock(&args.out)?;
     store::tidy(&args.out)?;
+    let sections = sections(&args)?;
     let mut bench = Bench::new(folders, args.out, args.quick, args.long, args.reference)?;
     bench.readme_picture = args.readme_picture;
-    let mut sections = if args.only.is_empty() { Section::ALL.to_vec() } else { args.only };
-    // The first page tells what the others have measured.
-    sections.sort_by_key(|section| *section == Section::Summary);
+    let mut failed = Vec::new();
     for section in sections {
         eprintln!("== {section} (after {:.0} s)", start.elapsed().as_secs_f64());
-        let text = measure(section, &mut bench)?;
-        let path = bench.path("report.md");
-        let provenance = bench.provenance()?;
-        report::update(&path, section, &format!("{provenance}\n{text}"))?;
-        bench.write_figures(&section.to_string())?;
-        // All its stores are closed.
-        store::tidy(&bench.path(""))?;
-        eprintln!("{} (after {:.0} s)", path.display(), start.elapsed().as_secs_f64());
+        if let Err(error) = write_section(section, &mut bench) {
+            // The others may have nothing to do with it.
+            eprintln!("{section} failed: {error:#}");
+            bench.stop_baselines();
+            failed.push(section);
+        }
     }
-    let report = fs::read_to_string(bench.path("report.md"))?;
+    let path = bench.path(report::NAME);
+    eprintln!("{} (after {:.0} s)", path.display(), start.elapsed().as_secs_f64());
+    let report = files::read_if_any(&path)?.unwrap_or_default();
     let stale = report::of_other_versions(&report, &bench.product);
     if !stale.is_empty() {
         eprintln!("not of this version, or missing: {}", report::names(&stale));
     }
+    ensure!(failed.is_empty(), "these sections failed, as said above: {}", report::names(&failed));
     Ok(())
+}
+
+/// The sections that are asked for, each of them once.
+///
+/// # Errors
+/// When a quick run would take the place of full ones.
+fn sections(args: &Args) -> Result<Vec<Section>> {
+    let is_wanted = |section: &Section| args.only.is_empty() || args.only.contains(section);
+    let mut sections: Vec<Section> = Section::ALL.into_iter().filter(is_wanted).collect();
+    // The first page tells what the others have measured.
+    sections.sort_by_key(|section| *section == Section::Summary);
+    if args.quick {
+        let report = files::read_if_any(&args.out.join(report::NAME))?.unwrap_or_default();
+        let mut full = report::of_full_runs(&report);
+        full.retain(|section| sections.contains(section));
+        ensure!(
+            full.is_empty(),
+            "{} has sections of a full run, which --quick would replace: {}; choose another folder",
+            args.out.display(),
+            report::names(&full)
+        );
+    }
+    if let Some(path) = &args.readme_picture {
+        ensure!(sections.contains(&Section::Sheet), "--readme-picture needs the section sheet");
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        ensure!(folder.is_none_or(Path::is_dir), "there is no folder for {}", path.display());
+    }
+    if let Some(path) = &args.reference {
+        ensure!(sections.contains(&Section::Rate), "--reference needs the section rate");
+        ensure!(path.is_file(), "there is no {}", path.display());
+    }
+    Ok(sections)
+}
+
+/// Measures what a section lacks, and writes it.
+fn write_section(section: Section, bench: &mut Bench) -> Result<()> {
+    bench.begin();
+    let text = measure(section, bench)?;
+    let provenance = bench.provenance()?;
+    report::update(&bench.path(report::NAME), section, &format!("{provenance}\n{text}"))?;
+    bench.write_figures(&section.to_string())?;
+    // All its stores are closed.
+    store::tidy(&bench.path(""))
 }
 
 /// Measures what a section lacks and returns its text.

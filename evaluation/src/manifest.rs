@@ -46,12 +46,12 @@ impl Manifest {
         self.0.iter().filter(|listed| listed.set == set).count()
     }
 
-    /// Whether a picture of a set is listed.
+    /// Whether a picture is listed, in whatever set.
     ///
     /// # Errors
-    /// When the list has another picture of that name.
-    pub(crate) fn has(&self, set: &str, picture: &TestPicture) -> Result<bool> {
-        let named = |listed: &&Listed| listed.set == set && listed.picture == picture.name;
+    /// When the list has another picture of that name: measurements are kept by name alone.
+    pub(crate) fn has(&self, picture: &TestPicture) -> Result<bool> {
+        let named = |listed: &&Listed| listed.picture == picture.name;
         let Some(listed) = self.0.iter().find(named) else { return Ok(false) };
         ensure!(
             listed.is(picture),
@@ -119,10 +119,11 @@ mod tests {
             url: String::new(),
         };
         let manifest = Manifest(vec![listed]);
-        assert!(manifest.has("kodak", &picture).expect("it is the same"));
-        assert!(!manifest.has("photos", &picture).expect("that set has none"));
+        assert!(manifest.has(&picture).expect("it is the same"));
+        let unlisted = TestPicture { name: "b".into(), ..picture.clone() };
+        assert!(!manifest.has(&unlisted).expect("there is none"));
         let other = TestPicture { rgb: vec![7, 8, 10], ..picture };
-        let refusal = manifest.has("kodak", &other).expect_err("it is another").to_string();
+        let refusal = manifest.has(&other).expect_err("it is another").to_string();
         assert!(refusal.contains("is not the a that pictures.csv lists"), "{refusal}");
     }
 }

@@ -1,11 +1,11 @@
 //! Where measurements come from: a short key in each row of a store, and one small table of what the keys
 //! stand for.
 
-use std::fs::{self, OpenOptions};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+
+use crate::files::{self, whole_lines};
 
 /// The name of the table in the folder of the report.
 const NAME: &str = "origins.csv";
@@ -31,20 +31,19 @@ impl Origins {
     /// Adds the origin of a measurement, if it is not there. Of the same version, all have the commit of the
     /// first.
     pub(crate) fn note(&self, machine: &str, version: &str, commit: &str) -> Result<()> {
-        let rows = self.rows()?;
+        let mut rows = self.rows()?;
         let key = key(machine, version);
         if rows.iter().any(|[known, ..]| *known == key) {
             return Ok(());
         }
         let known = self.commit(version)?;
         let commit = known.as_deref().unwrap_or(commit);
+        rows.push([&key, machine, version, commit].map(str::to_owned));
+        rows.sort_unstable();
         let mut writer = csv::Writer::from_writer(Vec::new());
-        if rows.is_empty() {
-            writer.write_record(COLUMNS)?;
-        }
-        writer.write_record([&key, machine, version, commit])?;
-        let mut file = OpenOptions::new().append(true).create(true).open(&self.0)?;
-        Ok(file.write_all(&writer.into_inner()?)?)
+        writer.write_record(COLUMNS)?;
+        rows.iter().try_for_each(|row| writer.write_record(row))?;
+        files::replace(&self.0, &writer.into_inner()?)
     }
 
     /// The commit that was checked out when a version was measured for the first time.
@@ -60,14 +59,10 @@ impl Origins {
     }
 
     fn rows(&self) -> Result<Vec<[String; 4]>> {
-        if !self.0.exists() {
-            return Ok(Vec::new());
-        }
-        // Interruptions leave at most one torn row, which the next run of `store::tidy` drops.
-        let text = fs::read_to_string(&self.0)?;
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole]);
-        reader.deserialize().map(|row| Ok(row?)).collect()
+        let text = files::read_if_any(&self.0)?.unwrap_or_default();
+        let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole_lines(&text)]);
+        let rows = reader.deserialize().collect::<Result<_, _>>();
+        rows.with_context(|| format!("cannot read {}", self.0.display()))
     }
 }
 

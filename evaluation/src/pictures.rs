@@ -164,6 +164,9 @@ fn pixels(path: &Path) -> Result<u64> {
     Ok(u64::from(width) * u64::from(height))
 }
 
+/// What Markdown takes for more than a letter; not in names of pictures.
+const RESERVED: &[char] = &['|', '*', '<', '>', '`', '[', ']', '\\', '$'];
+
 /// The picture of a file.
 pub(crate) fn open(path: &Path) -> Result<TestPicture> {
     let image = image::open(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -171,7 +174,13 @@ pub(crate) fn open(path: &Path) -> Result<TestPicture> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (width, height) = image.dimensions();
     // Absolute, because the worker may have another working directory.
-    let path = fs::canonicalize(path)?;
+    let path = fs::canonicalize(path).with_context(|| format!("cannot find {}", path.display()))?;
+    // Names go into tables of Markdown, and paths into lines for the worker.
+    ensure!(
+        !name.contains(RESERVED) && !path.to_string_lossy().contains(char::is_control),
+        "{path:?} has a name or a folder with control characters or with one of {}: rename it",
+        RESERVED.iter().collect::<String>()
+    );
     Ok(TestPicture { name, path, width, height, rgb: image.into_raw() })
 }
 
@@ -205,6 +214,20 @@ mod tests {
         assert_eq!(names(None), ["a", "b", "c", "d"]);
         assert_eq!(names(Some(3)), ["b", "d", "c"]);
         assert_eq!(names(Some(9)).len(), 4);
+    }
+
+    #[test]
+    fn names_that_tables_cannot_have_are_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, fits) in [("a, b (c)", true), ("ü_1-2", true), ("a|b", false), ("a\nb", false)]
+        {
+            let path = folder.path().join(format!("{name}.png"));
+            RgbImage::new(1, 1).save(&path).expect("it is written");
+            let opened = open(&path);
+            assert_eq!(opened.is_ok(), fits, "{name}");
+            let refusal = opened.err().map(|error| error.to_string());
+            assert!(refusal.is_none_or(|refusal| refusal.contains("rename it")), "{name}");
+        }
     }
 
     #[test]

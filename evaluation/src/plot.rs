@@ -57,19 +57,23 @@ const COLORS: [RGBColor; 9] = [
     RGBColor(240, 228, 66),
 ];
 
+impl Series {
+    /// The points that can be drawn: those of equal pictures have no PSNR.
+    fn drawn(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite())
+    }
+}
+
 impl Plot<'_> {
     /// Writes the series, each as points joined by lines, in the colour of its place. Those without points have
     /// a place alone.
     pub(crate) fn write(&self, path: &Path, series: &[Series]) -> Result<()> {
-        let points = || series.iter().flat_map(|series| &series.points);
+        let points = || series.iter().flat_map(Series::drawn);
         let mut x = range(points().map(|point| point.0), self.x.1);
-        if let (Some(x), Corner::Beside) = (&mut x, self.legend) {
+        if matches!(self.legend, Corner::Beside) {
             x.end = x.start * (x.end / x.start).powf(LONGER);
         }
         let y = range(points().map(|point| point.1), self.y.1);
-        let (Some(x), Some(y)) = (x, y) else {
-            return Err(anyhow!("there is nothing to plot in {}", path.display()));
-        };
         use Scale::{Linear, Logarithmic};
         match (self.x.1, self.y.1) {
             (Linear, Linear) => self.draw(path, x, y, series),
@@ -107,11 +111,11 @@ impl Plot<'_> {
             .draw()
             .map_err(|error| failed(&error))?;
         for (index, series) in series.iter().enumerate() {
-            if series.points.is_empty() {
+            if series.drawn().next().is_none() {
                 continue;
             }
             let color = COLORS[index % COLORS.len()];
-            let line = LineSeries::new(series.points.iter().copied(), color.stroke_width(2));
+            let line = LineSeries::new(series.drawn(), color.stroke_width(2));
             chart
                 .draw_series(line.point_size(3))
                 .map_err(|error| failed(&error))?
@@ -143,20 +147,20 @@ fn labels(scale: Scale) -> usize {
     }
 }
 
-/// From the least to the largest value, with a margin.
-fn range(values: impl Iterator<Item = f64>, scale: Scale) -> Option<Range<f64>> {
+/// From the least to the largest value, with a margin; any range of nothing, whose plot is empty.
+fn range(values: impl Iterator<Item = f64>, scale: Scale) -> Range<f64> {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for value in values {
         (low, high) = (low.min(value), high.max(value));
     }
     if low > high {
-        return None;
+        (low, high) = (0.1, 1.0);
     }
-    Some(match scale {
+    match scale {
         Scale::Linear => {
             let margin = 0.05 * (high - low).max(1e-9);
             low - margin..high + margin
         }
         Scale::Logarithmic => low / 1.3..high * 1.3,
-    })
+    }
 }

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 
-use crate::{provenance, store};
+use crate::{files, provenance, store};
 
 /// Removes measurements of other versions of our codec than the one that is checked out.
 ///
-/// Those of baselines, and of all machines, stay.
+/// Those of baselines, and of all machines, stay, and those whose origin is not known.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The folder of the report.
@@ -16,8 +16,13 @@ pub(crate) struct Args {
     report: PathBuf,
 }
 
-/// Removes them.
+/// Removes them, and says how many.
 pub(crate) fn prune(args: &Args) -> Result<()> {
+    let _lock = files::lock(&args.report)?;
     let product = provenance::product()?;
-    store::keep(&args.report, |version| !provenance::is_of_another(version, &product))
+    let removed = |version: &str| provenance::is_of_another(version, &product);
+    for (table, count) in store::remove(&args.report, removed)? {
+        println!("{table}: {count} rows removed");
+    }
+    Ok(())
 }

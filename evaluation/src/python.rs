@@ -6,6 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::files;
 use crate::provenance::FOLDER;
 
 /// A package that is built from its source, and the version of that source.
@@ -23,7 +24,7 @@ pub(crate) fn environment(
     built: Option<Built<'_>>,
 ) -> Result<PathBuf> {
     let folder = Path::new(FOLDER).join("target").join(name);
-    let mut wanted = fs::read_to_string(requirements)?;
+    let mut wanted = files::read(requirements)?;
     if let Some(Built { source, version }) = built {
         wanted.push_str(&format!("{} of {version}\n", source.display()));
     }
@@ -38,12 +39,13 @@ pub(crate) fn environment(
     let mut install = Command::new(&python);
     install.args(pip).arg(requirements);
     run(install.args(built.map(|built| built.source)))?;
-    fs::write(installed, wanted)?;
+    files::replace(&installed, wanted.as_bytes())?;
     Ok(python)
 }
 
 fn run(command: &mut Command) -> Result<()> {
-    let status = command.status().with_context(|| format!("cannot run {command:?}"))?;
+    let status = command.status();
+    let status = status.with_context(|| format!("cannot run {command:?}: is Python installed?"))?;
     ensure!(
         status.success(),
         "{command:?} failed; Python 3.11 or later and the network are needed"

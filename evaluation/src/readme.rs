@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use crate::figures::{Figure, Figures};
+use crate::files;
 use crate::provenance::FOLDER;
 
 const MARK: &str = "<!-- report: ";
@@ -37,7 +38,7 @@ pub(crate) fn check(args: &Args) -> Result<()> {
     let figures = Figures::load(&Path::new(FOLDER).join("report"))?;
     let mut faults = Vec::new();
     for path in texts(&root)? {
-        let text = fs::read_to_string(&path)?;
+        let text = files::read(&path)?;
         let found = compare(&text, &figures);
         let name = path.strip_prefix(&root)?.display();
         let of_text = |fault: &String| format!("{name}: {fault}");
@@ -45,7 +46,7 @@ pub(crate) fn check(args: &Args) -> Result<()> {
         if !args.write {
             faults.extend(found.other.iter().map(of_text));
         } else if !found.other.is_empty() {
-            fs::write(&path, found.text)?;
+            files::replace(&path, found.text.as_bytes())?;
             println!("{name}: {} figures written", found.other.len());
         }
     }

@@ -1,10 +1,15 @@
 //! The report: its sections, and one text that has each of them as it was last measured.
 
+use std::fmt;
 use std::path::Path;
-use std::{fmt, fs, io};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::ValueEnum;
+
+use crate::files;
+
+/// The name of the report in its folder.
+pub(crate) const NAME: &str = "report.md";
 
 const TITLE: &str = "\
 # image-gip, measured
@@ -13,6 +18,9 @@ Written by `evaluation/`, whose README has the command. Every single measurement
 this folder, and the pictures are those of [`pictures.csv`](../pictures.csv). Sizes are those of whole files. PSNR is over all samples \
 of the decoded 8-bit RGB picture, unless stated otherwise.
 ";
+
+/// A line in the head of sections of a quick run.
+pub(crate) const QUICK: &str = "- A quick run: few pictures and settings\n";
 
 /// What can be measured on its own; the comments are the help of `--only`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -107,22 +115,29 @@ impl fmt::Display for Section {
 
 /// Replaces one section of the report in a file, which is made if it is missing.
 pub(crate) fn update(path: &Path, section: Section, text: &str) -> Result<()> {
-    let before = match fs::read_to_string(path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
-        before => before.with_context(|| format!("cannot read {}", path.display()))?,
-    };
-    // Written beside the old report and then renamed: an interruption must not destroy the other
-    // sections, which are kept nowhere else.
-    let new = path.with_extension("md.new");
-    fs::write(&new, with(&before, section, text))?;
-    fs::rename(new, path)?;
-    Ok(())
+    let before = files::read_if_any(path)?.unwrap_or_default();
+    files::replace(path, with(&before, section, text).as_bytes())
 }
 
 /// The sections of a report that are missing or of another version of our codec than this one.
 pub(crate) fn of_other_versions(report: &str, product: &str) -> Vec<Section> {
     let is_of_it = |section| text_of(report, section).is_some_and(|text| text.contains(product));
     Section::ALL.into_iter().filter(|&section| !is_of_it(section)).collect()
+}
+
+/// The sections of a report that a full run has measured.
+pub(crate) fn of_full_runs(report: &str) -> Vec<Section> {
+    let is_full = |section| text_of(report, section).is_some_and(|text| !text.contains(QUICK));
+    Section::ALL.into_iter().filter(|&section| is_full(section)).collect()
+}
+
+/// The files beside a report that it links.
+pub(crate) fn links(report: &str) -> Vec<&str> {
+    let targets = report.split("](").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0));
+    let mut links: Vec<&str> = targets.filter(|target| !target.contains(':')).collect();
+    links.sort_unstable();
+    links.dedup();
+    links
 }
 
 /// The names of sections in a sentence.
@@ -155,6 +170,8 @@ fn heading(section: Section) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -188,6 +205,14 @@ mod tests {
         assert_eq!(stale.len(), Section::ALL.len() - 1);
         assert!(!stale.contains(&Section::Decode) && stale.contains(&Section::Rate));
         assert_eq!(names(&[Section::Rate, Section::Decode]), "rate, decode");
+    }
+
+    #[test]
+    fn sections_of_full_runs_and_links_are_found() {
+        let report = with("", Section::Decode, &format!("- Seed: 1\n{QUICK}\n![a](a.svg)"));
+        let report = with(&report, Section::Rate, "[b](b.csv), [c](https://c), [b](b.csv)");
+        assert_eq!(of_full_runs(&report), [Section::Rate]);
+        assert_eq!(links(&report), ["../pictures.csv", "a.svg", "b.csv"]);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
+use crate::files::{self, whole_lines};
 use crate::number::rounded;
 use crate::origins::{self, Origins};
 use crate::parallel;
@@ -28,7 +29,7 @@ pub(crate) struct Store<const K: usize, const V: usize> {
     rows: HashMap<Vec<String>, [f64; V]>,
     source: Source,
     origins: Origins,
-    /// Versions of which this has written measurements.
+    /// Versions of which this has used or made measurements.
     noted: HashSet<String>,
 }
 
@@ -40,11 +41,13 @@ impl<const K: usize, const V: usize> Store<K, V> {
         keys: [&str; K],
         values: [&str; V],
     ) -> Result<Self> {
-        let mut file =
-            OpenOptions::new().read(true).append(true).create(true).truncate(false).open(path)?;
-        let mut text = fs::read_to_string(path)?;
-        text.truncate(whole(&text));
-        file.set_len(text.len() as u64)?;
+        let unreadable = || format!("cannot read {}", path.display());
+        let options =
+            OpenOptions::new().read(true).append(true).create(true).truncate(false).open(path);
+        let mut file = options.with_context(unreadable)?;
+        let mut text = files::read(path)?;
+        text.truncate(whole_lines(&text));
+        file.set_len(text.len() as u64).with_context(unreadable)?;
 
         let header = [&[origins::COLUMN], keys.as_slice(), &values].concat();
         if text.is_empty() {
@@ -52,22 +55,31 @@ impl<const K: usize, const V: usize> Store<K, V> {
         }
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         ensure!(
-            text.is_empty() || reader.headers()? == header,
+            text.is_empty() || reader.headers().with_context(unreadable)? == header,
             "{} has other columns than this program writes: move it away",
             path.display()
         );
         let mut rows = HashMap::new();
         for row in reader.records() {
-            let row = row?;
+            let row = row.with_context(unreadable)?;
             let fields: Vec<&str> = row.iter().collect();
             let (key, numbers) = fields.split_at(1 + K);
-            let mut values = [0.0; V];
+            let mut values = [0.0_f64; V];
             for (value, number) in values.iter_mut().zip(numbers) {
                 *value = number
                     .parse()
                     .with_context(|| format!("{}: `{number}` is not a number", path.display()))?;
             }
-            rows.insert(key.iter().map(|&field| field.to_owned()).collect(), values);
+            let key: Vec<String> = key.iter().map(|&field| field.to_owned()).collect();
+            let other = rows
+                .insert(key, values)
+                .filter(|other| other.iter().zip(&values).any(|(a, b)| a.to_bits() != b.to_bits()));
+            ensure!(
+                other.is_none(),
+                "{} has two measurements of {}: remove one",
+                path.display(),
+                fields[1..=K].join(", ")
+            );
         }
         let origins = Origins::of(path.parent().unwrap_or(Path::new("")));
         Ok(Self { file, rows, source: source.clone(), origins, noted: HashSet::new() })
@@ -92,21 +104,27 @@ impl<const K: usize, const V: usize> Store<K, V> {
         key: [&str; K],
         measure: impl FnOnce() -> Result<[f64; V]>,
     ) -> Result<[f64; V]> {
+        self.note(version)?;
         if let Some(values) = self.known(version, key) {
             return Ok(values);
         }
         let key = self.row(version, key);
         eprintln!("{}", key[1..].join("  "));
         let values = measure().with_context(|| key[1..].join(", "))?.map(rounded);
-        if self.noted.insert(version.to_owned()) {
-            let Source { machine, commit } = &self.source;
-            self.origins.note(machine, version, commit)?;
-        }
         let numbers = values.map(|value| value.to_string());
         // One call, so that an interruption leaves at most one torn row.
         self.file.write_all(&record(key.iter().chain(&numbers))?)?;
         self.rows.insert(key, values);
         Ok(values)
+    }
+
+    /// Says where measurements of a version come from, should the table of origins not have it.
+    pub(crate) fn note(&mut self, version: &str) -> Result<()> {
+        if self.noted.insert(version.to_owned()) {
+            let Source { machine, commit } = &self.source;
+            self.origins.note(machine, version, commit)?;
+        }
+        Ok(())
     }
 
     /// The measurements of some jobs, in their order, each under its key. Those that are missing are made on all
@@ -118,6 +136,7 @@ impl<const K: usize, const V: usize> Store<K, V> {
         jobs: &'j [([&'j str; K], J)],
         measure: impl Fn(&mut W, &J) -> Result<[f64; V]> + Sync,
     ) -> Result<Vec<[f64; V]>> {
+        self.note(version)?;
         let missing = jobs.iter().filter(|(key, _)| self.known(version, *key).is_none());
         let missing: Vec<_> = missing.collect();
         let work = |worker: &mut W,
@@ -135,56 +154,103 @@ impl<const K: usize, const V: usize> Store<K, V> {
 }
 
 /// Sorts the rows of all stores of a folder, so that the same measurements are the same bytes in whatever
-/// order they were made. No store of the folder may be open.
+/// order they were made, and leaves one of equal rows. No store of the folder may be open.
 pub(crate) fn tidy(folder: &Path) -> Result<()> {
-    rewrite(folder, |_| true)
-}
-
-/// Removes what is of versions that a filter does not let pass, and does what [`tidy`] does.
-pub(crate) fn keep(folder: &Path, pass: impl Fn(&str) -> bool) -> Result<()> {
-    let kept: HashSet<String> = Origins::of(folder).keys(pass)?.into_iter().collect();
-    rewrite(folder, |origin| kept.contains(origin))
-}
-
-/// The stores of a folder with the rows of those origins that a filter lets pass.
-fn rewrite(folder: &Path, pass: impl Fn(&str) -> bool) -> Result<()> {
-    for path in files(folder)? {
-        let text = fs::read_to_string(&path)?;
-        let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole(&text)]);
-        let header = reader.headers()?.clone();
-        if header.get(0) != Some(origins::COLUMN) {
-            continue;
-        }
-        let unreadable = || format!("cannot read {}", path.display());
-        let rows = reader.records().collect::<Result<Vec<_>, _>>().with_context(unreadable)?;
-        let mut rows: Vec<Vec<&str>> = rows.iter().map(|row| row.iter().collect()).collect();
-        rows.retain(|row| pass(row[0]));
-        rows.sort_unstable();
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&header)?;
-        rows.iter().try_for_each(|row| writer.write_record(row))?;
-        let sorted = writer.into_inner()?;
-        if sorted != text.as_bytes() {
-            // Renamed when it is whole, so that an interruption loses nothing.
-            let new = path.with_extension("csv.new");
-            fs::write(&new, sorted)?;
-            fs::rename(new, path)?;
-        }
+    for table in tables(folder)? {
+        table.keep(|_| true)?;
     }
     Ok(())
 }
 
-/// The tables of a folder.
-fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let paths = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
-    let mut paths = paths.collect::<Result<Vec<_>>>()?;
-    paths.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
-    Ok(paths)
+/// Removes what is of versions that a filter lets pass, and does what [`tidy`] does. Rows of an origin that the
+/// folder does not explain stay. Returns how many rows of each table were removed.
+pub(crate) fn remove(folder: &Path, pass: impl Fn(&str) -> bool) -> Result<Vec<(String, usize)>> {
+    let removed: HashSet<String> = Origins::of(folder).keys(pass)?.into_iter().collect();
+    let counts = tables(folder)?.into_iter().map(|table| {
+        let count = table.keep(|origin| !removed.contains(origin))?;
+        Ok((table.name(), count))
+    });
+    counts.collect()
 }
 
-/// How many bytes of a text are whole lines.
-fn whole(text: &str) -> usize {
-    text.rfind('\n').map_or(0, |end| end + 1)
+/// What is wrong with the stores of a folder, as they are committed: no faults after [`tidy`] of a run's.
+pub(crate) fn faults(folder: &Path) -> Result<Vec<String>> {
+    let origins: HashSet<String> = Origins::of(folder).keys(|_| true)?.into_iter().collect();
+    let mut faults = Vec::new();
+    for table in tables(folder)? {
+        let name = table.name();
+        let mut fault = |what: &str| faults.push(format!("{name} {what}"));
+        if table.rows.is_empty() {
+            fault("is empty");
+        }
+        if table.rows.iter().any(|row| !origins.contains(&row[0])) {
+            fault("has rows of an unknown origin");
+        }
+        if !table.rows.is_sorted_by(|a, b| a < b) {
+            fault("is not sorted, or has a row twice");
+        }
+    }
+    Ok(faults)
+}
+
+/// A store as it lies in its folder.
+struct Stored {
+    path: PathBuf,
+    text: String,
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Stored {
+    /// The store of a file; `None` of a table that is none.
+    fn read(path: PathBuf) -> Result<Option<Self>> {
+        let text = files::read(&path)?;
+        let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole_lines(&text)]);
+        let fields = |row: &csv::StringRecord| row.iter().map(str::to_owned).collect::<Vec<_>>();
+        // What is no table is none of ours.
+        let Ok(header) = reader.headers().map(fields) else { return Ok(None) };
+        if header.first().is_none_or(|column| column != origins::COLUMN) {
+            return Ok(None);
+        }
+        let rows = reader.records().map(|row| row.map(|row| fields(&row)));
+        let rows = rows.collect::<Result<_, _>>();
+        let rows = rows.with_context(|| format!("cannot read {}", path.display()))?;
+        Ok(Some(Self { path, text, header, rows }))
+    }
+
+    fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+
+    /// Writes it with the rows of those origins that a filter lets pass, sorted. Returns how many it has less.
+    fn keep(&self, pass: impl Fn(&str) -> bool) -> Result<usize> {
+        let mut rows: Vec<&Vec<String>> = self.rows.iter().filter(|row| pass(&row[0])).collect();
+        rows.sort_unstable();
+        rows.dedup();
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header)?;
+        rows.iter().try_for_each(|row| writer.write_record(*row))?;
+        let sorted = writer.into_inner()?;
+        if sorted != self.text.as_bytes() {
+            files::replace(&self.path, &sorted)?;
+        }
+        Ok(self.rows.len() - rows.len())
+    }
+}
+
+/// The stores of a folder, by name.
+fn tables(folder: &Path) -> Result<Vec<Stored>> {
+    let unreadable = || format!("cannot read the folder {}", folder.display());
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).with_context(unreadable)? {
+        let path = entry.with_context(unreadable)?.path();
+        if path.extension().is_some_and(|extension| extension == "csv") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    let stores = paths.into_iter().map(Stored::read).collect::<Result<Vec<_>>>()?;
+    Ok(stores.into_iter().flatten().collect())
 }
 
 fn record<T: AsRef<[u8]>>(fields: impl IntoIterator<Item = T>) -> Result<Vec<u8>> {
@@ -321,12 +387,50 @@ mod tests {
     }
 
     #[test]
+    fn a_lost_table_of_origins_loses_no_measurements() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        get(&mut open(&path, "here"), "1", "a", 0.5);
+        let faults = || faults(folder.path()).expect("all are tables");
+        assert_eq!(faults(), [""; 0]);
+        let origins = folder.path().join("origins.csv");
+        for torn in ["", "orig", "origin,machine,version,commit\n1234,he"] {
+            fs::write(&origins, torn).expect("it is written");
+            remove(folder.path(), |_| true).expect("all are tables");
+            assert!(faults().contains(&"rate.csv has rows of an unknown origin".to_owned()));
+            assert_eq!(get(&mut open(&path, "here"), "1", "a", 9.0)[0], 0.5);
+            assert_eq!(faults(), [""; 0], "{torn}");
+        }
+    }
+
+    #[test]
+    fn rows_that_are_there_twice_are_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rate.csv");
+        get(&mut open(&path, "here"), "1", "a", 0.5);
+        let text = fs::read_to_string(&path).expect("text");
+        let row = text.lines().nth(1).expect("it has one");
+        fs::write(&path, format!("{text}{row}\n")).expect("it is written");
+        let faults = || faults(folder.path()).expect("all are tables");
+        assert_eq!(faults(), ["rate.csv is not sorted, or has a row twice"]);
+        assert_eq!(get(&mut open(&path, "here"), "1", "a", 9.0)[0], 0.5);
+        tidy(folder.path()).expect("all are tables");
+        assert_eq!(faults(), [""; 0]);
+        fs::write(&path, format!("{text}{}\n", row.replace("0.5", "0.6"))).expect("it is written");
+        let source = Source { machine: "here".into(), commit: "abc".into() };
+        let other = Store::<2, 2>::open(&path, &source, ["codec", "image"], ["bytes", "psnr"]);
+        let refusal = other.expect_err("which one holds?").to_string();
+        assert!(refusal.contains("two measurements of gip, a"), "{refusal}");
+    }
+
+    #[test]
     fn what_is_of_other_versions_can_be_removed() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("rate.csv");
         get(&mut open(&path, "here"), "old", "a", 1.0);
         get(&mut open(&path, "here"), "new", "a", 2.0);
-        keep(folder.path(), |version| version == "new").expect("all are tables");
+        let removed = remove(folder.path(), |version| version == "old").expect("all are tables");
+        assert_eq!(removed, [("origins.csv".to_owned(), 1), ("rate.csv".to_owned(), 1)]);
         assert_eq!(fs::read_to_string(&path).expect("text").lines().count(), 2);
         assert_eq!(get(&mut open(&path, "here"), "new", "a", 9.0)[0], 2.0);
         assert_eq!(get(&mut open(&path, "here"), "old", "a", 9.0)[0], 9.0);

@@ -20,7 +20,7 @@ impl Table {
 
     pub(crate) fn row<T: AsRef<str>>(&mut self, cells: &[T]) {
         for cell in cells {
-            let _ = write!(self.text, "| {} ", cell.as_ref());
+            let _ = write!(self.text, "| {} ", without_nan(cell.as_ref()));
         }
         self.text.push_str("|\n");
     }
@@ -29,6 +29,16 @@ impl Table {
     pub(crate) fn finish(&self) -> String {
         format!("\n{}", self.text)
     }
+}
+
+/// A cell in which numbers that are not defined, of pictures without a structure for example, are dashes.
+fn without_nan(cell: &str) -> String {
+    let shown = |word: &str| match word.trim_matches(|sign: char| "+-±()".contains(sign)) {
+        "NaN" => word.replace("NaN", "-").replace(['+', '±'], ""),
+        "inf" => word.replace("inf", "∞"),
+        _ => word.to_owned(),
+    };
+    cell.split(' ').map(shown).collect::<Vec<_>>().join(" ")
 }
 
 /// A share as a signed percentage.
@@ -74,6 +84,15 @@ mod tests {
         let mut table = Table::new(&["codec", "bpp"]);
         table.row(&["gip", "0.5"]);
         assert_eq!(table.finish(), "\n| codec | bpp |\n| --- | ---: |\n| gip | 0.5 |\n");
+    }
+
+    #[test]
+    fn numbers_that_are_not_defined_are_dashes() {
+        let cells = ["NaN", "±NaN", "0.9000 (inf)", "-inf dB", "NaN dB", "NaNa of info"];
+        assert_eq!(
+            cells.map(without_nan),
+            ["-", "-", "0.9000 (∞)", "-∞ dB", "- dB", "NaNa of info"]
+        );
     }
 
     #[test]

@@ -12,6 +12,7 @@ use serde::Deserialize;
 use super::binomial::interval;
 use super::key::{self, Shown, Triplet};
 use crate::canvas::{Canvas, LINE};
+use crate::files;
 use crate::table::Table;
 
 /// The most bytes of a sheet.
@@ -35,6 +36,7 @@ pub(crate) struct Args {
 pub(crate) fn print(args: &Args) -> Result<()> {
     for folder in &args.folders {
         let round = Round::load(folder)?;
+        ensure!(!round.answers.is_empty(), "{} has no answers", folder.display());
         println!("{}{}", folder.display(), round.tables());
         if let Some(triplets) = &args.triplets {
             round.write_lost(triplets, folder)?;
@@ -131,13 +133,7 @@ impl Round {
                 answers.push(answer.with_context(unreadable)?);
             }
         }
-        let viewers = folder.join(VIEWERS);
-        let viewers = if viewers.exists() {
-            fs::read_to_string(&viewers)
-                .with_context(|| format!("cannot read {}", viewers.display()))?
-        } else {
-            String::new()
-        };
+        let viewers = files::read_if_any(&folder.join(VIEWERS))?.unwrap_or_default();
         Ok(Self { viewers, ..Self::new(key::read(&folder.join("key.csv"))?, answers)? })
     }
 

@@ -5,6 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
+use clap::builder::RangedU64ValueParser;
 use fastrand::Rng;
 use image::RgbImage;
 use image::imageops::{self, FilterType};
@@ -41,11 +42,15 @@ pub(crate) struct Args {
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
     /// Triplets for each rate and comparison.
-    #[arg(long, value_name = "N", default_value_t = 36)]
+    #[arg(long, value_name = "N", default_value_t = 36, value_parser = at_least_one())]
     count: usize,
     /// Seed of crops, sides and order.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+}
+
+fn at_least_one() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(1..)
 }
 
 pub(crate) fn make(args: &Args) -> Result<()> {

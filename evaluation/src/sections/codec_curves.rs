@@ -91,7 +91,7 @@ pub(super) struct Codec {
     /// For each picture, a point for each setting, or for the first of them.
     pub(super) points: Vec<Vec<Point>>,
     /// The same with other tunings, of which the best counts.
-    retuned: Vec<Vec<Vec<Point>>>,
+    pub(super) retuned: Vec<Vec<Vec<Point>>>,
 }
 
 impl Codec {

@@ -243,7 +243,8 @@ fn ours(bench: &Bench, file: &mut LazyFile<'_>) -> Result<DecoderProfile> {
             seconds(|| Ok(picture_of().render_u8(&nothing, &mut out)?))?,
             faster,
             thumbnail_psnr,
-            seconds(|| render_prefix(tenth, &one, &mut out))?,
+            seconds(|| render_prefix(tenth, &one, &mut out))
+                .context("of the first tenth of the file")?,
             seconds(|| render_prefix(tenth, &preview, &mut out))?,
             gip::open(tenth, |picture| Ok(picture.gaussians().len() as f64))?,
             held,

@@ -8,7 +8,7 @@ use super::codec_curves::{Codec, OURS};
 use super::comparisons::{Comparison, compare};
 use super::ranges::{HIGH, Outcome, RANGES, bd_rates, short};
 use super::rate_store::RateStore;
-use super::reference;
+use super::reference::Reference;
 use crate::baselines::{BEST_AVIF, DESCRIPTION, RIVALS_DESCRIPTION};
 use crate::bench::Bench;
 use crate::comparison::list_or_none;
@@ -34,12 +34,13 @@ const ENDS: usize = 5;
 const BY_PICTURE: &str = "rate-pictures.csv";
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
+    let reference = bench.reference.as_deref().map(Reference::load).transpose()?;
     let mut store = RateStore::open(bench)?;
     let comparisons = compare(bench, &mut store)?;
     let mut text = introduction();
-    if let Some(path) = &bench.reference {
+    if let Some(reference) = reference {
         let kodak = &comparisons[0];
-        text.push_str(&reference::compare(path, &kodak.set.pictures, &kodak.others)?);
+        text.push_str(&reference.compare(&kodak.set.pictures, &kodak.others)?);
     }
     text.push_str(&format!("\n### In short\n{}", in_short(&comparisons)));
     for comparison in &comparisons {

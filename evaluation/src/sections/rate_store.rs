@@ -103,6 +103,7 @@ impl RateStore {
         measure: impl Fn(&mut W, usize, &TestPicture) -> Result<Point> + Sync,
     ) -> Result<Vec<Vec<Point>>> {
         let Wanted { version, codec, settings, pictures, until } = *wanted;
+        self.0.note(version)?;
         // With what is known already, and those first that have most to do.
         let mut jobs: Vec<(&TestPicture, Vec<Option<Point>>)> = Vec::new();
         for picture in pictures {

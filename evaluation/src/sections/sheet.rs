@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use image::{RgbImage, imageops};
 use image_gip::{Target, Threads};
 
@@ -105,7 +105,8 @@ struct Strips {
 
 fn strips_of(bench: &mut Bench, picture: &TestPicture) -> Result<Strips> {
     let file = ours(bench, picture)?;
-    let ours = Version::of_file(&file, None)?;
+    let unreadable = || format!("remove {} and run again", bench.files().display());
+    let ours = Version::of_file(&file, None).with_context(unreadable)?;
     let bytes = ours.bytes;
     let samples = gip::decode_plain(&file, Threads::Pool)?;
     let plain = Version { bytes, samples, report: None };

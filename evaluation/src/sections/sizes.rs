@@ -402,11 +402,13 @@ fn table(ways: &[Way], show: Show, rate: f64) -> String {
 fn worth(ways: &[Way]) -> String {
     let (rendered, all) = (&ways[0], ways[0].files.len());
     let against = |other: &Way| {
-        let each = Metric::ALL.map(|metric| {
+        let each = Metric::ALL.into_iter().filter_map(|metric| {
             let by = metric.shown(rendered.level(metric)) - metric.shown(other.level(metric));
-            format!("{by:+.3} in {} ({}/{all})", metric.name(), rendered.better(other, metric))
+            let better = rendered.better(other, metric);
+            // Not every metric is defined for the smallest pictures.
+            by.is_finite().then(|| format!("{by:+.3} in {} ({better}/{all})", metric.name()))
         });
-        format!("against {}: {}", other.name, each.join(", "))
+        format!("against {}: {}", other.name, each.collect::<Vec<_>>().join(", "))
     };
     // Ours with the better of both filters is the second or the third; the first of the others follows.
     format!(
