@@ -37,11 +37,11 @@ pub(crate) struct Folders {
     /// Folder with a second set of photographs, as .png, for the sections about quality.
     #[arg(long, value_name = "DIR")]
     photos: Option<PathBuf>,
-    /// Folder with pictures of 2,048 pixels, as .png, for `rate`, and for `representation` at the
-    /// paper's 10,000 and 50,000 Gaussians.
+    /// Folder with pictures of 2,048 pixels, as .png: two of them for `rate`, `losses`, `speed` and
+    /// `training`, and for `representation` at the paper's 10,000 and 50,000 Gaussians.
     #[arg(long, value_name = "DIR")]
     large: Option<PathBuf>,
-    /// Folder with screenshots, as .png, for `rate`, `losses` and `monotony`.
+    /// Folder with screenshots, as .png, for `rate`, `losses`, `sizes` and `monotony`.
     #[arg(long, value_name = "DIR")]
     screens: Option<PathBuf>,
     /// CSV with the columns picture and content, for means by class of content in `texture`.
@@ -181,6 +181,15 @@ impl Bench {
         let mut sets = vec![PictureSet { name: "Kodak", pictures: self.pictures.clone() }];
         if !self.photos.is_empty() {
             sets.push(PictureSet { name: "photos", pictures: self.photos.clone() });
+        }
+        sets
+    }
+
+    /// All sets, the large one with those of [`Self::large_sample`].
+    pub(crate) fn compared_sets(&self) -> Vec<PictureSet> {
+        let mut sets = self.all_sets();
+        for set in sets.iter_mut().filter(|set| set.name == "large") {
+            set.pictures = self.large_sample();
         }
         sets
     }

@@ -28,6 +28,14 @@ pub(crate) struct PictureSet {
     pub(crate) pictures: Vec<TestPicture>,
 }
 
+impl PictureSet {
+    /// One in so many of the pictures, evenly spread.
+    pub(crate) fn every(mut self, step: usize) -> Self {
+        self.pictures = self.pictures.into_iter().step_by(step).collect();
+        self
+    }
+}
+
 /// How well a decoded picture agrees with its source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Distortion {

@@ -183,7 +183,9 @@ def main() -> None:
     args.files.mkdir(parents=True, exist_ok=True)
     found = [sorted(path.glob("*.png")) if path.is_dir() else [path] for path in args.pictures]
     pictures = [path for paths in found for path in paths[:: args.every]]
-    scores = [make_files(picture, args.quality, args.files) for picture in pictures]
+    with ProcessPoolExecutor(2) as pool:
+        every = [[value] * len(pictures) for value in (args.quality, args.files)]
+        scores = list(pool.map(make_files, pictures, *every))
     paths = {
         name: [args.files / f"{picture.stem}.{suffix}" for picture in pictures]
         for name, (suffix, _) in READERS.items()

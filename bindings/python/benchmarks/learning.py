@@ -157,15 +157,16 @@ def main() -> None:
             }
             for kind, of_seeds in learned.items():
                 accuracies = [accuracy.result() for accuracy in of_seeds]
-                rows.append((0 if kind == FORMATS[0] else size, kind, accuracies))
+                rows.append((0 if kind == FORMATS[0] else size, kind, quality, accuracies))
     if args.csv:
-        for size, kind, accuracies in rows:
+        for size, kind, quality, accuracies in rows:
+            name = f"{kind} {quality}" if size else kind
             mean = statistics.mean(accuracies)
-            csv.writer(sys.stdout).writerow((kind, size, mean, min(accuracies), max(accuracies)))
+            csv.writer(sys.stdout).writerow((name, size, mean, min(accuracies), max(accuracies)))
         return
     print("| bytes | learned from | accuracy | of each seed |")
     print("| ---: | --- | ---: | --- |")
-    for size, kind, accuracies in rows:
+    for size, kind, _, accuracies in rows:
         each = ", ".join(f"{accuracy:.1f}" for accuracy in accuracies)
         shown = f"{size:,.0f}" if size else "-"
         print(f"| {shown} | {kind} | {statistics.mean(accuracies):.1f} % | {each} |")

@@ -1,6 +1,6 @@
 //! Curves of quality over rate: a codec at all its settings, on all pictures of a set.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use image_gip::{Encoder, Target};
 
 use super::rate_store::{Point, RateStore, Wanted};
@@ -82,6 +82,15 @@ pub(super) fn setting(target: Target) -> String {
     format!("{target}, effort {}", gip::EFFORT)
 }
 
+/// The settings of a baseline that curves run through.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sweep {
+    /// One baseline, or several that are tunings of one codec with the same settings: then each picture has the one
+    /// that is best by the metric in question.
+    pub(super) tunings: &'static [Baseline],
+    pub(super) extent: Extent,
+}
+
 /// A codec with the measurements of all its files.
 #[derive(Debug)]
 pub(super) struct Codec {
@@ -108,41 +117,50 @@ impl Codec {
         let (codec, until) = (variant.name, extent.until);
         let wanted = Wanted { version, codec, settings: &settings, pictures, until };
         let mut threads = parallel::threads();
-        let points = store.all(&wanted, &mut threads, |(), index, picture| {
+        let points = store.all(&[wanted], &mut threads, |(), [_, index], picture| {
             let encoder = (variant.encoder)(gip::EFFORT).with_target(targets[index]);
             Point::of_ours(encoder, picture)
         })?;
+        let points = points.into_iter().flatten().collect();
         Ok(Self { id: codec, name: codec, settings, points, retuned: Vec::new() })
     }
 
-    /// A baseline at its settings. Others of the same settings may be tunings of it: then each
-    /// picture has the one that is best by the metric in question.
-    pub(super) fn baseline(
+    /// Baselines at their settings, given from quick ones to slow ones.
+    pub(super) fn baselines(
         store: &mut RateStore,
         workers: &mut [Worker],
         versions: &str,
-        (baseline, tunings): (&Baseline, &[Baseline]),
+        sweeps: &[Sweep],
         pictures: &[TestPicture],
-        extent: Extent,
-    ) -> Result<Self> {
-        let settings = extent.chosen(baseline.settings);
-        let settings: Vec<String> = settings.into_iter().map(str::to_owned).collect();
-        let mut points = |baseline: &Baseline| {
-            let wanted = Wanted {
-                version: versions,
-                codec: baseline.id,
-                settings: &settings,
-                pictures,
-                until: extent.until,
-            };
-            store.all(&wanted, workers, |worker, index, picture| {
-                Point::of_baseline(worker, baseline, &settings[index], picture)
-            })
+    ) -> Result<Vec<Self>> {
+        let tunings = |sweep: &Sweep| {
+            let settings: Vec<&str> = sweep.extent.chosen(sweep.tunings[0].settings);
+            let settings: Vec<String> = settings.into_iter().map(str::to_owned).collect();
+            let until = sweep.extent.until;
+            sweep.tunings.iter().map(move |baseline| (baseline, settings.clone(), until))
         };
-        let first = points(baseline)?;
-        let retuned = tunings.iter().map(points).collect::<Result<_>>()?;
-        let Baseline { id, name, .. } = *baseline;
-        Ok(Self { id, name, settings, points: first, retuned })
+        let all: Vec<(&Baseline, Vec<String>, f64)> = sweeps.iter().flat_map(tunings).collect();
+        let wanted = all.iter().map(|(baseline, settings, until)| Wanted {
+            version: versions,
+            codec: baseline.id,
+            settings,
+            pictures,
+            until: *until,
+        });
+        let wanted: Vec<Wanted<'_>> = wanted.collect();
+        let points = store.all(&wanted, workers, |worker, [codec, index], picture| {
+            let (baseline, settings, _) = &all[codec];
+            Point::of_baseline(worker, baseline, &settings[index], picture)
+        })?;
+        let mut of_tunings = all.iter().zip(points);
+        let codecs = sweeps.iter().map(|sweep| {
+            let ((baseline, settings, _), points) = of_tunings.next()?;
+            let others = of_tunings.by_ref().take(sweep.tunings.len() - 1);
+            let retuned = others.map(|(_, points)| points).collect();
+            let Baseline { id, name, .. } = **baseline;
+            Some(Self { id, name, settings: settings.clone(), points, retuned })
+        });
+        codecs.collect::<Option<_>>().context("each has the points of its tunings")
     }
 
     /// The points of a picture with the tuning that is best by a metric.

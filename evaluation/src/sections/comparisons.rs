@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 
-use super::codec_curves::{Codec, Extent, OURS};
+use super::codec_curves::{Codec, Extent, OURS, Sweep};
 use super::ranges::HIGH;
 use super::rate_store::RateStore;
 use crate::baselines::{self, BEST_AVIF};
@@ -44,18 +44,19 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
     let mut comparisons = Vec::new();
     let quick = bench.quick;
     // A large picture takes AVIF at its best longer than a quick run may last.
-    let sets = bench.all_sets().into_iter().filter(|set| !(quick && set.name == "large"));
-    for set in sets.map(thinned) {
+    let sets = bench.compared_sets();
+    for set in sets.into_iter().filter(|set| !(quick && set.name == "large")) {
         let ours = Codec::ours(store, &product, &default, &set.pictures, extent(quick, 1))?;
         let (workers, versions) = bench.workers()?;
-        let rivals = baselines::rivals().filter(|(rival, _)| is_in(set.name, rival.name));
-        let others = rivals.map(|rival| {
+        let rivals = baselines::rivals().filter(|tunings| is_in(set.name, tunings[0].name));
+        let sweeps = rivals.map(|tunings| {
             // It has few settings anyway.
-            let is_best = rival.0.name == BEST_AVIF[0].name;
+            let is_best = tunings[0].name == BEST_AVIF[0].name;
             let step = if is_best { 1 } else { step_of_others(set.name) };
-            Codec::baseline(store, workers, &versions, rival, &set.pictures, extent(quick, step))
+            Sweep { tunings, extent: extent(quick, step) }
         });
-        let others = others.collect::<Result<_>>()?;
+        let sweeps: Vec<Sweep> = sweeps.collect();
+        let others = Codec::baselines(store, workers, &versions, &sweeps, &set.pictures)?;
         comparisons.push(Comparison { set, ours, others });
     }
     for Comparison { set, others, .. } in &mut comparisons {
@@ -65,15 +66,6 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
         }
     }
     Ok(comparisons)
-}
-
-/// A set with the pictures that are compared: of the large ones, each of which takes as long as seven
-/// of Kodak's, every other one.
-fn thinned(mut set: PictureSet) -> PictureSet {
-    if set.name == "large" {
-        set.pictures = set.pictures.into_iter().step_by(2).collect();
-    }
-    set
 }
 
 /// One in so many settings of the others is measured on a set: screenshots take them as long as all
@@ -105,32 +97,15 @@ fn is_in(set: &str, codec: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pictures::TestPicture;
-
-    #[test]
-    fn every_other_large_picture_is_compared() {
-        let picture = |name: &str| TestPicture {
-            name: name.into(),
-            path: "".into(),
-            width: 1,
-            height: 1,
-            rgb: vec![0; 3],
-        };
-        let names = |name: &'static str| {
-            let pictures = ["a", "b", "c"].map(picture).into();
-            let set = thinned(PictureSet { name, pictures });
-            set.pictures.into_iter().map(|picture| picture.name).collect::<Vec<_>>()
-        };
-        assert_eq!(names("large"), ["a", "c"]);
-        assert_eq!(names("photos"), ["a", "b", "c"]);
-    }
 
     #[test]
     fn every_codec_is_on_the_first_set_and_ours_beside_the_best_on_all() {
-        for (rival, _) in baselines::rivals() {
+        for rival in baselines::rivals().map(|tunings| &tunings[0]) {
             assert!(is_in("Kodak", rival.name), "{}", rival.name);
         }
-        assert!(ON_LARGE.iter().all(|name| baselines::rivals().any(|(r, _)| r.name == *name)));
+        assert!(
+            ON_LARGE.iter().all(|name| baselines::rivals().any(|tunings| tunings[0].name == *name))
+        );
         for set in ["Kodak", "photos", "large", "screens"] {
             assert!(is_in(set, BEST_AVIF[0].name), "{set}");
         }

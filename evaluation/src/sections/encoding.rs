@@ -3,6 +3,7 @@
 use anyhow::Result;
 use image_gip::{ColorModel, Encoder, Source, Target, Threads};
 
+use super::ranges::short;
 use crate::bench::Bench;
 use crate::pictures::{self, TestPicture};
 use crate::store::Store;
@@ -11,7 +12,7 @@ use crate::{gip, memory};
 
 /// An encoding is timed so often, or until all of its runs have taken so many seconds.
 const RUNS: usize = 5;
-const SECONDS: f64 = 4.0;
+const SECONDS: f64 = 2.0;
 /// The tiles of the largest picture: 25 megapixels.
 const TILES: (u32, u32) = (12, 8);
 const TILE: u32 = 512;
@@ -39,7 +40,8 @@ pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64)
     );
     for &(name, pictures) in sets {
         if !pictures.is_empty() {
-            text.push_str(&format!("\n{name}, {} pictures:\n", pictures.len()));
+            let names: Vec<&str> = pictures.iter().map(|picture| short(&picture.name)).collect();
+            text.push_str(&format!("\n{name}, {}:\n", names.join(", ")));
             text.push_str(&set(bench, name, pictures, rate)?);
         }
     }

@@ -1,5 +1,7 @@
 //! Whether more bits, and more effort, give a picture that is no worse.
 
+use std::collections::HashSet;
+
 use anyhow::Result;
 use image_gip::{Target, Threads, Tune};
 
@@ -50,7 +52,11 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     let rates: &[f64] = if bench.quick { &QUICK_RATES } else { &RATES };
     let keys = ["tune", "effort", "bpp", "image"];
     let mut store: Store<4, 3> = bench.store("monotony.csv", keys, ["bytes", "psnr", "quality"])?;
-    let pictures: Vec<TestPicture> = bench.all_sets().into_iter().flat_map(part).collect();
+    // Of large pictures one, which takes as long as seven of Kodak's.
+    let step = |set: &PictureSet| if set.name == "large" { LARGE_STEP } else { STEP };
+    let sets = bench.all_sets().into_iter();
+    let pictures: Vec<TestPicture> =
+        sets.flat_map(|set| set.clone().every(step(&set)).pictures).collect();
     let runs = pictures.iter().flat_map(|picture| TUNES.map(|tune| (picture, tune)));
     let runs: Vec<(&TestPicture, (&str, Tune))> = runs.collect();
     let settings = EFFORTS.iter().flat_map(|&effort| rates.iter().map(move |&rate| (effort, rate)));
@@ -83,22 +89,30 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     bench.figure("falls", falls.len() as f64, "files");
     bench.figure("worst", falls.first().map_or(0.0, |fall| fall.by), "dB");
     let mut text = format!(
-        "Compared: {} pictures, one in {STEP} of each set (of large ones one in {LARGE_STEP}), at {rates:?} bits per pixel and efforts {EFFORTS:?}. A picture falls if its \
-         PSNR is more than {TOLERANCE} dB below that of a file with fewer bits and the same effort, or with \
-         less effort and the same bits; above {EXACT} dB nothing but rounding is left of the error.\n\n",
+        "Compared with each other: files of {} pictures, one in {STEP} of each set (of large ones one in {LARGE_STEP}), \
+         at {} bits per pixel and at the efforts {} (the default is {}). A picture \
+         falls if its PSNR is more than {TOLERANCE} dB below that of a file with fewer bits and the same effort, or \
+         with less effort and the same bits; above {EXACT} dB nothing but rounding is left of the error.\n\n",
         pictures.len(),
+        listed(rates),
+        listed(&EFFORTS),
+        gip::EFFORT,
     );
     text.push_str(&counts(&files, &falls));
+    let compared = files.len() * settings.len();
+    text.push_str(&match falls.first() {
+        Some(worst) => format!(
+            "\nOf {compared} files {} fall, the worst by {:.2} dB ({}).\n",
+            fallen(&falls),
+            worst.by,
+            worst.picture
+        ),
+        None => format!("\nOf {compared} files none falls.\n"),
+    });
     if !falls.is_empty() {
         text.push_str(&format!("\nThe largest falls:\n\n{}", named(&falls)));
     }
     Ok(text)
-}
-
-/// The pictures of a set that are measured, evenly spread: of large ones few, which take as long.
-fn part(set: PictureSet) -> Vec<TestPicture> {
-    let step = if set.name == "large" { LARGE_STEP } else { STEP };
-    set.pictures.into_iter().step_by(step).collect()
 }
 
 /// Bytes, PSNR and quality of a file.
@@ -135,6 +149,21 @@ impl<'a> Files<'a> {
         }
         falls
     }
+}
+
+/// Numbers in a sentence.
+fn listed<T: ToString>(numbers: &[T]) -> String {
+    let [others @ .., last] = numbers else { return String::new() };
+    let others: Vec<String> = others.iter().map(T::to_string).collect();
+    format!("{} and {}", others.join(", "), last.to_string())
+}
+
+/// How many files fall, whether below one better file or several.
+fn fallen(falls: &[Fall<'_>]) -> usize {
+    let file = |fall: &Fall<'_>| {
+        (fall.tune.to_owned(), fall.picture.to_owned(), fall.file.0, fall.file.1.to_bits())
+    };
+    falls.iter().map(file).collect::<HashSet<_>>().len()
 }
 
 /// How many files fall, by tune, effort and rate.
@@ -195,6 +224,7 @@ mod tests {
         let falls = files[0].falls();
         let found: Vec<_> = falls.iter().map(|fall| (fall.file, fall.better, fall.by)).collect();
         assert_eq!(found, [((2, 1.0), (1, 1.0), 2.5), ((2, 1.0), (2, 0.5), 0.5)]);
+        assert_eq!((fallen(&falls), listed(&[1, 2, 3])), (1, "1, 2 and 3".to_owned()));
         let counts = counts(&files, &falls);
         assert!(counts.contains("| visual | 2 | 0 of 1 | 1 of 1 | 2.50 dB |"), "{counts}");
     }

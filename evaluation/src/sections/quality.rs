@@ -11,7 +11,7 @@ use crate::gip;
 use crate::table::{Table, mean};
 
 /// The qualities that the encoder is asked for.
-const QUALITIES: [f64; 7] = [30.0, 50.0, 60.0, 70.0, 75.0, 80.0, 90.0];
+const QUALITIES: [f64; 5] = [30.0, 50.0, 60.0, 75.0, 90.0];
 const QUICK_QUALITIES: [f64; 2] = [50.0, 75.0];
 /// How far SSIMULACRA2 may be from its mean over the pictures.
 const TOLERANCE: f64 = 4.0;

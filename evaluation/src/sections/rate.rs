@@ -66,7 +66,7 @@ fn introduction() -> String {
          BD-rate is how much larger (+) or smaller (-) our files are at equal quality, as a mean over the \
          qualities that both reach within a range of rates: {}. A picture without such a quality is left out; one is \
          won if our files are smaller. [{BY_PICTURE}]({BY_PICTURE}) has every picture's, [rate.csv](rate.csv) every \
-         file. Of the large pictures every other one is compared.\n",
+         file.\n",
         OURS.each_ref().map(|variant| variant.name).join(", "),
         OURS[0].settings().join("; "),
         HIGH.rates.1,

@@ -94,71 +94,72 @@ impl RateStore {
         Ok(values.into())
     }
 
-    /// For each picture the points of its files. What is missing is measured with one thread for
-    /// each worker, by `measure` of the index of a setting.
+    /// Of some codecs, given from quick ones to slow ones: for each picture the points of its files. What is
+    /// missing is measured with one thread for each worker, by `measure` of the indices of codec and setting.
     pub(super) fn all<W: Send>(
         &mut self,
-        wanted: &Wanted<'_>,
+        all: &[Wanted<'_>],
         workers: &mut [W],
-        measure: impl Fn(&mut W, usize, &TestPicture) -> Result<Point> + Sync,
-    ) -> Result<Vec<Vec<Point>>> {
-        let Wanted { version, codec, settings, pictures, until } = *wanted;
-        self.0.note(version)?;
-        // With what is known already, and those first that have most to do.
-        let mut jobs: Vec<(&TestPicture, Vec<Option<Point>>)> = Vec::new();
-        for picture in pictures {
-            let known = settings.iter().map(|setting| self.known(version, codec, setting, picture));
-            jobs.push((picture, known.collect()));
+        measure: impl Fn(&mut W, [usize; 2], &TestPicture) -> Result<Point> + Sync,
+    ) -> Result<Vec<Vec<Vec<Point>>>> {
+        // With what is known already, and those first that take longest, so that all workers end at once.
+        let mut jobs: Vec<(usize, &TestPicture, Vec<Option<Point>>)> = Vec::new();
+        for (codec, wanted) in all.iter().enumerate() {
+            self.0.note(wanted.version)?;
+            for picture in wanted.pictures {
+                let known = wanted.settings.iter();
+                let known = known.map(|setting| self.known(wanted, setting, picture));
+                jobs.push((codec, picture, known.collect()));
+            }
         }
-        jobs.sort_by_key(|(picture, _)| Reverse(picture.rgb.len()));
+        jobs.sort_by_key(|(codec, picture, _)| Reverse((*codec, picture.rgb.len())));
         let work = |worker: &mut W,
-                    (picture, known): &(&TestPicture, Vec<Option<Point>>),
-                    emit: &mut dyn FnMut((String, String, Point))| {
-            for (index, setting) in settings.iter().enumerate() {
+                    (codec, picture, known): &(usize, &TestPicture, Vec<Option<Point>>),
+                    emit: &mut dyn FnMut((usize, usize, String, Point))| {
+            let wanted = &all[*codec];
+            for (index, setting) in wanted.settings.iter().enumerate() {
                 let point = match known[index] {
                     Some(point) => point,
                     None => {
-                        let key = || format!("{codec}, {setting}, {}", picture.name);
-                        let point = measure(worker, index, picture).with_context(key)?;
-                        emit((setting.clone(), picture.name.clone(), point));
+                        let key = || format!("{}, {setting}, {}", wanted.codec, picture.name);
+                        let point = measure(worker, [*codec, index], picture).with_context(key)?;
+                        emit((*codec, index, picture.name.clone(), point));
                         point
                     }
                 };
-                if point.rate >= until {
+                if point.rate >= wanted.until {
                     break;
                 }
             }
             Ok(())
         };
         let store = &mut self.0;
-        parallel::for_each(workers, &jobs, work, |(setting, picture, point)| {
-            store.get(version, [codec, &setting, &picture], || Ok(point.values())).map(|_| ())
+        parallel::for_each(workers, &jobs, work, |(codec, setting, picture, point)| {
+            let Wanted { version, codec, settings, .. } = all[codec];
+            let key = [codec, &settings[setting], &picture];
+            store.get(version, key, || Ok(point.values())).map(|_| ())
         })?;
-        pictures
-            .iter()
-            .map(|picture| {
-                let mut points = Vec::new();
-                for setting in settings {
-                    let point = self.known(version, codec, setting, picture);
-                    let point = point.context("it was measured above")?;
-                    points.push(point);
-                    if point.rate >= until {
-                        break;
-                    }
-                }
-                Ok(points)
-            })
-            .collect()
+        let of_all = all.iter().map(|wanted| {
+            wanted.pictures.iter().map(|picture| self.points(wanted, picture)).collect()
+        });
+        of_all.collect()
     }
 
-    fn known(
-        &self,
-        version: &str,
-        codec: &str,
-        setting: &str,
-        picture: &TestPicture,
-    ) -> Option<Point> {
-        self.0.known(version, [codec, setting, &picture.name]).map(Point::from)
+    /// The points of a picture, which are all measured.
+    fn points(&self, wanted: &Wanted<'_>, picture: &TestPicture) -> Result<Vec<Point>> {
+        let mut points = Vec::new();
+        for setting in wanted.settings {
+            let point = self.known(wanted, setting, picture).context("it was measured before")?;
+            points.push(point);
+            if point.rate >= wanted.until {
+                break;
+            }
+        }
+        Ok(points)
+    }
+
+    fn known(&self, wanted: &Wanted<'_>, setting: &str, picture: &TestPicture) -> Option<Point> {
+        self.0.known(wanted.version, [wanted.codec, setting, &picture.name]).map(Point::from)
     }
 }
 
@@ -194,13 +195,13 @@ mod tests {
                 pictures: &pictures,
                 until,
             };
-            let points = store.all(&wanted, &mut [(), ()], |(), index, picture| {
+            let points = store.all(&[wanted], &mut [(), ()], |(), [_, index], picture| {
                 count.fetch_add(1, Ordering::Relaxed);
                 // A file of the larger picture has half as many bits per pixel.
                 let rate = (index + 1) as f64 / f64::from(picture.width);
                 Ok(Point { bytes: 1.0, rate, distortion: Distortion::from([rate; 5]) })
             });
-            let points = points.expect("it measures");
+            let [points] = &points.expect("it measures")[..] else { panic!("there is one codec") };
             let rates = |points: &Vec<Point>| points.iter().map(|point| point.rate).collect();
             let rates: Vec<Vec<f64>> = points.iter().map(rates).collect();
             (rates, count.swap(0, Ordering::Relaxed))

@@ -19,7 +19,7 @@ use crate::versions::nearest;
 /// The rate of all files, approximately, in bits per pixel.
 const RATE: f64 = 0.5;
 /// How many pictures are coded.
-const PICTURES: usize = 8;
+const PICTURES: usize = 6;
 const QUICK_PICTURES: usize = 1;
 /// The baselines' times are medians over so many runs.
 const REPEATS: u32 = 5;
@@ -33,7 +33,7 @@ const TIMES: [&str; 4] = [
 ];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let (kodak, large) = (pictures(bench), bench.large.clone());
+    let (kodak, large) = (pictures(bench), bench.large_sample());
     let sets = [("Kodak", &kodak[..]), ("Large pictures", &large[..])];
     // What matters most comes first, so that a run that is interrupted has it.
     let races = race::measure(bench, &sets)?;
@@ -61,8 +61,6 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         }
     }
     text.push_str(&races);
-    let large = bench.large_sample();
-    let sets = [("Kodak", &kodak[..]), ("Large pictures", &large[..])];
     text.push_str(&encoding::efforts(bench, &sets, RATE)?);
     text.push_str(&encoding::single_pictures(bench, RATE)?);
     text.push_str(&growth::measure(bench)?);

@@ -25,8 +25,10 @@ const READERS: [&str; 7] = [
     "WebP by Pillow",
     "AVIF by Pillow",
 ];
-/// What a network learns from.
-const LEARNED: [&str; 3] = ["the pictures", "gip", "JPEG"];
+/// What a network learns from, besides from files, as the program calls it.
+const PICTURES_THEMSELVES: &str = "the pictures";
+/// The formats of the files, whose quality follows in the program's rows.
+const FILES: [&str; 2] = ["gip", "JPEG"];
 /// Qualities of JPEG whose bytes all have.
 const QUALITIES: [&str; 2] = ["10", "30"];
 const QUICK_QUALITIES: [&str; 1] = ["30"];
@@ -97,32 +99,34 @@ fn crops(
 fn learning(bench: &Bench, run: &impl Fn(&str) -> Command) -> Result<String> {
     let mut store = bench.store(
         "training-learning.csv",
-        ["run", "quality", "learned"],
+        ["run", "learned"],
         ["bytes", "accuracy", "lowest", "highest"],
     )?;
     let mut table = Table::new(&["learned from", "bytes", "accuracy in %", "lowest", "highest"]);
     let qualities: &[&str] = if bench.quick { &QUICK_QUALITIES } else { &QUALITIES };
-    for (index, &quality) in qualities.iter().enumerate() {
-        let mut command = run("learning.py");
-        command.args(["--quality", quality]);
-        if bench.quick {
-            command.args(["--pictures", "300", "--epochs", "4", "--seeds", "1"]);
-        }
-        let mut measured = Measured::new(command);
-        let extent = if bench.quick { "quick" } else { "full" };
-        for learned in LEARNED {
-            let key = [extent, quality, learned];
-            let [bytes, accuracies @ ..] =
-                store.get(&bench.product, key, || measured.row(learned))?;
-            // Without a file, they are the same for each quality.
-            if bytes > 0.0 || index == 0 {
-                bench.figure(format!("{learned}/{quality}/accuracy"), accuracies[0], "%");
-                bench.figure(format!("{learned}/{quality}/bytes"), bytes, "");
-                let bytes = if bytes > 0.0 { format!("{bytes:.0}") } else { "-".into() };
-                let accuracies = accuracies.map(|accuracy| format!("{accuracy:.1}"));
-                table.row(&[&[learned.to_owned(), bytes], &accuracies[..]].concat());
-            }
-        }
+    let mut command = run("learning.py");
+    command.arg("--quality").args(qualities);
+    if bench.quick {
+        command.args(["--pictures", "300", "--epochs", "4", "--seeds", "1"]);
+    }
+    let mut measured = Measured::new(command);
+    let extent = if bench.quick { "quick" } else { "full" };
+    let files = qualities.iter().flat_map(|&quality| FILES.map(|format| (format, quality)));
+    for (format, quality) in [(PICTURES_THEMSELVES, "")].into_iter().chain(files) {
+        let learned = format!("{format} {quality}");
+        let learned = learned.trim_end();
+        let [bytes, accuracies @ ..] =
+            store.get(&bench.product, [extent, learned], || measured.row(learned))?;
+        let name = if quality.is_empty() { format.into() } else { format!("{format}/{quality}") };
+        bench.figure(format!("{name}/accuracy"), accuracies[0], "%");
+        let size = if quality.is_empty() {
+            "-".to_owned()
+        } else {
+            bench.figure(format!("{name}/bytes"), bytes, "");
+            format!("{bytes:.0}")
+        };
+        let accuracies = accuracies.map(|accuracy| format!("{accuracy:.1}"));
+        table.row(&[&[format.to_owned(), size], &accuracies[..]].concat());
     }
     Ok(format!(
         "\n`bindings/python/benchmarks/learning.py` has a small network learn handwritten digits before parts of \

@@ -1,17 +1,16 @@
 //! Noise, on its own: the same photographs without and with it.
 
-use std::fs;
+use std::{fs, slice};
 
 use anyhow::Result;
 use image::RgbImage;
 
 use super::source::Source;
-use crate::baselines;
 use crate::bench::Bench;
 use crate::gip;
 use crate::metric::Metric;
 use crate::pictures::TestPicture;
-use crate::sections::codec_curves::{Codec, Extent, OURS};
+use crate::sections::codec_curves::{Codec, Extent, OURS, Sweep};
 use crate::sections::content::{GRAIN, middle, noisy};
 use crate::sections::ranges::{HIGH, MIDDLE, Outcome, bd_rates};
 use crate::sections::rate_store::RateStore;
@@ -89,10 +88,11 @@ fn measured(
         .collect::<Result<_>>()?;
     let mut codecs = vec![Codec::ours(store, &product, &OURS[0], &pictures, extent)?];
     let (workers, versions) = bench.workers()?;
-    for name in OTHERS {
-        let alone = (versions::baseline_called(name)?, baselines::ALONE);
-        codecs.push(Codec::baseline(store, workers, &versions, alone, &pictures, extent)?);
-    }
+    let sweeps = OTHERS.map(|name| {
+        Ok(Sweep { tunings: slice::from_ref(versions::baseline_called(name)?), extent })
+    });
+    let sweeps = sweeps.into_iter().collect::<Result<Vec<_>>>()?;
+    codecs.extend(Codec::baselines(store, workers, &versions, &sweeps, &pictures)?);
     fs::remove_dir_all(folder)?;
     Ok(codecs)
 }

@@ -1,18 +1,19 @@
 //! Our curve on Kodak beside curves that others have printed, in the convention of papers.
 
 use std::path::Path;
+use std::slice;
 
 use anyhow::{Context, Result};
 use image_gip::Target;
 use serde::Deserialize;
 
-use crate::baselines::{ALONE, BASELINES};
+use crate::baselines::BASELINES;
 use crate::bench::Bench;
 use crate::curve::{Curve, bd_rate};
 use crate::gip;
 use crate::metric::Metric;
 use crate::provenance::FOLDER;
-use crate::sections::codec_curves::{Codec, Extent, Variant};
+use crate::sections::codec_curves::{Codec, Extent, Sweep, Variant};
 use crate::sections::rate_store::RateStore;
 use crate::table::{Table, decibels, median, percent};
 
@@ -85,7 +86,8 @@ pub(super) fn measure(bench: &mut Bench) -> Result<String> {
 fn read(path: &Path) -> Result<Vec<Row>> {
     let mut reader =
         csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
-    Ok(reader.deserialize().collect::<Result<_, _>>()?)
+    let rows = reader.deserialize().collect::<Result<_, _>>();
+    rows.with_context(|| format!("cannot read {}", path.display()))
 }
 
 /// Ours and then the baselines, as measured on Kodak.
@@ -95,10 +97,11 @@ fn measured(bench: &mut Bench) -> Result<Vec<Printed>> {
     let product = bench.product.clone();
     let mut codecs = vec![Codec::ours(&mut store, &product, &OURS, &pictures, extent)?];
     let (workers, versions) = bench.workers()?;
-    for baseline in &BASELINES {
-        let (store, alone) = (&mut store, (baseline, ALONE));
-        codecs.push(Codec::baseline(store, workers, &versions, alone, &pictures, extent)?);
-    }
+    let sweeps: Vec<Sweep> = BASELINES
+        .iter()
+        .map(|baseline| Sweep { tunings: slice::from_ref(baseline), extent })
+        .collect();
+    codecs.extend(Codec::baselines(&mut store, workers, &versions, &sweeps, &pictures)?);
     let row = |codec: Codec| Printed {
         name: codec.name.to_owned(),
         curves: METRICS.map(|metric| codec.mean_curve(metric)),
