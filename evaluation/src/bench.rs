@@ -19,6 +19,8 @@ use crate::report;
 use crate::store::{Source, Store};
 use crate::{gip, provenance};
 
+/// Packages of Rust that make figures of the report: metrics, and placeholders.
+const PACKAGES: [&str; 5] = ["blurhash", "butteraugli", "colorvideovdp", "fast-ssim2", "thumbhash"];
 /// How many pictures a quick run takes.
 const QUICK_PICTURES: usize = 2;
 const QUICK_LARGE_PICTURES: usize = 1;
@@ -37,7 +39,7 @@ pub(crate) struct Folders {
     /// Folder with a second set of photographs, as .png, for the sections about quality.
     #[arg(long, value_name = "DIR")]
     photos: Option<PathBuf>,
-    /// Folder with pictures of 2,048 pixels, as .png: two of them for `rate`, `losses`, `speed` and
+    /// Folder with pictures of 2,048 pixels, as .png, for `rate`, `losses` and `speed`; two of them for
     /// `training`, and for `representation` at the paper's 10,000 and 50,000 Gaussians.
     #[arg(long, value_name = "DIR")]
     large: Option<PathBuf>,
@@ -185,15 +187,6 @@ impl Bench {
         sets
     }
 
-    /// All sets, the large one with those of [`Self::large_sample`].
-    pub(crate) fn compared_sets(&self) -> Vec<PictureSet> {
-        let mut sets = self.all_sets();
-        for set in sets.iter_mut().filter(|set| set.name == "large") {
-            set.pictures = self.large_sample();
-        }
-        sets
-    }
-
     /// At most so many of the pictures, evenly spread.
     pub(crate) fn sample(&self, at_most: usize) -> Vec<TestPicture> {
         spread(&self.pictures, at_most)
@@ -224,29 +217,9 @@ impl Bench {
         Store::open(&self.path(name), &self.source, keys, values)
     }
 
-    /// The folder of files of this version of our codec.
-    pub(crate) fn files(&self) -> PathBuf {
-        self.path("files").join(&self.product)
-    }
-
-    /// A file that takes long to make: from [`Self::files`], or
-    /// else made now and kept there.
-    pub(crate) fn file(
-        &self,
-        name: &str,
-        make: impl FnOnce() -> Result<Vec<u8>>,
-    ) -> Result<Vec<u8>> {
-        let folder = self.files();
-        let path = folder.join(name);
-        if let Ok(bytes) = fs::read(&path) {
-            return Ok(bytes);
-        }
-        eprintln!("{name}");
-        let bytes = make()?;
-        fs::create_dir_all(&folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
-        files::replace(&path, &bytes)?;
-        Ok(bytes)
+    /// Files of this version of our codec that take long to make.
+    pub(crate) fn kept_files(&self) -> KeptFiles {
+        KeptFiles(self.path("files").join(&self.product))
     }
 
     /// The baselines, with their versions in one line.
@@ -323,6 +296,7 @@ impl Bench {
                 self.unlisted.join(", ")
             ));
         }
+        list.push_str(&format!("- Packages: {}\n", provenance::packages(&PACKAGES)?.join(", ")));
         if let Some(worker) = self.workers.first().filter(|_| self.uses_baselines) {
             list.push_str(&format!("- Baselines: {}\n", worker.versions.join(", ")));
         }
@@ -330,6 +304,35 @@ impl Bench {
             list.push_str(report::QUICK);
         }
         Ok(list)
+    }
+}
+
+/// A folder of files that take long to make.
+#[derive(Clone, Debug)]
+pub(crate) struct KeptFiles(PathBuf);
+
+impl KeptFiles {
+    /// Where a file is kept.
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// A file: what is kept, or else made now.
+    pub(crate) fn get(
+        &self,
+        name: &str,
+        make: impl FnOnce() -> Result<Vec<u8>>,
+    ) -> Result<Vec<u8>> {
+        let path = self.path(name);
+        if let Ok(bytes) = fs::read(&path) {
+            return Ok(bytes);
+        }
+        eprintln!("{name}");
+        let bytes = make()?;
+        fs::create_dir_all(&self.0)
+            .with_context(|| format!("cannot make the folder {}", self.0.display()))?;
+        files::replace(&path, &bytes)?;
+        Ok(bytes)
     }
 }
 
@@ -368,9 +371,10 @@ mod tests {
         let (images, report) = (images.expect("a folder"), report.expect("a folder"));
         image::RgbImage::new(3, 2).save(images.path().join("a.png")).expect("it is written");
         let bench = open(images.path(), report.path()).expect("there is a picture");
-        assert!(bench.file("a.gip", || anyhow::bail!("it cannot be made")).is_err());
-        assert_eq!(bench.file("a.gip", || Ok(vec![1, 2])).expect("it is made"), [1, 2]);
-        assert_eq!(bench.file("a.gip", || Ok(vec![3])).expect("it is kept"), [1, 2]);
+        let files = bench.kept_files();
+        assert!(files.get("a.gip", || anyhow::bail!("it cannot be made")).is_err());
+        assert_eq!(files.get("a.gip", || Ok(vec![1, 2])).expect("it is made"), [1, 2]);
+        assert_eq!(files.get("a.gip", || Ok(vec![3])).expect("it is kept"), [1, 2]);
     }
 
     #[test]

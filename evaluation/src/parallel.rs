@@ -63,6 +63,28 @@ pub(crate) fn for_each<W: Send, J: Sync, R: Send>(
     })
 }
 
+/// What some jobs come to, in their order, with one thread for each worker.
+///
+/// # Errors
+/// The first failure; no further job begins after it.
+pub(crate) fn map<W: Send, J: Sync, R: Send>(
+    workers: &mut [W],
+    jobs: &[J],
+    work: impl Fn(&mut W, &J) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
+    let indices: Vec<usize> = (0..jobs.len()).collect();
+    let mut all: Vec<Option<R>> = jobs.iter().map(|_| None).collect();
+    let work = |worker: &mut W, &index: &usize, emit: &mut dyn FnMut((usize, R))| {
+        emit((index, work(worker, &jobs[index])?));
+        Ok(())
+    };
+    for_each(workers, &indices, work, |(index, result)| {
+        all[index] = Some(result);
+        Ok(())
+    })?;
+    Ok(all.into_iter().flatten().collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +112,18 @@ mod tests {
         kept.sort_unstable();
         assert_eq!(kept, (0..100).collect::<Vec<_>>());
         assert_eq!(counts.iter().sum::<u32>(), 50);
+    }
+
+    #[test]
+    fn results_have_the_order_of_their_jobs() {
+        let jobs: Vec<u32> = (0..50).collect();
+        let doubled = map(&mut [(), ()], &jobs, |(), job| Ok(2 * job)).expect("nothing fails");
+        assert_eq!(doubled, (0..50).map(|job| 2 * job).collect::<Vec<_>>());
+        let failed = map(&mut [(), ()], &jobs, |(), job| {
+            anyhow::ensure!(*job != 7, "job {job}");
+            Ok(())
+        });
+        assert_eq!(failed.expect_err("the eighth fails").to_string(), "job 7");
     }
 
     #[test]

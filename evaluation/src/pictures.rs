@@ -74,6 +74,31 @@ impl From<[f64; 5]> for Distortion {
     }
 }
 
+/// A picture with what metrics need of it.
+pub(crate) struct Reference<'a> {
+    pub(crate) picture: &'a TestPicture,
+    visual: visual::Reference,
+}
+
+impl Reference<'_> {
+    pub(crate) fn distortion(&self, decoded: &[u8]) -> Result<Distortion> {
+        let TestPicture { rgb, width, height, .. } = self.picture;
+        ensure!(
+            decoded.len() == rgb.len(),
+            "{} samples were decoded in place of {}",
+            decoded.len(),
+            rgb.len()
+        );
+        Ok(Distortion {
+            psnr: metrics::psnr(rgb, decoded, 255.0),
+            ms_ssim: metrics::ms_ssim(rgb, decoded, *width as usize, 3, 255.0),
+            ssimulacra2: self.visual.ssimulacra2(decoded)?,
+            butteraugli: self.visual.butteraugli_3_norm(decoded)?,
+            cvvdp: visual::cvvdp(rgb, decoded, *width, *height)?,
+        })
+    }
+}
+
 impl TestPicture {
     pub(crate) fn pixels(&self) -> f64 {
         f64::from(self.width) * f64::from(self.height)
@@ -84,21 +109,15 @@ impl TestPicture {
         8.0 * bytes / self.pixels()
     }
 
+    /// What it is that decoded pictures are compared with.
+    pub(crate) fn reference(&self) -> Result<Reference<'_>> {
+        let visual = visual::Reference::new(&self.rgb, self.width, self.height)?;
+        Ok(Reference { picture: self, visual })
+    }
+
+    /// For one decoded picture; for more of them, [`Self::reference`] takes less time.
     pub(crate) fn distortion(&self, decoded: &[u8]) -> Result<Distortion> {
-        ensure!(
-            decoded.len() == self.rgb.len(),
-            "{} samples were decoded in place of {}",
-            decoded.len(),
-            self.rgb.len()
-        );
-        let (width, height) = (self.width, self.height);
-        Ok(Distortion {
-            psnr: metrics::psnr(&self.rgb, decoded, 255.0),
-            ms_ssim: metrics::ms_ssim(&self.rgb, decoded, width as usize, 3, 255.0),
-            ssimulacra2: visual::ssimulacra2(&self.rgb, decoded, width, height)?,
-            butteraugli: visual::butteraugli_3_norm(&self.rgb, decoded, width, height)?,
-            cvvdp: visual::cvvdp(&self.rgb, decoded, width, height)?,
-        })
+        self.reference()?.distortion(decoded)
     }
 
     /// The picture at another size: cropped, or continued in mirror images.

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::available_parallelism;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
-use crate::code;
+use crate::{code, files};
 
 /// The crate's folder in the repository.
 pub(crate) const FOLDER: &str = env!("CARGO_MANIFEST_DIR");
@@ -31,6 +31,18 @@ pub(crate) fn product() -> Result<String> {
     let folder = Path::new(FOLDER);
     let checksum = code::checksum(&folder.join("../src"), &folder.join("Cargo.lock"), "image-gip")?;
     Ok(format!("{PRODUCT}{checksum:08x}"))
+}
+
+/// Packages with their versions, from `Cargo.lock`.
+pub(crate) fn packages(names: &[&str]) -> Result<Vec<String>> {
+    let lock = files::read(&Path::new(FOLDER).join("Cargo.lock"))?;
+    let version = |name: &&str| {
+        let (_, rest) = lock.split_once(&format!("name = \"{name}\"\nversion = \""))?;
+        Some(format!("{name} {}", rest.split_once('"')?.0))
+    };
+    let known =
+        names.iter().map(|name| version(name).with_context(|| format!("no package {name}")));
+    known.collect()
 }
 
 /// Whether a version of measurements is that of another version of our codec than this one.
@@ -65,6 +77,13 @@ fn output(command: &mut Command) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn packages_have_versions() {
+        let packages = packages(&["anyhow", "csv"]).expect("both are used");
+        assert!(packages[0].starts_with("anyhow 1.") && packages[1].starts_with("csv 1."));
+        assert!(super::packages(&["no such"]).is_err());
+    }
 
     #[test]
     fn versions_of_baselines_stay_and_those_of_other_codecs_do_not() {

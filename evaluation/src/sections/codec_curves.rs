@@ -117,9 +117,9 @@ impl Codec {
         let (codec, until) = (variant.name, extent.until);
         let wanted = Wanted { version, codec, settings: &settings, pictures, until };
         let mut threads = parallel::threads();
-        let points = store.all(&[wanted], &mut threads, |(), [_, index], picture| {
+        let points = store.all(&[wanted], &mut threads, |(), [_, index], reference| {
             let encoder = (variant.encoder)(gip::EFFORT).with_target(targets[index]);
-            Point::of_ours(encoder, picture)
+            Point::of_ours(encoder, reference)
         })?;
         let points = points.into_iter().flatten().collect();
         Ok(Self { id: codec, name: codec, settings, points, retuned: Vec::new() })
@@ -148,9 +148,9 @@ impl Codec {
             until: *until,
         });
         let wanted: Vec<Wanted<'_>> = wanted.collect();
-        let points = store.all(&wanted, workers, |worker, [codec, index], picture| {
+        let points = store.all(&wanted, workers, |worker, [codec, index], reference| {
             let (baseline, settings, _) = &all[codec];
-            Point::of_baseline(worker, baseline, &settings[index], picture)
+            Point::of_baseline(worker, baseline, &settings[index], reference)
         })?;
         let mut of_tunings = all.iter().zip(points);
         let codecs = sweeps.iter().map(|sweep| {

@@ -44,7 +44,7 @@ pub(super) fn compare(bench: &mut Bench, store: &mut RateStore) -> Result<Vec<Co
     let mut comparisons = Vec::new();
     let quick = bench.quick;
     // A large picture takes AVIF at its best longer than a quick run may last.
-    let sets = bench.compared_sets();
+    let sets = bench.all_sets();
     for set in sets.into_iter().filter(|set| !(quick && set.name == "large")) {
         let ours = Codec::ours(store, &product, &default, &set.pictures, extent(quick, 1))?;
         let (workers, versions) = bench.workers()?;

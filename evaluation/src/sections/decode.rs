@@ -403,7 +403,12 @@ fn theirs(
                 &mut || worker.decode_again(RUNS_PER_TURN),
             ],
         )?;
-        Ok([picture.rate(trip.bytes), picture.distortion(&trip.decoded)?.psnr, theirs, share])
+        Ok([
+            picture.rate(trip.bytes),
+            metrics::psnr(&picture.rgb, &trip.decoded, 255.0),
+            theirs,
+            share,
+        ])
     })
 }
 
@@ -437,7 +442,7 @@ fn ratios(bench: &Bench, all: &[RateResults]) -> String {
         }
         let faster = rows.iter().filter(|row| row.ratio() > 1.0);
         text.push_str(&format!(
-            "\nFiles of about {rate} bits per pixel:\n{}\nFaster than ours: {}.\n",
+            "\nFiles of about {rate} bpp:\n{}\nFaster than ours: {}.\n",
             table.finish(),
             list_or_none(faster.map(|row| row.decoder)),
         ));

@@ -17,6 +17,9 @@ const SECONDS: f64 = 2.0;
 const TILES: (u32, u32) = (12, 8);
 const TILE: u32 = 512;
 
+/// The set of large pictures, each of which takes minutes at the highest efforts: they go up to the default.
+pub(super) const LARGE: &str = "Large pictures";
+
 /// Measurements of our encoder: PSNR, seconds with one thread and with all, peak memory in bytes.
 type EncodingStore = Store<2, 4>;
 
@@ -36,7 +39,7 @@ pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64)
         "\n### Efforts\n\nCompared with each other: our encoder, tuned for PSNR, asked for {rate} bits per pixel. \
          Times are those of the encoder from samples in memory to a verified file in memory, of one thread and of \
          all in turns; all where none are named. Memory is the encoder's peak memory without the source. PSNR is \
-         a mean over the pictures, all else medians.\n",
+         a mean over the pictures, all else medians. Large pictures go up to the default effort.\n",
     );
     for &(name, pictures) in sets {
         if !pictures.is_empty() {
@@ -49,7 +52,11 @@ pub(super) fn efforts(bench: &Bench, sets: &[(&str, &[TestPicture])], rate: f64)
 }
 
 fn set(bench: &Bench, name: &str, pictures: &[TestPicture], rate: f64) -> Result<String> {
-    let efforts: &[u8] = if bench.quick { &gip::QUICK_EFFORTS } else { &gip::EFFORTS };
+    let mut efforts: &[u8] = if bench.quick { &gip::QUICK_EFFORTS } else { &gip::EFFORTS };
+    if name == LARGE {
+        let to_default = efforts.iter().take_while(|&&effort| effort <= gip::EFFORT).count();
+        efforts = &efforts[..to_default];
+    }
     let mut store: EncodingStore = bench.store(
         "encoding.csv",
         ["effort", "image"],

@@ -1,15 +1,16 @@
 //! Measurements of whole files, by every codec at every setting: `rate.csv`.
 
+use std::cell::LazyCell;
 use std::cmp::Reverse;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use image_gip::{Encoder, Threads};
 
 use crate::baselines::{Baseline, Worker};
 use crate::bench::Bench;
 use crate::gip;
 use crate::parallel;
-use crate::pictures::{Distortion, TestPicture};
+use crate::pictures::{Distortion, Reference, TestPicture};
 use crate::store::Store;
 
 /// What one file contributes to a rate-distortion curve.
@@ -22,24 +23,25 @@ pub(super) struct Point {
 }
 
 impl Point {
-    fn of(picture: &TestPicture, bytes: f64, decoded: &[u8]) -> Result<Self> {
-        Ok(Self { bytes, rate: picture.rate(bytes), distortion: picture.distortion(decoded)? })
+    fn of(reference: &Reference<'_>, bytes: f64, decoded: &[u8]) -> Result<Self> {
+        let rate = reference.picture.rate(bytes);
+        Ok(Self { bytes, rate, distortion: reference.distortion(decoded)? })
     }
 
     /// Of our file, with one thread: the file is the same with any number of threads.
-    pub(super) fn of_ours(encoder: Encoder, picture: &TestPicture) -> Result<Self> {
-        let file = gip::file(encoder, picture, Threads::One)?.bytes;
-        Self::of(picture, file.len() as f64, &gip::decode(&file, Threads::One)?)
+    pub(super) fn of_ours(encoder: Encoder, reference: &Reference<'_>) -> Result<Self> {
+        let file = gip::file(encoder, reference.picture, Threads::One)?.bytes;
+        Self::of(reference, file.len() as f64, &gip::decode(&file, Threads::One)?)
     }
 
     pub(super) fn of_baseline(
         worker: &mut Worker,
         baseline: &Baseline,
         setting: &str,
-        picture: &TestPicture,
+        reference: &Reference<'_>,
     ) -> Result<Self> {
-        let trip = worker.round_trip(baseline.id, setting, picture, Some(1), [1; 2])?;
-        Self::of(picture, trip.bytes, &trip.decoded)
+        let trip = worker.round_trip(baseline.id, setting, reference.picture, Some(1), [1; 2])?;
+        Self::of(reference, trip.bytes, &trip.decoded)
     }
 
     /// In the order of the columns.
@@ -89,7 +91,7 @@ impl RateStore {
     ) -> Result<Point> {
         let key = [baseline.id, setting, &picture.name];
         let values = self.0.get(versions, key, || {
-            Ok(Point::of_baseline(worker, baseline, setting, picture)?.values())
+            Ok(Point::of_baseline(worker, baseline, setting, &picture.reference()?)?.values())
         })?;
         Ok(values.into())
     }
@@ -100,7 +102,7 @@ impl RateStore {
         &mut self,
         all: &[Wanted<'_>],
         workers: &mut [W],
-        measure: impl Fn(&mut W, [usize; 2], &TestPicture) -> Result<Point> + Sync,
+        measure: impl Fn(&mut W, [usize; 2], &Reference<'_>) -> Result<Point> + Sync,
     ) -> Result<Vec<Vec<Vec<Point>>>> {
         // With what is known already, and those first that take longest, so that all workers end at once.
         let mut jobs: Vec<(usize, &TestPicture, Vec<Option<Point>>)> = Vec::new();
@@ -117,12 +119,15 @@ impl RateStore {
                     (codec, picture, known): &(usize, &TestPicture, Vec<Option<Point>>),
                     emit: &mut dyn FnMut((usize, usize, String, Point))| {
             let wanted = &all[*codec];
+            let reference = LazyCell::new(|| picture.reference());
             for (index, setting) in wanted.settings.iter().enumerate() {
                 let point = match known[index] {
                     Some(point) => point,
                     None => {
                         let key = || format!("{}, {setting}, {}", wanted.codec, picture.name);
-                        let point = measure(worker, [*codec, index], picture).with_context(key)?;
+                        let reference = reference.as_ref().map_err(|error| anyhow!("{error:#}"))?;
+                        let point =
+                            measure(worker, [*codec, index], reference).with_context(key)?;
                         emit((*codec, index, picture.name.clone(), point));
                         point
                     }
@@ -195,10 +200,10 @@ mod tests {
                 pictures: &pictures,
                 until,
             };
-            let points = store.all(&[wanted], &mut [(), ()], |(), [_, index], picture| {
+            let points = store.all(&[wanted], &mut [(), ()], |(), [_, index], reference| {
                 count.fetch_add(1, Ordering::Relaxed);
                 // A file of the larger picture has half as many bits per pixel.
-                let rate = (index + 1) as f64 / f64::from(picture.width);
+                let rate = (index + 1) as f64 / f64::from(reference.picture.width);
                 Ok(Point { bytes: 1.0, rate, distortion: Distortion::from([rate; 5]) })
             });
             let [points] = &points.expect("it measures")[..] else { panic!("there is one codec") };
@@ -216,7 +221,8 @@ mod tests {
     #[test]
     fn our_file_is_measured_as_it_is() {
         let picture = picture("a", 16);
-        let point = Point::of_ours(gip::encoder(1), &picture).expect("a small picture");
+        let point = Point::of_ours(gip::encoder(1), &picture.reference().expect("it has one"));
+        let point = point.expect("a small picture");
         assert_eq!(point.rate, point.bytes / 32.0);
         assert!(point.distortion.psnr > 50.0);
         assert_eq!(Point::from(point.values()).values(), point.values());

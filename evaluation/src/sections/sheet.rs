@@ -8,9 +8,11 @@ use image::{RgbImage, imageops};
 use image_gip::{Target, Threads};
 
 use super::crops::{Crop, extremes};
-use crate::bench::Bench;
+use crate::baselines::Worker;
+use crate::bench::{Bench, KeptFiles};
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
+use crate::parallel;
 use crate::pictures::TestPicture;
 use crate::table::Table;
 use crate::versions::{self, Version};
@@ -58,8 +60,11 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
     );
     let mut strips = Vec::new();
     for set in bench.sets() {
-        let of_set = set.pictures.iter().map(|picture| strips_of(bench, picture));
-        let of_set = of_set.collect::<Result<Vec<_>>>()?;
+        let files = bench.kept_files();
+        let (workers, _) = bench.workers()?;
+        let of_set = parallel::map(workers, &set.pictures, |worker, picture| {
+            strips_of(&files, worker, picture).with_context(|| picture.name.clone())
+        })?;
         let name = format!("sheet-{}.jpg", set.name).to_lowercase();
         sheet(&of_set).save_jpeg(&bench.path(&name), SHEET_BYTES)?;
         text.push_str(&format!("\n### Sheet: {}\n\n![{0}: crops]({name})\n", set.name));
@@ -83,7 +88,8 @@ struct Shown {
 impl Shown {
     fn new(codec: &'static str, picture: &TestPicture, version: Version) -> Result<Self> {
         let rate = picture.rate(version.bytes);
-        let ssimulacra2 = picture.distortion(&version.samples)?.ssimulacra2;
+        let TestPicture { rgb, width, height, .. } = picture;
+        let ssimulacra2 = visual::ssimulacra2(rgb, &version.samples, *width, *height)?;
         Ok(Self { codec, rate, ssimulacra2, samples: version.samples })
     }
 }
@@ -103,16 +109,19 @@ struct Strips {
     scores: Vec<f64>,
 }
 
-fn strips_of(bench: &mut Bench, picture: &TestPicture) -> Result<Strips> {
-    let file = ours(bench, picture)?;
-    let unreadable = || format!("remove {} and run again", bench.files().display());
+fn strips_of(files: &KeptFiles, worker: &mut Worker, picture: &TestPicture) -> Result<Strips> {
+    let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
+    let file = files.get(&name, || {
+        let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
+        Ok(gip::file(encoder, picture, Threads::One)?.bytes)
+    })?;
+    let unreadable = || format!("remove {} and run again", files.path(&name).display());
     let ours = Version::of_file(&file, None).with_context(unreadable)?;
     let bytes = ours.bytes;
     let samples = gip::decode_plain(&file, Threads::Pool)?;
     let plain = Version { bytes, samples, report: None };
     let mut shown = vec![Shown::new(gip::NAME, picture, ours)?, Shown::new(PLAIN, picture, plain)?];
     for name in OTHERS {
-        let (worker, _) = bench.baselines()?;
         let other = versions::baseline_called(name)?;
         let theirs = Version::baseline(worker, other, picture, bytes)?;
         shown.push(Shown::new(name, picture, theirs)?);
@@ -131,14 +140,6 @@ fn strips_of(bench: &mut Bench, picture: &TestPicture) -> Result<Strips> {
     let [_, most] = extremes(&texture, picture.width, side);
     let strips = [worst, best, most].map(|crop| strip(picture, &shown, crop, side));
     Ok(Strips { strips, scores: shown.iter().map(|version| version.ssimulacra2).collect() })
-}
-
-fn ours(bench: &Bench, picture: &TestPicture) -> Result<Vec<u8>> {
-    let name = format!("{}, {RATE} bpp, effort {}.gip", picture.name, gip::EFFORT);
-    bench.file(&name, || {
-        let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(RATE));
-        Ok(gip::file(encoder, picture, Threads::Pool)?.bytes)
-    })
 }
 
 fn strip(picture: &TestPicture, shown: &[Shown], crop: Crop, side: u32) -> Strip {

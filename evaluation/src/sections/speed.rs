@@ -33,8 +33,8 @@ const TIMES: [&str; 4] = [
 ];
 
 pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
-    let (kodak, large) = (pictures(bench), bench.large_sample());
-    let sets = [("Kodak", &kodak[..]), ("Large pictures", &large[..])];
+    let (kodak, large) = (pictures(bench), bench.large.clone());
+    let sets = [("Kodak", &kodak[..]), (encoding::LARGE, &large[..])];
     // What matters most comes first, so that a run that is interrupted has it.
     let races = race::measure(bench, &sets)?;
     let rows = measure_all(bench)?;
@@ -61,6 +61,8 @@ pub(crate) fn measure(bench: &mut Bench) -> Result<String> {
         }
     }
     text.push_str(&races);
+    let large = bench.large_sample();
+    let sets = [("Kodak", &kodak[..]), (encoding::LARGE, &large[..])];
     text.push_str(&encoding::efforts(bench, &sets, RATE)?);
     text.push_str(&encoding::single_pictures(bench, RATE)?);
     text.push_str(&growth::measure(bench)?);

@@ -2,16 +2,18 @@
 
 use std::ptr;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use image::{RgbImage, imageops};
 use image_gip::{Target, Threads};
 
 use super::case::{Case, worst};
 use super::kinds::KINDS;
+use crate::baselines::Worker;
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
 use crate::gip;
 use crate::metric::Metric;
+use crate::parallel;
 use crate::pictures::TestPicture;
 use crate::sections::crops::{Crop, extremes};
 use crate::sections::ranges::{RANGES, short};
@@ -38,11 +40,11 @@ struct Strip(Vec<(String, RgbImage)>);
 /// Writes the sheet of the worst picture by each metric and of each class of content, and says what
 /// is in it.
 pub(super) fn make(bench: &mut Bench, cases: &[Case]) -> Result<String> {
-    let mut strips = Vec::new();
-    for (case, metric) in chosen(cases) {
-        let rate = case.telling(metric).map_or(RATES[0], |(range, _)| RATES[range]);
-        strips.push(strip(bench, metric, &case.picture, rate)?);
-    }
+    let (workers, _) = bench.workers()?;
+    let strips = parallel::map(workers, &chosen(cases), |worker, (case, metric)| {
+        let rate = case.telling(*metric).map_or(RATES[0], |(range, _)| RATES[range]);
+        strip(worker, *metric, &case.picture, rate).with_context(|| case.picture.name.clone())
+    })?;
     let canvas = draw(&strips);
     let path = bench.path(NAME);
     canvas.save_jpeg(&path, BYTES)?;
@@ -50,11 +52,12 @@ pub(super) fn make(bench: &mut Bench, cases: &[Case]) -> Result<String> {
         "\n### Sheet: losses\n\nThe picture with the largest BD-rate by each metric, and then of each class of content by \
          {}, each picture once: the {SIDE} x {SIDE} pixels where ours is furthest behind {} (by the map of SSIMULACRA2; for \
          PSNR, by squared error), in our file of {} bits per pixel (where low, middle or high \
-         rates stand for the picture) and in others of as many bytes; with the rate and the metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
+         rates stand for the picture) and in others of as many bytes ({} at speed 6 with its default tuning: a file of it at its best takes half a minute); with the rate and the metric of the whole file. Photographs: Kodak; gb82 image set (CC0 1.0); Unsplash.\n\n![Crops where \
          we lose]({NAME})\n",
         Metric::Ssimulacra2.name(),
         OTHERS[0],
         RATES.map(|rate| rate.to_string()).join(", "),
+        OTHERS[0],
     ))
 }
 
@@ -76,13 +79,12 @@ fn chosen(cases: &[Case]) -> Vec<(&Case, Metric)> {
     chosen
 }
 
-fn strip(bench: &mut Bench, metric: Metric, picture: &TestPicture, rate: f64) -> Result<Strip> {
+fn strip(worker: &mut Worker, metric: Metric, picture: &TestPicture, rate: f64) -> Result<Strip> {
     let encoder = gip::encoder(gip::EFFORT).with_target(Target::BitsPerPixel(rate));
-    let file = gip::file(encoder, picture, Threads::Pool)?;
+    let file = gip::file(encoder, picture, Threads::One)?;
     let mut versions = vec![(gip::NAME, Version::of_file(&file.bytes, Some(file.report))?)];
     let bytes = versions[0].1.bytes;
     for name in OTHERS {
-        let (worker, _) = bench.baselines()?;
         let baseline = versions::baseline_called(name)?;
         versions.push((name, Version::baseline(worker, baseline, picture, bytes)?));
     }

@@ -6,6 +6,7 @@ use image::RgbImage;
 use super::codecs::{self, BUDGETS, Codec, Placeholder, Placeholders};
 use crate::bench::Bench;
 use crate::canvas::{Canvas, LINE};
+use crate::parallel;
 use crate::pictures::TestPicture;
 
 /// How many pictures are shown, of those that are at least as wide as high.
@@ -29,15 +30,15 @@ pub(super) fn make(bench: &mut Bench) -> Result<String> {
     let wide = |picture: &&TestPicture| picture.width >= picture.height;
     let wide: Vec<TestPicture> = bench.pictures.iter().filter(wide).cloned().collect();
     let count = if bench.quick { QUICK_PICTURES } else { PICTURES }.min(wide.len());
-    let mut blocks = Vec::new();
-    for picture in (0..count).map(|index| &wide[index * wide.len() / count]) {
-        let scratch = bench.path("");
-        let (worker, _) = bench.baselines()?;
+    let shown: Vec<_> = (0..count).map(|index| &wide[index * wide.len() / count]).collect();
+    let scratch = bench.path("");
+    let (workers, _) = bench.workers()?;
+    let blocks = parallel::map(workers, &shown, |worker, picture| {
         let of_codec = |codec: Codec| codec.placeholders(worker, &scratch, picture);
         let placeholders = Codec::ALL.into_iter().map(of_codec).collect::<Result<_>>()?;
         let (name, original) = (picture.name.clone(), codecs::original(picture));
-        blocks.push(Block { name, original, placeholders });
-    }
+        Ok(Block { name, original, placeholders })
+    })?;
     draw(&blocks).save_jpeg(&bench.path(NAME), BYTES)?;
     Ok(format!(
         "\n![Placeholders of {count} pictures, with the bytes and the SSIMULACRA2 of each]({NAME})\n"

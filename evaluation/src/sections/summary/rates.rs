@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::bench::Bench;
-use crate::contents::RENDERED;
+use crate::contents::{Contents, RENDERED};
 use crate::gip;
 use crate::metric::Metric;
 use crate::plot::{Corner, Plot, Scale, Series};
@@ -18,14 +18,28 @@ const METRIC: Metric = Metric::Ssimulacra2;
 const CURVES: &str = "summary-curves.svg";
 const PICTURES: &str = "summary-pictures.svg";
 
-/// Sets of photographs, and others.
-fn parted(comparisons: &[Comparison]) -> (Vec<&Comparison>, Vec<&Comparison>) {
-    comparisons.iter().partition(|comparison| comparison.set.name != "screens")
+/// The pictures of a set that a claim is about.
+struct Part<'a> {
+    comparison: &'a Comparison,
+    /// Their indices.
+    pictures: Vec<usize>,
+}
+
+/// Photographs, which rendered pictures among them are not, and others.
+fn parted<'a>(contents: &Contents, comparisons: &'a [Comparison]) -> [Vec<Part<'a>>; 2] {
+    let part = |comparison: &'a Comparison| {
+        let pictures = comparison.set.pictures.iter().enumerate();
+        let pictures = pictures.filter(|(_, picture)| contents.of(&picture.name) != RENDERED);
+        Part { comparison, pictures: pictures.map(|(index, _)| index).collect() }
+    };
+    let (photographs, others): (Vec<_>, Vec<_>) =
+        comparisons.iter().partition(|comparison| comparison.set.name != "screens");
+    [photographs, others].map(|comparisons| comparisons.into_iter().map(part).collect())
 }
 
 /// A list of claims.
 pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> String {
-    let (photographs, others) = parted(comparisons);
+    let [photographs, others] = parted(&bench.contents, comparisons);
     let anchor = comparisons[0].best_avif().name;
     let mut text = String::new();
     for range in RANGES {
@@ -34,12 +48,12 @@ pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> String {
             range.name,
             range.rates.0,
             range.rates.1,
-            by_metric(bench, &photographs, anchor, range),
+            by_metric(&photographs, anchor, range),
         ));
     }
     if !others.is_empty() {
         let each = RANGES.map(|range| {
-            let (outcome, _) = of(bench, &others, anchor, METRIC, range);
+            let (outcome, _) = of(&others, anchor, METRIC, range);
             let Outcome { mean, won, compared, .. } = outcome;
             if compared == 0 {
                 return format!("nothing to compare at {} rates", range.name);
@@ -52,51 +66,47 @@ pub(super) fn claims(bench: &Bench, comparisons: &[Comparison]) -> String {
             each.join(", "),
         ));
     }
-    text.push_str(&format!("- {}\n", lost(bench, &photographs, anchor)));
+    text.push_str(&format!("- {}\n", lost(&photographs, anchor)));
     text
 }
 
 /// The table of all codecs, and two plots.
 pub(super) fn pictures(bench: &Bench, comparisons: &[Comparison]) -> Result<String> {
-    let (photographs, _) = parted(comparisons);
+    let [photographs, _] = parted(&bench.contents, comparisons);
     let anchor = comparisons[0].best_avif().name;
     Ok(format!(
         "\nHow much larger (+) or smaller (-) our files of photographs are at equal {}: the mean, the median, and \
          pictures won of those with a quality in common. Rendered scenes are not photographs; not every codec was \
          measured on every set, so rows with other numbers of pictures are of other pictures.\n{}\n![Quality over rate]({})\n\n![Every photograph]({})\n",
         METRIC.name(),
-        table(bench, &photographs),
+        table(&photographs),
         curves(bench, comparisons)?,
         every_photograph(bench, &photographs, anchor)?
     ))
 }
 
-/// The BD-rates of all pictures of some sets, but those that are rendered, against the codec of a name,
-/// with their names.
+/// The BD-rates of all pictures of some sets against the codec of a name, with their names.
 fn of<'a>(
-    bench: &Bench,
-    comparisons: &[&'a Comparison],
+    parts: &[Part<'a>],
     name: &str,
     metric: Metric,
     range: Range,
 ) -> (Outcome, Vec<(&'a str, Option<f64>)>) {
     let mut all = Vec::new();
-    for comparison in comparisons {
+    for &Part { comparison, ref pictures } in parts {
         let Some(other) = comparison.other(name) else { continue };
         let rates = bd_rates(&comparison.ours, other, metric, range);
-        let names = comparison.set.pictures.iter().map(|picture| short(&picture.name));
-        let named = names.zip(rates).zip(&comparison.set.pictures);
-        let photographs = named.filter(|(_, picture)| bench.contents.of(&picture.name) != RENDERED);
-        all.extend(photographs.map(|(named, _)| named));
+        let name = |index: usize| short(&comparison.set.pictures[index].name);
+        all.extend(pictures.iter().map(|&index| (name(index), rates[index])));
     }
     let rates: Vec<Option<f64>> = all.iter().map(|(_, rate)| *rate).collect();
     (Outcome::of(&rates), all)
 }
 
 /// The mean, the median and the pictures won, by each metric.
-fn by_metric(bench: &Bench, photographs: &[&Comparison], anchor: &str, range: Range) -> String {
+fn by_metric(photographs: &[Part<'_>], anchor: &str, range: Range) -> String {
     let each = Metric::ALL.map(|metric| {
-        let (outcome, _) = of(bench, photographs, anchor, metric, range);
+        let (outcome, _) = of(photographs, anchor, metric, range);
         let Outcome { mean, median, won, compared, .. } = outcome;
         format!(
             "{} {} (median {}, {won} of {compared} won)",
@@ -109,39 +119,48 @@ fn by_metric(bench: &Bench, photographs: &[&Comparison], anchor: &str, range: Ra
 }
 
 /// The photographs that are lost by all metrics at middle rates, and the largest loss at any rates.
-fn lost(bench: &Bench, photographs: &[&Comparison], anchor: &str) -> String {
-    let all = Metric::ALL.map(|metric| of(bench, photographs, anchor, metric, MIDDLE).1);
-    let lost = |index: usize| all.iter().all(|of| of[index].1.is_some_and(|rate| rate > 0.0));
-    let count = (0..all[0].len()).filter(|&index| lost(index)).count();
-    let mut worst: Option<(f64, String)> = None;
-    for (metric, range) in Metric::ALL.into_iter().flat_map(|m| RANGES.map(|range| (m, range))) {
-        for (name, rate) in of(bench, photographs, anchor, metric, range).1 {
-            let Some(rate) = rate else { continue };
-            if worst.as_ref().is_none_or(|(largest, _)| rate > *largest) {
-                let what = format!("of {name} by {} at {} rates", metric.name(), range.name);
-                worst = Some((rate, what));
-            }
-        }
-    }
-    let worst = worst.map_or_else(String::new, |(rate, what)| {
-        format!("; the largest BD-rate is {}, {what}", percent(Some(rate)))
+fn lost(photographs: &[Part<'_>], anchor: &str) -> String {
+    let each = Metric::ALL.into_iter().flat_map(|metric| RANGES.map(|range| (metric, range)));
+    let each = each.map(|(metric, range)| {
+        let (_, rates) = of(photographs, anchor, metric, range);
+        (metric, range, rates)
     });
+    let each: Vec<_> = each.collect();
+    let count = each[0].2.len();
+    let middle = each.iter().filter(|(_, range, _)| range.name == MIDDLE.name);
+    let is_lost =
+        |index: usize, rates: &[(&str, Option<f64>)]| rates[index].1.is_some_and(|rate| rate > 0.0);
+    let mut lost: Vec<usize> = (0..count).collect();
+    middle.for_each(|(.., rates)| lost.retain(|&index| is_lost(index, rates)));
+    let all = each.iter().flat_map(|(metric, range, rates)| {
+        rates.iter().filter_map(move |(name, rate)| Some((name, metric, range, (*rate)?)))
+    });
+    let worst = match all.max_by(|a, b| a.3.total_cmp(&b.3)) {
+        Some((name, metric, range, rate)) => format!(
+            "; the largest BD-rate is {}, of {name} by {} at {} rates",
+            percent(Some(rate)),
+            metric.name(),
+            range.name
+        ),
+        None => String::new(),
+    };
     format!(
-        "**Where we lose**: {count} of {} photographs are larger than {anchor} by all metrics at middle rates{worst}.",
-        all[0].len()
+        "**Where we lose**: {} of {count} photographs are larger than {anchor} by all metrics at middle rates{worst}.",
+        lost.len()
     )
 }
 
 /// A row for each of the other codecs, a column for each range.
-fn table(bench: &Bench, photographs: &[&Comparison]) -> String {
+fn table(photographs: &[Part<'_>]) -> String {
     let mut columns = vec![format!("{} against", gip::NAME)];
     columns.extend(RANGES.map(|range| range.title()));
     let mut table = Table::new(&columns);
-    let rivals = photographs[0].others.iter().filter(|codec| !codec.name.starts_with(gip::NAME));
+    let rivals =
+        photographs[0].comparison.others.iter().filter(|codec| !codec.name.starts_with(gip::NAME));
     for Codec { name, .. } in rivals {
         let mut cells = vec![(*name).to_owned()];
         cells.extend(RANGES.map(|range| {
-            let (outcome, _) = of(bench, photographs, name, METRIC, range);
+            let (outcome, _) = of(photographs, name, METRIC, range);
             let [mean, median] = [outcome.mean, outcome.median].map(percent);
             format!("{mean}; {median}; {}/{}", outcome.won, outcome.compared)
         }));
@@ -169,13 +188,9 @@ fn curves(bench: &Bench, comparisons: &[Comparison]) -> Result<&'static str> {
 }
 
 /// The mean BD-rate over all ranges of every photograph, in order, by each metric.
-fn every_photograph(
-    bench: &Bench,
-    photographs: &[&Comparison],
-    anchor: &str,
-) -> Result<&'static str> {
+fn every_photograph(bench: &Bench, photographs: &[Part<'_>], anchor: &str) -> Result<&'static str> {
     let series = Metric::ALL.map(|metric| {
-        let of_ranges = RANGES.map(|range| of(bench, photographs, anchor, metric, range).1);
+        let of_ranges = RANGES.map(|range| of(photographs, anchor, metric, range).1);
         let of_picture = |index: usize| mean(of_ranges.iter().filter_map(|of| of[index].1));
         let mut rates: Vec<f64> = (0..of_ranges[0].len()).filter_map(of_picture).collect();
         rates.sort_by(f64::total_cmp);
