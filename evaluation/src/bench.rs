@@ -6,7 +6,7 @@ use std::fs;
 use std::mem;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
 use crate::baselines::Worker;
 use crate::contents::Contents;
@@ -329,8 +329,7 @@ impl KeptFiles {
         }
         eprintln!("{name}");
         let bytes = make()?;
-        fs::create_dir_all(&self.0)
-            .with_context(|| format!("cannot make the folder {}", self.0.display()))?;
+        files::make_folder(&self.0)?;
         files::replace(&path, &bytes)?;
         Ok(bytes)
     }

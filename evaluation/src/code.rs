@@ -90,7 +90,7 @@ fn hash(tokens: TokenStream, hasher: &mut crc32fast::Hasher) {
 }
 
 /// What a package of a `Cargo.lock` needs, directly or not: names and versions in the order of the file.
-fn packages(lock: &str, package: &str) -> Vec<String> {
+pub(crate) fn packages(lock: &str, package: &str) -> Vec<String> {
     let sections: Vec<&str> = lock.split("[[package]]\n").skip(1).collect();
     let value = |section: &str, field: &str| {
         let line = section.lines().find_map(|line| line.strip_prefix(&format!("{field} = \"")));

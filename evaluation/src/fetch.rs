@@ -7,6 +7,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::files;
 use crate::manifest::{Listed, Manifest, NAME};
 use crate::pictures;
 
@@ -57,8 +58,7 @@ pub(crate) fn fetch(args: &Args) -> Result<()> {
 fn get(listed: &Listed, path: &Path) -> Result<()> {
     if !path.exists() {
         let folder = path.parent().context("it is in a folder")?;
-        let no_folder = || format!("cannot make the folder {}", folder.display());
-        fs::create_dir_all(folder).with_context(no_folder)?;
+        files::make_folder(folder)?;
         let is_png = listed.url.ends_with(".png");
         let new = path.with_extension(if is_png { "png.new" } else { "jxl" });
         let fetch = ["--fail", "--silent", "--show-error", "--location", "--output"];

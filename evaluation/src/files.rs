@@ -30,6 +30,11 @@ pub(crate) fn lock(folder: &Path) -> Result<File> {
     }
 }
 
+/// Makes a folder, and those that it is in, where they are missing.
+pub(crate) fn make_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).with_context(|| format!("cannot make the folder {}", path.display()))
+}
+
 /// The text of a file.
 pub(crate) fn read(path: &Path) -> Result<String> {
     fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))

@@ -34,11 +34,10 @@ mod table;
 mod versions;
 mod visual;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::{Parser, Subcommand};
 
 use bench::{Bench, Folders};
@@ -119,8 +118,7 @@ fn main() -> Result<()> {
 
 fn write_report(folders: &Folders, args: Args) -> Result<()> {
     let start = Instant::now();
-    fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+    files::make_folder(&args.out)?;
     let _lock = files::lock(&args.out)?;
     store::tidy(&args.out)?;
     let sections = sections(&args)?;
@@ -215,6 +213,8 @@ fn measure(section: Section, bench: &mut Bench) -> Result<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use clap::CommandFactory;
 

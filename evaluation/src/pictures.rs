@@ -258,6 +258,22 @@ mod tests {
     }
 
     #[test]
+    fn one_in_so_many_pictures_can_be_taken() {
+        let picture = |name: &str| {
+            let rgb = vec![0; 3];
+            TestPicture { name: name.into(), path: "".into(), width: 1, height: 1, rgb }
+        };
+        let set = PictureSet { name: "photos", pictures: ["a", "b", "c"].map(picture).into() };
+        let names = |step: usize| -> Vec<String> {
+            set.clone().every(step).pictures.into_iter().map(|picture| picture.name).collect()
+        };
+        assert_eq!(
+            (names(1), names(2)),
+            (vec!["a".into(), "b".into(), "c".into()], vec!["a".into(), "c".into()])
+        );
+    }
+
+    #[test]
     fn a_mosaic_has_every_tile_once() {
         let picture = |width: u32, height: u32, first: u8| {
             let rgb = (0..(width * height * 3) as u8).map(|sample| first + sample).collect();

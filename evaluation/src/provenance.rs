@@ -36,12 +36,11 @@ pub(crate) fn product() -> Result<String> {
 /// Packages with their versions, from `Cargo.lock`.
 pub(crate) fn packages(names: &[&str]) -> Result<Vec<String>> {
     let lock = files::read(&Path::new(FOLDER).join("Cargo.lock"))?;
-    let version = |name: &&str| {
-        let (_, rest) = lock.split_once(&format!("name = \"{name}\"\nversion = \""))?;
-        Some(format!("{name} {}", rest.split_once('"')?.0))
-    };
-    let known =
-        names.iter().map(|name| version(name).with_context(|| format!("no package {name}")));
+    let needed = code::packages(&lock, env!("CARGO_PKG_NAME"));
+    let known = names.iter().map(|name| {
+        let found = needed.iter().find(|package| package.split(' ').next() == Some(*name));
+        found.cloned().with_context(|| format!("no package {name}"))
+    });
     known.collect()
 }
 

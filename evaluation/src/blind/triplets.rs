@@ -1,10 +1,9 @@
 //! Makes the triplets: an original between two versions of it in files of equal size.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use clap::builder::RangedU64ValueParser;
 use fastrand::Rng;
 use image::RgbImage;
@@ -14,6 +13,7 @@ use super::key::{self, Shown, Triplet};
 use crate::baselines::Worker;
 use crate::canvas::{Canvas, LINE};
 use crate::contents::Contents;
+use crate::files;
 use crate::pictures::{self, TestPicture};
 use crate::versions::{self, RATES, Version};
 use crate::{gip, provenance};
@@ -64,7 +64,7 @@ pub(crate) fn make(args: &Args) -> Result<()> {
     let key = args.out.join("key.csv");
     ensure!(!key.exists(), "{} is there already: its triplets would be lost", key.display());
     let folder = args.out.join("triplets");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    files::make_folder(&folder)?;
 
     let mut triplets = plan(&pictures, &contents, args.count, args.seed)?;
     let mut worker = Worker::start(&args.out, 0)?;

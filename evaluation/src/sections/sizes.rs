@@ -12,6 +12,7 @@ use image_gip::{Target, Threads};
 use crate::baselines::Worker;
 use crate::bench::{Bench, timing_version};
 use crate::comparison::{Better, NamedFigures, better_than};
+use crate::files;
 use crate::gip;
 use crate::metric::Metric;
 use crate::parallel;
@@ -291,7 +292,7 @@ impl FileStore {
     /// Measures what is missing, on all cores.
     fn fill(&mut self, bench: &mut Bench, pictures: &[TestPicture]) -> Result<()> {
         let folder = bench.path("sizes");
-        fs::create_dir_all(&folder)?;
+        files::make_folder(&folder)?;
         let mut jobs = Vec::new();
         for picture in pictures {
             for (show, rates) in ALL {

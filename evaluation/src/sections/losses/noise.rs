@@ -7,6 +7,7 @@ use image::RgbImage;
 
 use super::source::Source;
 use crate::bench::Bench;
+use crate::files;
 use crate::gip;
 use crate::metric::Metric;
 use crate::pictures::TestPicture;
@@ -75,7 +76,7 @@ fn measured(
     let extent = Extent { until: HIGH.rates.1, ..Extent::new(bench.quick) };
     let product = bench.product.clone();
     let folder = bench.path("noise");
-    fs::create_dir_all(&folder)?;
+    files::make_folder(&folder)?;
     let pictures: Vec<TestPicture> = pictures
         .iter()
         .map(|picture| {
